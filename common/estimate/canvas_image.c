@@ -156,6 +156,21 @@ static void doubt_short_chains(struct making *m)
 	m->img->rel_mse_95[0] = m->img->rel_mse_95[1] = NAN;
 }
 
+/* If what no sample has found were in the image, its error would leave the interval. Once samples find such light, it
+ * is in the spread between groups. */
+static void doubt_unseen_light(struct making *m)
+{
+	const struct plan *p = &m->c->plan;
+	struct canvas_image *img = m->img;
+	if (p->kind == PLAN_CHAINS || !(img->rel_mse > 0))
+		return;
+	img->rel_mse_unseen = plan_unseen_after(p, (double)p->groups * (double)p->epoch * (double)m->c->rounds);
+	if (img->rel_mse_doubt || img->rel_mse + IMAGE_UNSEEN_FACTOR * img->rel_mse_unseen <= img->rel_mse_95[1])
+		return;
+	img->rel_mse_doubt = ERROR_UNSEEN;
+	img->rel_mse_95[0] = img->rel_mse_95[1] = NAN;
+}
+
 int canvas_image(const struct canvas *c, bool open_rounds, struct canvas_image *img, struct error *e)
 {
 	const struct plan *p = &c->plan;
@@ -196,6 +211,8 @@ int canvas_image(const struct canvas *c, bool open_rounds, struct canvas_image *
 		rc = find_moments(&m, e);
 	if (rc == 0 && errors)
 		doubt_short_chains(&m);
+	if (rc == 0 && errors)
+		doubt_unseen_light(&m);
 	if (rc)
 		canvas_image_fini(img);
 	mem_free(m.all);

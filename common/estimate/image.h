@@ -26,7 +26,11 @@ enum error_doubt {
 		       above error_tail_least */
 	ERROR_NO_SPREAD, /* a single group: nothing to compare it with */
 	ERROR_SHORT,	 /* the chains are too short to be judged (common/estimate/convergence.h) */
+	ERROR_UNSEEN,	 /* light that so few samples hardly ever find is missing (struct plan_unseen) */
 };
+
+/* By which pilots' estimates of rel_mse_unseen may be too small: they are made of few photons. */
+#define IMAGE_UNSEEN_FACTOR 2
 
 struct canvas_image {
 	uint32_t width, height; /* crop */
@@ -43,6 +47,8 @@ struct canvas_image {
 	double rel_mse_95[2];	/* contains this image's relMSE in 95 % of all cases; NAN if doubtful */
 	enum error_doubt rel_mse_doubt;
 	double doubtful_share; /* share of rel_mse that the doubt is about */
+	double rel_mse_unseen; /* what light that so few samples hardly ever find adds to rel_mse, by the plan's pilot
+				*/
 	double error_tail; /* tail index (common/estimate/tail.h) of the groups' relative errors of pixels; INFINITY or
 			      0: not known */
 	double error_tail_least; /* above this the variance of errors is finite, with 95 % confidence */

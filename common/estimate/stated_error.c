@@ -62,6 +62,13 @@ void stated_error_doubt(const struct canvas_image *img, char *text, size_t size)
 	case ERROR_SHORT:
 		text_put(&t, "the chains are too short to be judged");
 		break;
+	case ERROR_UNSEEN:
+		text_put(
+			&t,
+			"about %.2g %% of the light, root mean square over the image, arrives by paths that so few samples "
+			"hardly ever find; with it the error is about %.3g %%",
+			100 * sqrt(img->rel_mse_unseen), 100 * sqrt(img->rel_mse + img->rel_mse_unseen));
+		break;
 	}
 }
 
@@ -110,7 +117,9 @@ double stated_error_upper(const struct canvas_image *img, bool *doubtful)
 {
 	double error = sqrt(img->rel_mse), upper = sqrt(img->rel_mse_upper);
 	bool samples = !img->r_hat;
-	*doubtful = img->rel_mse_doubt != ERROR_KNOWN;
+	*doubtful = img->rel_mse_doubt != ERROR_KNOWN && img->rel_mse_doubt != ERROR_UNSEEN;
+	if (img->rel_mse_doubt == ERROR_UNSEEN)
+		return sqrt(img->rel_mse_upper + IMAGE_UNSEEN_FACTOR * img->rel_mse_unseen);
 	for (size_t i = 0; i < RARE_RULES && samples; i++) {
 		const struct rare_rule *r = &rare_rules[i];
 		if (img->rel_mse_doubt != r->doubt || !(error <= r->small))

@@ -41,6 +41,7 @@ enum {
 };
 #define TOTAL_MOST (UINT64_C(1) << 62)
 #define LEASE_MOST (UINT64_C(1) << 40)
+static const double unseen_most = 1e12;
 
 static wide wide_ceil_div(wide a, wide b)
 {
@@ -406,6 +407,7 @@ int plan_make(const struct plan_request *r, struct plan *p, struct error *e)
 	memcpy(p->mutations, r->mixture, strnlen(r->mixture, sizeof p->mutations));
 	memcpy(p->accuracy, r->accuracy, strnlen(r->accuracy, sizeof p->accuracy));
 	memcpy(p->effects, r->effects, strnlen(r->effects, sizeof p->effects));
+	p->unseen = r->unseen;
 	if (r->crop_width == 0) {
 		p->crop_x = p->crop_y = 0;
 		p->crop_width = r->width;
@@ -510,6 +512,14 @@ static int check_end(const struct plan *p, struct error *e)
 	return 0;
 }
 
+static int check_unseen(const struct plan *p, struct error *e)
+{
+	for (int i = 0; i < PLAN_UNSEEN; i++)
+		if (!(p->unseen.at[i] >= 0 && p->unseen.at[i] <= unseen_most))
+			return error_set(e, EINVAL, "unseen light of %g", p->unseen.at[i]);
+	return 0;
+}
+
 int plan_check(const struct plan *p, struct error *e)
 {
 	int rc = check_integrator(p, e);
@@ -519,7 +529,16 @@ int plan_check(const struct plan *p, struct error *e)
 		rc = check_film(p, e);
 	if (rc == 0)
 		rc = check_cut(p, e);
+	if (rc == 0)
+		rc = check_unseen(p, e);
 	return rc ? rc : check_end(p, e);
+}
+
+double plan_unseen_after(const struct plan *p, double spp)
+{
+	const double *at = p->unseen.at, x = fmin(fmax(0.5 * log2(spp), 0), PLAN_UNSEEN - 1);
+	int i = (int)fmin(x, PLAN_UNSEEN - 2);
+	return at[i] + (x - i) * (at[i + 1] - at[i]);
 }
 
 /* ---- texts ---- */

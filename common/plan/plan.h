@@ -41,6 +41,16 @@ enum {
 	PLAN_SPEED_MOST = 20000000, /* mutations or samples a second of one thread: nothing is faster */
 };
 
+/*
+ * Light that few samples hardly ever find, such as reflections inside the glass around a lamp for `path`, as a pilot
+ * estimates it (worker/render/unseen_light.h): at[i] is the mean over the film of the square of its share in a place's
+ * light, for 4^i samples per pixel. All 0: there is none, or no pilot has asked.
+ */
+enum { PLAN_UNSEEN = 12 };
+struct plan_unseen {
+	double at[PLAN_UNSEEN];
+};
+
 /* Rays that a pilot counted (worker/render/rays.h), the same on every machine; 0: not counted. */
 struct plan_rays {
 	double bootstrap, step; /* per bootstrap sample; per mutation or sample */
@@ -65,6 +75,7 @@ struct plan_request {
 	double speed; /* mutations or samples a second of one thread, measured by a pilot: bounds a lease's time; 0: not
 			 known */
 	struct plan_rays rays; /* set if a time or an error ends the job: decides how much fits into it */
+	struct plan_unseen unseen;
 	double bandwidth; /* bytes of tiles a second that one thread may send, set by the coordinator; 0: unlimited */
 	char mixture[PLAN_MUTATIONS_MAX]; /* see mutations below; the count of them has the word here */
 	char accuracy[PLAN_ACCURACY_MAX], effects[PLAN_EFFECTS_MAX];
@@ -89,6 +100,7 @@ struct plan {
 	 * "tolerance=1e-05". Effects whose choice was overridden: "all", "-dispersion,+aperture". Empty: nothing
 	 * differs. */
 	char accuracy[PLAN_ACCURACY_MAX], effects[PLAN_EFFECTS_MAX];
+	struct plan_unseen unseen; /* changes no bit of the image, but what is said of its error */
 };
 
 /* Their numbers, but for the kind: those that a plan has from its request, and those that plan_make may choose.
@@ -128,6 +140,8 @@ bool plan_wants_rays(const struct plan_request *r);
 uint64_t plan_bootstrap_room(const struct plan_request *r, double seconds);
 /* Every plan from the wire must pass this check. */
 int plan_check(const struct plan *p, struct error *e);
+/* The share's mean square after that many samples per pixel, linear in their logarithm between two entries. */
+double plan_unseen_after(const struct plan *p, double spp);
 /* The rule by which plan_make chose the length of an epoch; empty: it was requested. */
 void plan_describe_epoch(const struct plan_request *r, const struct plan *p, char *text, size_t size);
 enum { PLAN_TEXT = 1536 }; /* enough for any of these texts */

@@ -5,6 +5,28 @@
 
 #include <string.h>
 
+static size_t unseen_to_wire(const struct plan_unseen *u, double **out)
+{
+	union { /* messages are only read: protobuf-c knows no const */
+		const double *from;
+		double *to;
+	} borrowed = {u->at};
+	*out = borrowed.to;
+	for (size_t i = 0; i < PLAN_UNSEEN; i++)
+		if (u->at[i] > 0)
+			return PLAN_UNSEEN;
+	return 0;
+}
+
+static int unseen_from_wire(const double *at, size_t count, struct plan_unseen *out, struct error *e)
+{
+	if (count && count != PLAN_UNSEEN)
+		return error_set(e, EBADMSG, "a plan with %zu numbers of unseen light", count);
+	for (size_t i = 0; i < count; i++)
+		out->at[i] = at[i];
+	return 0;
+}
+
 void plan_to_wire(const struct plan *p, Farm__Plan *out)
 {
 	farm__plan__init(out);
@@ -16,6 +38,7 @@ void plan_to_wire(const struct plan *p, Farm__Plan *out)
 	out->mutations = text_borrow(p->mutations);
 	out->accuracy = text_borrow(p->accuracy);
 	out->effects = text_borrow(p->effects);
+	out->n_unseen = unseen_to_wire(&p->unseen, &out->unseen);
 }
 
 static int kind_from_wire(uint32_t kind, const char *name, enum plan_kind *out, char integrator[16], struct error *e)
@@ -61,6 +84,8 @@ int plan_from_wire(const Farm__Plan *m, struct plan *p, struct error *e)
 		rc = text_from_wire(m->accuracy, p->accuracy, sizeof p->accuracy, e);
 	if (!rc)
 		rc = text_from_wire(m->effects, p->effects, sizeof p->effects, e);
+	if (!rc)
+		rc = unseen_from_wire(m->unseen, m->n_unseen, &p->unseen, e);
 	if (rc)
 		return rc;
 #define X(name) p->name = m->name;
@@ -82,6 +107,7 @@ void plan_request_to_wire(const struct plan_request *r, Farm__PlanRequest *out)
 	out->mixture = text_borrow(r->mixture);
 	out->accuracy = text_borrow(r->accuracy);
 	out->effects = text_borrow(r->effects);
+	out->n_unseen = unseen_to_wire(&r->unseen, &out->unseen);
 }
 
 int plan_request_from_wire(const Farm__PlanRequest *m, struct plan_request *r, struct error *e)
@@ -96,6 +122,8 @@ int plan_request_from_wire(const Farm__PlanRequest *m, struct plan_request *r, s
 		rc = text_from_wire(m->accuracy, r->accuracy, sizeof r->accuracy, e);
 	if (!rc)
 		rc = text_from_wire(m->effects, r->effects, sizeof r->effects, e);
+	if (!rc)
+		rc = unseen_from_wire(m->unseen, m->n_unseen, &r->unseen, e);
 	if (!rc && !(m->speed >= 0 && m->speed <= PLAN_SPEED_MOST))
 		rc = error_set(e, EBADMSG, "a pilot of %g a second", m->speed);
 	if (!rc && !(m->bootstrap_rays >= 0 && m->bootstrap_rays < 1e15 && m->step_rays >= 0 && m->step_rays < 1e15))

@@ -96,4 +96,14 @@ ends 0 "$DIR/large.log" "$BIN/hslt-render" "$SCENE" -o "$DIR/b.exr" $LARGE $CHAI
 grep -q ': note:' "$DIR/large.log" && fail "nothing is wrong, but: $(grep ': note:' "$DIR/large.log")"
 grep -a -q hslt:disagreement "$DIR/b.exr" && fail "the header finds something wrong"
 ends 0 "$DIR/path.log" "$BIN/hslt-render" "$SCENE" -o "$DIR/b.exr" $SMALL --size 160x120 --integrator path --spp 1
+# Light that path hardly ever finds, as it is reflected in the glass first: said, and on the farm by the same header.
+UNSEEN="--size 48x36 --spp 64"
+ends 0 "$DIR/unseen.log" "$BIN/hslt-render" "$SCENE" -o "$DIR/a.exr" $UNSEEN --integrator path --quiet --stats "$DIR/a.json"
+has "$DIR/unseen.log" 'arrives by paths that so few samples hardly ever find; with it the error is about'
+grep -q '"relMSEUnseen": [0-9.e-]*[1-9]' "$DIR/a.json" || fail "the statistics do not say how much is unseen"
+ends 0 "$DIR/submit.log" "$BIN/hslt-submit" "$SCENE" -o "$DIR/farm.exr" $UNSEEN --integrator path --wait
+has "$DIR/submit.log" 'hardly ever find'
+same "$DIR/a.exr" "$DIR/farm.exr"
+ends 0 "$DIR/seen.log" "$BIN/hslt-render" "$SCENE" -o "$DIR/a.exr" $UNSEEN --integrator bdpt --quiet
+[ ! -s "$DIR/seen.log" ] || fail "bdpt finds it, but: $(cat "$DIR/seen.log")"
 sed -n 's/.*note: //p' "$DIR/render.log"

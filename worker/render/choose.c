@@ -451,21 +451,12 @@ static bool path_misses(const struct world *w)
 	return emitter && lobe;
 }
 
-/* What the scene has, whatever the user forces. */
-static bool scene_has(const struct render_summary *s, const char *effect)
-{
-	for (size_t i = 0; i < s->line_count; i++)
-		if (strcmp(s->lines[i].name, effect) == 0)
-			return s->lines[i].on != s->lines[i].forced;
-	return true;
-}
-
 /* Where media scatter, faces of `null` are no vertices, and neither focus nor refract. */
 static void find_lobes(const struct world *w, const struct render_summary *s, struct render_choice *out)
 {
 	bool narrow = false, transmits = false;
-	out->focuses = scene_has(s, "half-vectors");
-	out->refracts = out->focuses && scene_has(s, "transmission");
+	out->focuses = pilot_scene_has(s, "half-vectors");
+	out->refracts = out->focuses && pilot_scene_has(s, "transmission");
 	if (!w->effects.scattering)
 		return;
 	for (uint32_t i = 0; i < w->bsdf_count; i++) {

@@ -50,3 +50,11 @@ int pilot_film(const struct plan_request *r, struct plan *p, struct error *e)
 	p->crop_height = p->height;
 	return rc;
 }
+
+bool pilot_scene_has(const struct render_summary *s, const char *effect)
+{
+	for (size_t i = 0; i < s->line_count; i++)
+		if (strcmp(s->lines[i].name, effect) == 0)
+			return s->lines[i].on != s->lines[i].forced;
+	return true;
+}

@@ -7,6 +7,7 @@
 #define WORKER_RENDER_PILOT_H
 
 #include "common/plan/plan.h"
+#include "worker/render/render.h"
 
 /* Steps of RNG_CHOICE, one for each use of it. */
 enum pilot_step {
@@ -16,6 +17,8 @@ enum pilot_step {
 	PILOT_PIXEL,
 	PILOT_BESIDE,
 	PILOT_MERGED, /* uses the next number, too */
+	PILOT_UNSEEN_MAP = PILOT_MERGED + 2,
+	PILOT_UNSEEN, /* uses the next three, too */
 };
 
 /* Of a render that is not short. Fewer estimate the tail worse: tests/bench/choices.md, "What the pilot chooses". */
@@ -29,5 +32,8 @@ uint64_t pilot_samples(const struct plan_request *r, uint64_t pixels);
 /* The film and the random numbers of the render, checked as it will be; then all of the film, so that a crop has the
  * pilots of the whole, and its pixels. -EINVAL with a sentence */
 int pilot_film(const struct plan_request *r, struct plan *p, struct error *e);
+
+/* Whether it has the effect, whatever the user forces. */
+bool pilot_scene_has(const struct render_summary *s, const char *effect);
 
 #endif

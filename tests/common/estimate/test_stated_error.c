@@ -321,6 +321,29 @@ static void infinite_variance_is_doubtful(void **state)
 	assert_true(stated == 50);
 }
 
+/* What a pilot says is missing makes the error doubtful where it may leave the interval. */
+static void unseen_light_is_doubtful(void **state)
+{
+	(void)state;
+	struct plan p = group_image_plan(PLAN_SAMPLES, 64, 32);
+	struct canvas_image img;
+	for (int i = 0; i < 3; i++) {
+		struct dice d = dice_of("unseen light");
+		const double missing[] = {0, 0.4, 0.6};
+		group_image(&p, less_unequal, &d, &img);
+		double own = img.rel_mse, room = (img.rel_mse_95[1] - own) / own;
+		canvas_image_fini(&img);
+		for (int k = 0; k < PLAN_UNSEEN; k++)
+			p.unseen.at[k] = missing[i] * room * own;
+		d = dice_of("unseen light");
+		group_image(&p, less_unequal, &d, &img);
+		assert_true(img.rel_mse == own && fabs(img.rel_mse_unseen - missing[i] * room * own) <= 1e-12 * own);
+		assert_int_equal(img.rel_mse_doubt, i == 2 ? ERROR_UNSEEN : ERROR_KNOWN);
+		assert_true((i == 2) == (bool)isnan(img.rel_mse_95[1]));
+		canvas_image_fini(&img);
+	}
+}
+
 /* One group in sixteen is five times as bright, another one in each pixel: a firefly that is small enough for the pixel
  * to be believed. The upper bound divides it by 1, what the others found, not by the 1.25 that it makes of it. */
 static double small_fireflies(void *user, uint32_t group, uint32_t pixel)
@@ -396,6 +419,14 @@ static void words(void **state)
 		img.rel_mse_doubt = others[i];
 		assert_false(stated_error_meets(&img, 10));
 	}
+	img.rel_mse_doubt = ERROR_UNSEEN;
+	img.rel_mse_unseen = 0.0044;
+	stated_error(&img, text, sizeof text);
+	assert_string_equal(text,
+			    "relative error about 10 %, its interval is not known: about 6.6 % of the light, root mean "
+			    "square over the image, arrives by paths that so few samples hardly ever find; with it the "
+			    "error is about 12 %");
+	assert_true(stated_error_meets(&img, 0.1446) && !stated_error_meets(&img, 0.1445)); /* 0.0121 + 2 x 0.0044 */
 	img.rel_mse = NAN;
 	stated_error(&img, text, sizeof text);
 	assert_string_equal(text, "");
@@ -442,6 +473,7 @@ int main(void)
 		cmocka_unit_test(one_sample_decides_nothing),
 		cmocka_unit_test(unknown_brightness_is_doubtful),
 		cmocka_unit_test(infinite_variance_is_doubtful),
+		cmocka_unit_test(unseen_light_is_doubtful),
 		cmocka_unit_test(fireflies_are_divided_by_what_others_found),
 		cmocka_unit_test(words),
 		cmocka_unit_test(black_is_divided_by_the_floor),

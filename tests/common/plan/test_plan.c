@@ -571,6 +571,25 @@ static void limits_are_held(void **state)
 	assert_int_equal(plan_check(&q, &e), -EINVAL);
 }
 
+static void unseen_light_of_a_plan(void **state)
+{
+	(void)state;
+	struct plan_request r = request(PLAN_SAMPLES, "");
+	struct plan p;
+	struct error e;
+	for (int i = 0; i < PLAN_UNSEEN; i++)
+		r.unseen.at[i] = PLAN_UNSEEN - 1 - i;
+	assert_int_equal(plan_make(&r, &p, &e), 0);
+	assert_true(plan_unseen_after(&p, 1) == 11 && plan_unseen_after(&p, 0.25) == 11);
+	assert_true(plan_unseen_after(&p, 64) == 8 && plan_unseen_after(&p, 128) == 7.5);
+	assert_true(plan_unseen_after(&p, 0x1p22) == 0 && plan_unseen_after(&p, 0x1p60) == 0);
+	const double bad[] = {-1e-9, NAN, INFINITY};
+	for (int i = 0; i < 3; i++) {
+		r.unseen.at[5] = bad[i];
+		assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -593,6 +612,7 @@ int main(void)
 		cmocka_unit_test(seeds_stand_at_even_marks),
 		cmocka_unit_test(the_least_bound_counts_in_whole_rounds),
 		cmocka_unit_test(limits_are_held),
+		cmocka_unit_test(unseen_light_of_a_plan),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -424,9 +424,16 @@ static void plans_travel(void **state)
 	struct plan p = chain_plan(), back;
 	struct error e;
 	Farm__Plan m;
-	plan_to_wire(&p, &m);
-	assert_int_equal(plan_from_wire(&m, &back, &e), 0);
-	assert_memory_equal(&p, &back, sizeof p);
+	for (int unseen = 0; unseen < 2; unseen++) {
+		p.unseen.at[PLAN_UNSEEN - 1] = 1e-6 * unseen;
+		plan_to_wire(&p, &m);
+		assert_int_equal(m.n_unseen, unseen ? PLAN_UNSEEN : 0);
+		assert_int_equal(plan_from_wire(&m, &back, &e), 0);
+		assert_memory_equal(&p, &back, sizeof p);
+	}
+	m.n_unseen--;
+	assert_int_equal(plan_from_wire(&m, &back, &e), -EBADMSG);
+	m.n_unseen++;
 	m.groups = 0; /* plan_check has the last word */
 	assert_true(plan_from_wire(&m, &back, &e) < 0);
 	plan_to_wire(&p, &m);
@@ -446,7 +453,8 @@ static void plans_travel(void **state)
 				       .effects = "all",
 				       .parts = 64,
 				       .speed = 31000.5,
-				       .rays = {8123.25, 88.5}},
+				       .rays = {8123.25, 88.5},
+				       .unseen = {{0.5, 0.25}}},
 			    again;
 	Farm__PlanRequest rm;
 	plan_request_to_wire(&request, &rm);

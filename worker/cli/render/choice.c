@@ -5,6 +5,7 @@
 #include "common/json/estimate_json.h"
 #include "worker/render/rays.h"
 #include "worker/render/scene/scene.h"
+#include "worker/render/unseen_light.h"
 
 #include <stdio.h>
 
@@ -22,6 +23,8 @@ int choice_in_world(const struct world *w, struct render_arguments *a, struct ch
 {
 	*out = (struct choice){.made = integrator_is_open(&a->plan)};
 	int rc = out->made ? choose(w, a, out, e) : 0;
+	if (!rc)
+		rc = render_unseen_light(w, &a->plan, e);
 	return !rc && plan_wants_rays(&a->plan) ? render_count_rays(w, &a->plan, &a->plan.rays, e) : rc;
 }
 
@@ -30,7 +33,7 @@ int choice_make(struct render_arguments *a, const char *folder, const char *name
 	struct scene scene;
 	struct world *w;
 	*out = (struct choice){.made = false};
-	if (!integrator_is_open(&a->plan) && !plan_wants_rays(&a->plan))
+	if (!integrator_is_open(&a->plan) && a->plan.kind == PLAN_CHAINS && !plan_wants_rays(&a->plan))
 		return 0;
 	struct asset_folders folders = option_folders(a, folder);
 	struct asset_source assets = asset_search(&folders);

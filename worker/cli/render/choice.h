@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What is found out about a scene before a plan is made for it: the integrator (worker/render/choose.h) if none was
- * given, and how many rays its samples take (worker/render/rays.h) if a time or an error ends the render.
+ * given, how much light its samples hardly ever find (worker/render/unseen_light.h), and how many rays they take
+ * (worker/render/rays.h) if a time or an error ends the render.
  */
 #ifndef WORKER_CLI_RENDER_CHOICE_H
 #define WORKER_CLI_RENDER_CHOICE_H

@@ -52,13 +52,13 @@ static json_t *image_json(const struct canvas_image *i)
 	char doubt[STATED_ERROR_TEXT], b_doubt[STATED_ERROR_TEXT];
 	stated_error_doubt(i, doubt, sizeof doubt);
 	stated_b_doubt(i, b_doubt, sizeof b_doubt);
-	return json_pack("{s:o s:o s:s s:o s:o s:[oo] s:s s:s s:I s:o s:o}", "b", forecast_real(i->b), "bError",
+	return json_pack("{s:o s:o s:s s:o s:o s:[oo] s:s s:s s:f s:I s:o s:o}", "b", forecast_real(i->b), "bError",
 			 *b_doubt ? json_null() : forecast_real(i->b_error), "bErrorDoubt", b_doubt, "relMSE",
 			 forecast_real(i->rel_mse), "relMSEUpper",
 			 *doubt ? json_null() : forecast_real(i->rel_mse_upper), "relMSE95",
 			 forecast_real(i->rel_mse_95[0]), forecast_real(i->rel_mse_95[1]), "relMSEDefinition",
-			 REL_MSE_DEFINITION, "relMSEDoubt", doubt, "unvisitedPixels", (json_int_t)i->unvisited,
-			 "beyondShare", forecast_real(i->beyond_share), "counters", counters);
+			 REL_MSE_DEFINITION, "relMSEDoubt", doubt, "relMSEUnseen", i->rel_mse_unseen, "unvisitedPixels",
+			 (json_int_t)i->unvisited, "beyondShare", forecast_real(i->beyond_share), "counters", counters);
 }
 
 double stats_chains_rays(const struct canvas_image *i)

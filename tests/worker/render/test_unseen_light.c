@@ -1,0 +1,134 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Light that samples hardly ever find: a small lamp in a ball of glass, a fiftieth of whose light is reflected inside
+ * the glass first. `path` meets it once in a million samples, `bdpt` often. The independent way is to render: what a
+ * short render of path lacks is what bdpt has more of.
+ */
+#include "tests/support/length.h"
+#include "tests/support/worlds.h"
+#include "worker/render/halfvec/refract.h"
+#include "worker/render/path/integrate_bdpt.h"
+#include "worker/render/path/integrate_path.h"
+#include "worker/render/unseen_light.h"
+
+#include <errno.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+
+#include <cmocka.h>
+
+enum { WIDTH = 48, HEIGHT = 36, SAMPLES = 1 << 13, DEPTH = 4 };
+
+struct looking {
+	struct path_context context;
+	struct brightness map;
+	uint64_t counters[BATCH_COUNTERS];
+};
+
+static void begin(struct looking *l, const struct world *w, uint64_t seed)
+{
+	struct error e;
+	l->context = (struct path_context){.w = w,
+					   .window = {0, 0, WIDTH, HEIGHT},
+					   .min_depth = 1,
+					   .max_depth = DEPTH,
+					   .roulette = PATH_ROULETTE,
+					   .refract = halfvec_refract,
+					   .unclassed = true,
+					   .counters = l->counters};
+	assert_int_equal(
+		brightness_of_samples(&l->map, &l->context, path_trace_candidates, seed, RNG_TEST, 0, SAMPLES, &e), 0);
+}
+
+/* Mean contribution relative to the brightness of its place, brighter ones than any usual one left out: both
+ * integrators have few fireflies here, and one of path's is as bright as all of the image. */
+static double mean_of(struct looking *l, path_tracer *trace, uint64_t seed, uint64_t count)
+{
+	static struct path_sample sample;
+	double sum = 0;
+	for (uint64_t i = 0; i < count; i++) {
+		struct sampler_random s;
+		sampler_random_init(&s, seed, RNG_TEST, i, 1);
+		trace(&l->context, &s.base, &sample);
+		for (uint32_t k = 0; k < sample.count; k++) {
+			const struct splat *p = &sample.splats[k];
+			double y = (p->xyz[0] + p->xyz[1] + p->xyz[2]) * brightness_scale(&l->map, p->x, p->y);
+			sum += y < 1 << 12 ? y : 0;
+		}
+	}
+	return sum / (double)count;
+}
+
+static void what_path_lacks(void **state)
+{
+	(void)state;
+	const uint64_t drawn = (1u << 17) / test_scale();
+	static struct looking l;
+	struct world *w = world_of_own_scene("bulb", "scene.xml", WIDTH, HEIGHT);
+	begin(&l, w, 0);
+	double path = mean_of(&l, path_trace, 10, drawn), both = mean_of(&l, path_trace_both_ways, 11, drawn),
+	       lacks = 1 - path / both;
+	for (uint64_t seed = 0; seed < (test_scaled() ? 1 : 3); seed++) {
+		struct plan_unseen by_path, by_bdpt;
+		assert_int_equal(unseen_light(&l.context, &l.map, 0, seed, 0, SAMPLES, &by_path), 0);
+		assert_int_equal(unseen_light(&l.context, &l.map, 1, seed, 0, SAMPLES, &by_bdpt), 0);
+		printf("path lacks %.2f %% of the light; unseen by 64 samples: root mean square %.2f %%, by bdpt %.2f %%\n",
+		       100 * lacks, 100 * sqrt(by_path.at[3]), 100 * sqrt(by_bdpt.at[3]));
+		/* The light lies on a third of the image. */
+		assert_true(test_scaled() || (sqrt(by_path.at[3]) > 0.7 * lacks && sqrt(by_path.at[3]) < 3 * lacks));
+		assert_true(by_bdpt.at[3] < 0.02 * by_path.at[3]);
+		for (int i = 1; i < PLAN_UNSEEN; i++)
+			assert_true(by_path.at[i] <= by_path.at[i - 1]);
+		assert_true(by_path.at[PLAN_UNSEEN - 1] < 0.01 * by_path.at[3]); /* 7 billion find it */
+	}
+	assert_true(test_scaled() || (lacks > 0.01 && lacks < 0.04));
+	brightness_fini(&l.map);
+	world_free(w);
+}
+
+static struct plan_request request_of(const char *integrator, enum plan_kind kind)
+{
+	struct plan_request r = {
+		.kind = kind, .width = WIDTH, .height = HEIGHT, .spp = 16, .min_depth = 1, .max_depth = DEPTH};
+	snprintf(r.integrator, sizeof r.integrator, "%s", integrator);
+	return r;
+}
+
+static double unseen_of(const struct world *w, struct plan_request r)
+{
+	struct plan_request again = r;
+	struct error e;
+	assert_int_equal(render_unseen_light(w, &r, &e), 0);
+	assert_int_equal(render_unseen_light(w, &again, &e), 0);
+	assert_memory_equal(&r, &again, sizeof r);
+	return r.unseen.at[3];
+}
+
+static void of_a_request(void **state)
+{
+	(void)state;
+	struct error e;
+	struct world *bulb = world_of_own_scene("bulb", "scene.xml", WIDTH, HEIGHT),
+		     *box = world_of_own_scene("box", "box.xml", WIDTH, HEIGHT);
+	double path = unseen_of(bulb, request_of("path", PLAN_SAMPLES));
+	assert_true(path > 5e-5);
+	assert_true(unseen_of(bulb, request_of("erpt", PLAN_SAMPLES)) < 0.1 * path);
+	assert_true(unseen_of(bulb, request_of("hslt", PLAN_CHAINS)) == 0);
+	assert_true(unseen_of(box, request_of("path", PLAN_SAMPLES)) == 0); /* no lobe is narrow */
+	struct plan_request crop = request_of("path", PLAN_SAMPLES);
+	crop.crop_width = crop.crop_height = 8;
+	assert_true(unseen_of(bulb, crop) == path);
+	struct plan_request none = request_of("path", PLAN_SAMPLES);
+	none.width = 0;
+	assert_int_equal(render_unseen_light(bulb, &none, &e), -EINVAL);
+	world_free(bulb);
+	world_free(box);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(what_path_lacks), cmocka_unit_test(of_a_request)};
+	return cmocka_run_group_tests_name("worker/render/unseen_light", tests, NULL, NULL);
+}

@@ -1,0 +1,175 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A path of merging brings b, relative to the brightness of its place. If a sample of the integrator brings c when it
+ * finds that path, then b / c is how often one does: the rarer, the brighter. Paths are sorted into classes of c, each
+ * four times as bright as the one before. N samples find the classes from the k-th on
+ *
+ *     N sum_{i >= k} sum b / c
+ *
+ * times, and light is unseen if its class is among the brightest that are found at most `few` times in all. Once it has
+ * been found more often, different groups of samples have found it, and the spread between them tells.
+ *
+ * What is missing, squared and averaged over the film, is what it adds to relMSE. The square of a sum over few photons
+ * would be too large by its noise, so two sets of photons are multiplied, in each of ACROSS x ACROSS cells; where light
+ * is missing from a part of a cell, the mean over the cell is too small.
+ *
+ * Failures: -ENOMEM. A scene without light has no unseen light.
+ */
+#include "worker/render/unseen_light.h"
+
+#include "common/base/mem.h"
+#include "worker/render/halfvec/refract.h"
+#include "worker/render/path/integrate_bdpt.h"
+#include "worker/render/path/integrator.h"
+#include "worker/render/path/merging.h"
+#include "worker/render/pilot.h"
+
+#include <errno.h>
+#include <math.h>
+#include <string.h>
+
+enum { SETS = 2, ACROSS = 8, CELLS = ACROSS * ACROSS, CLASSES = 24 };
+static const double few = 3;
+
+/* Of one set of photons. */
+struct seen_by_merging {
+	double light[CELLS][CLASSES]; /* relative, summed over the samples of the camera */
+	double finds[CLASSES];	      /* by a sample of the integrator */
+	double samples[CELLS];	      /* of the camera */
+};
+
+struct place {
+	struct seen_by_merging *to;
+	double with_light, scale, brings;
+	unsigned cell;
+};
+
+static void add_brightness(void *user, const struct merged *m)
+{
+	((struct place *)user)->brings += m->brings;
+}
+
+static void add_to_class(void *user, const struct merged *m)
+{
+	struct place *p = user;
+	double finds = (1 - p->with_light) * m->brings / m->path + p->with_light * m->brings / m->bdpt,
+	       brings = p->scale * m->brings, each = finds > 0 ? brings / finds : INFINITY;
+	int k = each < 1 ? 0 : each < ldexp(1, 2 * CLASSES - 2) ? (int)(log2(each) / 2) : CLASSES - 1;
+	p->to->light[p->cell][k] += brings;
+	p->to->finds[k] += finds;
+}
+
+static unsigned cell_of(const struct film_window *w, const double film[2])
+{
+	double x = (film[0] - w->x) / w->width * ACROSS, y = (film[1] - w->y) / w->height * ACROSS;
+	return (unsigned)fmin(fmax(y, 0), ACROSS - 1) * ACROSS + (unsigned)fmin(fmax(x, 0), ACROSS - 1);
+}
+
+static int merge_one_set(struct path_context *c, const struct brightness *map, double with_light, uint64_t seed,
+			 uint64_t step, uint64_t samples, struct seen_by_merging *out)
+{
+	struct merging m;
+	int rc = merging_photons(&m, c, seed, step, samples);
+	for (uint64_t i = 0; i < m.paths && !rc; i++) {
+		struct merging_place at;
+		bool rough = merging_walk(&m, c, seed, step + 1, i, &at);
+		struct place p = {.to = out, .with_light = with_light, .cell = cell_of(&c->window, at.film)};
+		out->samples[p.cell]++;
+		if (!rough || !m.count)
+			continue;
+		merging_each(&m, c, &at, add_brightness, &p);
+		/* The map may be too dark, see rare_light.c. */
+		p.scale = brightness_scale(map, at.film[0], at.film[1]);
+		p.scale /= fmax(1, p.scale * p.brings);
+		if (p.scale > 0)
+			merging_each(&m, c, &at, add_to_class, &p);
+	}
+	for (int k = 0; k < CLASSES && !rc; k++)
+		out->finds[k] /= (double)m.paths;
+	merging_fini(&m);
+	return rc;
+}
+
+/* The dimmest of the classes that so many samples find at most a few times together. */
+static int first_unseen(const struct seen_by_merging *s, double samples)
+{
+	double finds = 0;
+	int k = CLASSES;
+	while (k > 0) {
+		finds += samples * (s[0].finds[k - 1] + s[1].finds[k - 1]) / SETS;
+		if (finds > few)
+			break;
+		k--;
+	}
+	return k;
+}
+
+static double mean_square(const struct seen_by_merging *s, int from)
+{
+	double sum = 0, samples = 0;
+	for (int i = 0; i < CELLS; i++) {
+		double light[SETS] = {0}, n = s[0].samples[i] + s[1].samples[i];
+		samples += n;
+		for (int k = from; k < CLASSES; k++)
+			for (int j = 0; j < SETS; j++)
+				light[j] += s[j].light[i][k];
+		if (s[0].samples[i] > 0 && s[1].samples[i] > 0)
+			sum += n * (light[0] / s[0].samples[i]) * (light[1] / s[1].samples[i]);
+	}
+	return samples > 0 ? sum / samples : 0;
+}
+
+int unseen_light(struct path_context *c, const struct brightness *map, double with_light, uint64_t seed, uint64_t step,
+		 uint64_t samples, struct plan_unseen *out)
+{
+	double pixels = c->window.width * c->window.height;
+	struct seen_by_merging *s = mem_alloc(SETS, sizeof *s);
+	int rc = s ? 0 : -ENOMEM;
+	for (unsigned j = 0; j < SETS && !rc; j++)
+		rc = merge_one_set(c, map, with_light, seed, step + 2 * j, samples, &s[j]);
+	for (int i = 0; i < PLAN_UNSEEN && !rc; i++)
+		out->at[i] = mean_square(s, first_unseen(s, pixels * ldexp(1, 2 * i)));
+	mem_free(s);
+	return rc;
+}
+
+/* ---- of a render */
+
+struct pilot {
+	struct path_context context;
+	struct brightness map;
+	uint64_t counters[BATCH_COUNTERS];
+};
+
+static int look(struct pilot *p, const struct world *w, const struct plan *film, const struct integrator *of,
+		struct plan_request *r, struct error *e)
+{
+	uint64_t n = pilot_samples(r, (uint64_t)film->crop_width * film->crop_height);
+	n = n < PILOT_SAMPLES ? n : PILOT_SAMPLES;
+	path_context_for_samples(&p->context, w, film, p->counters);
+	p->context.refract = halfvec_refract;
+	int rc = brightness_of_samples(&p->map, &p->context, path_trace_candidates, r->seed, RNG_CHOICE,
+				       PILOT_UNSEEN_MAP, n, e);
+	double with_light = of->face.from_camera ? 0 : of->light_every > 1 ? 1.0 / of->light_every : 1;
+	if (!rc && unseen_light(&p->context, &p->map, with_light, r->seed, PILOT_UNSEEN, n, &r->unseen))
+		rc = error_set(e, ENOMEM, "no memory for a pilot");
+	brightness_fini(&p->map);
+	return rc;
+}
+
+int render_unseen_light(const struct world *w, struct plan_request *r, struct error *e)
+{
+	const struct integrator *of = integrator_find(r->integrator);
+	struct render_summary summary;
+	struct plan film;
+	r->unseen = (struct plan_unseen){0};
+	world_summary(w, &summary);
+	if (r->kind != PLAN_SAMPLES || !of || w->effects.scattering || !pilot_scene_has(&summary, "half-vectors"))
+		return 0;
+	int rc = pilot_film(r, &film, e);
+	struct pilot *p = rc ? NULL : mem_alloc(1, sizeof *p);
+	if (!rc)
+		rc = p ? look(p, w, &film, of, r, e) : error_set(e, ENOMEM, "no memory for a pilot");
+	mem_free(p);
+	return rc;
+}
