@@ -36,7 +36,7 @@ static bool make_daylight(struct xml_element *scene, struct arena *arena)
 
 bool default_light_add(struct xml_tree *t, const struct plugin_decl *decls, struct arena *arena)
 {
-	if (t->dialect_3 || has_child(t->root, "emitter") || !has_child(t->root, "shape") ||
+	if (t->dialect_3 || t->holes || has_child(t->root, "emitter") || !has_child(t->root, "shape") ||
 	    t->note_count >= XML_NOTES_MAX || !plugin_find(decls, PLUGIN_EMITTER, "sunsky"))
 		return true;
 	t->notes[t->note_count++] = "has no emitter: sun and sky are added, as by Mitsuba 0.6";

@@ -7,9 +7,9 @@
  * What glTF cannot express keeps its default: the film's size follows the first camera's aspect, a file without cameras
  * gets one that sees everything, one without lights a constant environment, both with a note.
  *
- * Failures: a container that contradicts itself, invalid JSON, indices of missing entries, nodes that are their own
- * ancestors, unknown required extensions. What is known but not supported becomes a property that no table of
- * parameters has: there it is refused, or left out.
+ * Failures: a container that contradicts itself, invalid JSON, another version. Indices of missing entries, nodes that
+ * are their own ancestors, unknown required extensions are listed, and what depends on them is left out. What is known
+ * but not supported becomes a property that no table of parameters has: there it is refused, or left out.
  */
 #include "worker/render/scene/gltf.h"
 
@@ -180,8 +180,11 @@ static void check_file(struct gltf *g)
 	const char *version = asset ? gltf_text(g, NULL, asset, "version", "") : "";
 	if (strncmp(version, "2.", 2) != 0)
 		gltf_fail(g, NULL, EINVAL, "glTF of version \"%.16s\"; 2.0 is supported", version);
+	if (g->failed)
+		return;
 	note_writer(g, json_string_value(json_object_get(asset, "generator")));
 	check_required(g);
+	gltf_go_on(g);
 	note_unknown(g);
 }
 
@@ -214,6 +217,7 @@ static void visit_lists(struct gltf *g, const struct gltf_at *node, const mat4 *
 	struct gltf_at what;
 	if (gltf_follow(g, node, node->json, "camera", GLTF_CAMERAS, &what) > 0)
 		gltf_camera(g, &what, to_world);
+	gltf_go_on(g);
 	if (hidden)
 		return;
 	const json_t *instances = gltf_extension(g, node, node->json, "EXT_mesh_gpu_instancing");
@@ -222,9 +226,11 @@ static void visit_lists(struct gltf *g, const struct gltf_at *node, const mat4 *
 		gltf_mesh_instances(g, &what, node, instances, to_world);
 	else if (mesh)
 		gltf_mesh(g, &what, node, to_world);
+	gltf_go_on(g);
 	const json_t *light = gltf_extension(g, node, node->json, "KHR_lights_punctual");
 	if (light && gltf_follow(g, node, light, "light", GLTF_LIGHTS, &what) > 0)
 		gltf_light(g, &what, to_world);
+	gltf_go_on(g);
 }
 
 static void visit(struct walk *w, uint64_t index, const mat4 *above, int depth, bool hidden)
@@ -253,6 +259,7 @@ static void visit(struct walk *w, uint64_t index, const mat4 *above, int depth, 
 			gltf_fail(g, &node, EINVAL, "its children are not indices");
 		else
 			visit(w, (uint64_t)json_integer_value(child), &to_world, depth + 1, hidden);
+		gltf_go_on(g);
 	}
 	w->above[index] = false;
 }
@@ -261,9 +268,11 @@ static void visit(struct walk *w, uint64_t index, const mat4 *above, int depth, 
 static void visit_all(struct gltf *g, struct walk *w, const mat4 *world)
 {
 	gltf_note(g, "it has no scenes: all of its nodes are shown");
-	for (size_t i = 0; i < w->nodes && !g->failed; i++)
+	for (size_t i = 0; i < w->nodes && !g->failed; i++) {
 		if (gltf_node_is_root(g, i))
 			visit(w, i, world, 0, false);
+		gltf_go_on(g);
+	}
 }
 
 static void read_scene(struct gltf *g)
@@ -291,6 +300,7 @@ static void read_scene(struct gltf *g)
 			gltf_fail(g, &scene, EINVAL, "its nodes are not indices");
 		else
 			visit(&w, (uint64_t)json_integer_value(root), &world, 0, false);
+		gltf_go_on(g);
 	}
 }
 
@@ -375,11 +385,15 @@ static int read_file(struct gltf *g)
 	g->tree->root = g->scene;
 	g->tree->dialect_3 = true;
 	check_file(g);
+	if (g->failed)
+		return g->failed;
 	gltf_animation_begin(g);
+	gltf_go_on(g);
 	read_scene(g);
-	if (!g->has_camera)
+	gltf_go_on(g);
+	if (!g->has_camera && !g->tree->holes)
 		gltf_default_camera(g);
-	if (!g->has_light)
+	if (!g->has_light && !g->tree->holes)
 		gltf_default_light(g);
 	return g->failed;
 }

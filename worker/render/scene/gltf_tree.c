@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Members of JSON objects, and elements made from them, for the reader of glTF. The first failure is kept: nothing is
- * added to the tree after it.
+ * Members of JSON objects, and elements made from them, for the reader of glTF. After a failure nothing is added to the
+ * tree until gltf_go_on has noted it.
  */
 #include "worker/render/scene/gltf_tree.h"
 
@@ -46,6 +46,31 @@ int gltf_fail(struct gltf *g, const struct gltf_at *at, int errno_value, const c
 	else
 		g->failed = error_set(g->error, errno_value, "%s: %s", g->file, text);
 	return g->failed;
+}
+
+/* A mesh of several nodes says the same of each. */
+static bool is_noted(const struct gltf *g)
+{
+	for (uint32_t i = 0; i < g->tree->missing_count; i++)
+		if (strcmp(g->tree->missing[i], g->error->text) == 0)
+			return true;
+	return false;
+}
+
+void gltf_go_on(struct gltf *g)
+{
+	struct xml_tree *t = g->tree;
+	bool limit = g->failed == -ENOMEM || g->failed == -E2BIG || g->failed == -EFBIG;
+	if (g->failed && !limit && (is_noted(g) || t->missing_count < XML_MISSING_MAX)) {
+		const char *text = is_noted(g) ? NULL : arena_strdup(g->arena, g->error->text);
+		if (text)
+			t->missing[t->missing_count++] = text;
+		g->failed = text || is_noted(g) ? 0 : -ENOMEM;
+		t->holes = true;
+		for (struct xml_element *el = g->settled ? g->settled->next : g->scene->first; el; el = el->next)
+			el->told = true;
+	}
+	g->settled = g->scene->last;
 }
 
 static void no_memory(struct gltf *g)

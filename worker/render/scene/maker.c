@@ -24,6 +24,7 @@
 #include "worker/render/scene/report.h"
 #include "worker/render/scene/snake_case.h"
 #include "worker/render/scene/substitute.h"
+#include "worker/render/scene/transform.h"
 #include "worker/render/scene/value.h"
 #include "worker/render/scene/xml.h"
 
@@ -147,9 +148,10 @@ static int read_property(struct maker *m, struct draft *d, const struct xml_elem
 	if (unset && (strchr(written, '$') || strcmp(el->name, "animation") == 0))
 		return REPORT_TOLD;
 	if (strcmp(el->name, "animation") == 0) {
+		const struct xml_element *whole = el;
 		int r = animation_read(&el, m->arena, &animation, m->error);
 		if (r)
-			return r;
+			return transform_report(whole, r, &m->report, m->error);
 		written = strcmp(written, "animation") == 0 ? "to_world" : written;
 	}
 	const char *name = property_name(m, el, written);
@@ -172,6 +174,8 @@ static int read_property(struct maker *m, struct draft *d, const struct xml_elem
 	bool strange = d->stands_in && (r == -EINVAL || r == -ERANGE);
 	if (strange || (r == -EINVAL && m->lenient && p->choices))
 		return leave_out(&m->notes, el, written, xml_attribute(el, "value"), "the value");
+	if (r && strcmp(el->name, "transform") == 0)
+		return transform_report(el, r, &m->report, m->error);
 	if (!r && v.type == VALUE_STRING && strcmp(p->name, "filename") == 0)
 		r = *v.as.string ? maker_add_asset(m, v.as.string, owner)
 				 : xml_error(el, m->error, EINVAL, "an empty file name");
@@ -326,8 +330,23 @@ static int make_inner(struct maker *m, struct xml_element *el, struct xml_elemen
 	return r;
 }
 
-/* What is wrong inside an object that is refused: in its objects, such as the film of a sensor of an unknown type. What
- * its parameters may be is not known. */
+/* A parameter of an object whose type is not known: whether its value is well formed. */
+static int read_unknown(struct maker *m, const struct xml_element *el)
+{
+	const struct animation *moves;
+	const struct xml_element *whole = el;
+	struct value unused;
+	if (element_is_unset(el))
+		return REPORT_TOLD;
+	bool motion = strcmp(el->name, "animation") == 0;
+	int r = motion ? animation_read(&el, m->arena, &moves, m->error)
+		       : value_read(el, m->assets_from, m->arena, &unused, m->error);
+	return r && (motion || strcmp(el->name, "transform") == 0) ? transform_report(whole, r, &m->report, m->error)
+								   : r;
+}
+
+/* What is wrong inside an object that is refused: in its objects, such as the film of a sensor of an unknown type, and
+ * in how its values are written. Which parameters it may have is not known. */
 static int read_inside(struct maker *m, struct xml_element *el, int refused)
 {
 	if (refused >= 0 || (refused = report_problem(&m->report, refused, m->error)))
@@ -342,6 +361,8 @@ static int read_inside(struct maker *m, struct xml_element *el, int refused)
 			r = maker_node(m, c, &unused);
 		else if (!c->ignored && strcmp(c->name, "ref") == 0)
 			r = id_table_find(&m->ids, c, "id", &target, m->error);
+		else if (!c->ignored && value_is_element(c->name))
+			r = read_unknown(m, c);
 		r = report_problem(&m->report, r, m->error);
 	}
 	m->depth--;

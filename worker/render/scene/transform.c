@@ -6,7 +6,8 @@
  * matrix from the left, so that it applies to the result of those before.
  *
  * Failures are errors with file and line: an unknown element (with the nearest name), a missing or malformed
- * attribute, a matrix that is not affine, a lookat without a direction, a number outside PARAM_LENGTH_MAX.
+ * attribute, a matrix that is not affine, a lookat without a direction, a number outside PARAM_LENGTH_MAX. The first
+ * ends the reading; transform_report then lists those of all elements.
  */
 #include "worker/render/scene/transform.h"
 
@@ -201,23 +202,27 @@ static const struct step *find_step(const char *name, struct spelling *s)
 	return NULL;
 }
 
+static int read_step(const struct xml_element *el, mat4 *out, struct error *e)
+{
+	struct spelling s = {.wanted = el->name};
+	const struct step *step = find_step(el->name, &s);
+	char hint[128];
+	if (!step)
+		return xml_error(el, e, EINVAL,
+				 "is not a transform%s (supported: translate, rotate, scale, lookat, matrix)",
+				 spelling_hint(&s, hint, sizeof hint));
+	int r = element_check(el, step->attributes, false, e);
+	return r ? r : step->read(el, out, e);
+}
+
 int transform_read(const struct xml_element *el, mat4 *out, struct error *e)
 {
 	mat4 m = mat4_identity();
 	for (const struct xml_element *c = el->first; c; c = c->next) {
 		if (c->ignored)
 			continue;
-		struct spelling s = {.wanted = c->name};
-		const struct step *step = find_step(c->name, &s);
-		char hint[128];
-		if (!step)
-			return xml_error(c, e, EINVAL,
-					 "is not a transform%s (supported: translate, rotate, scale, lookat, matrix)",
-					 spelling_hint(&s, hint, sizeof hint));
 		mat4 one;
-		int r = element_check(c, step->attributes, false, e);
-		if (!r)
-			r = step->read(c, &one, e);
+		int r = read_step(c, &one, e);
 		if (r)
 			return r;
 		m = mat4_mul(one, m);
@@ -227,4 +232,29 @@ int transform_read(const struct xml_element *el, mat4 *out, struct error *e)
 	}
 	*out = m;
 	return 0;
+}
+
+/* The problems of the steps, except for the one that is known. */
+static int report_steps(const struct xml_element *el, const struct error *known, struct report *report, struct error *e)
+{
+	int r = 0;
+	for (const struct xml_element *c = el->first; c && !r; c = c->next) {
+		mat4 unused;
+		if (strcmp(c->name, "transform") == 0) /* of an animation */
+			r = report_steps(c, known, report, e);
+		else if (!c->ignored && !c->unset && read_step(c, &unused, e) && strcmp(e->text, known->text) != 0)
+			r = report_problem(report, -EINVAL, e);
+	}
+	return r;
+}
+
+int transform_report(const struct xml_element *el, int failure, struct report *report, struct error *e)
+{
+	const struct error first = *e;
+	if (failure != -EINVAL && failure != -ERANGE)
+		return failure;
+	int r = report_problem(report, failure, e);
+	if (!r)
+		r = report_steps(el, &first, report, e);
+	return r ? r : REPORT_TOLD;
 }

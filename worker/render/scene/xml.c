@@ -4,7 +4,8 @@
  * files searched along the paths. <include> reads the named file in its place. Nothing is interpreted here.
  *
  * Failures stop the parser at once, with file and line: errors of expat, a document type with declarations, and depth,
- * counts and sizes beyond the limits in xml.h.
+ * counts and sizes beyond the limits in xml.h. A file whose XML is wrong somewhere is kept up to there, with the error
+ * in the list of what is missing, so that one run finds the problems of the rest.
  */
 #include "worker/render/scene/xml.h"
 
@@ -36,6 +37,7 @@ struct reader {
 	bool worded;   /* noted that there is text */
 	bool cut;      /* noted that a file goes on after its first element */
 	bool by_end;   /* noted that a file was found by the end of its path */
+	bool broken;   /* the last file that was read is not well formed */
 	/* the current file */
 	XML_Parser parser;
 	const char *file;
@@ -344,6 +346,18 @@ static int open_element(struct reader *r, const char *name, const char **attribu
 
 static int read_file(struct reader *r, const char *name);
 
+/* After a file that is not well formed: whether what it holds up to there can be understood. What is still open is
+ * incomplete, and not looked at. */
+static bool keep_beginning(struct reader *r)
+{
+	if (!r->top || r->minor >= 0 || !xml_attribute(r->top, "version"))
+		return false;
+	for (struct xml_element *el = r->current; el && el != r->top; el = el->parent)
+		el->told = true;
+	r->top->told = true;
+	return true;
+}
+
 /* An <include> inside an object becomes the object that its file holds. */
 static int become_included(struct xml_element *el, struct error *e)
 {
@@ -392,10 +406,13 @@ static int read_include(struct reader *r, struct xml_element *el)
 	c = read_file(r, name);
 	if (c && r->file == outer.file)
 		c = error_prefix(r->error, c, "%s:%d: <include>", el->file, el->line);
-	bool absent = c && c != -ENOMEM && r->file == outer.file && r->tree->missing_count < XML_MISSING_MAX;
+	bool closed = r->file == outer.file,
+	     absent = c && c != -ENOMEM && (closed || r->broken) && r->tree->missing_count < XML_MISSING_MAX;
 	if (absent)
 		c = note_missing(r);
-	el->unset = absent;
+	el->unset = absent && (closed || !at_top || !keep_beginning(r));
+	if (el->unset)
+		el->first = el->last = NULL;
 	if (!c && !at_top && !absent)
 		c = become_included(el, r->error);
 	outer.failed = r->failed;
@@ -408,7 +425,7 @@ static int read_include(struct reader *r, struct xml_element *el)
 	outer.defines = r->defines;
 	outer.defines.incomplete |= absent;
 	outer.tree->holes |= absent;
-	outer.tree->include_count -= absent;
+	outer.tree->include_count -= absent && closed;
 	*r = outer;
 	return c;
 }
@@ -540,6 +557,7 @@ static int parse_bytes(struct reader *r, const struct asset *a)
 			      line_now(r), XML_ErrorString(code), r->current ? " in <" : "",
 			      r->current ? r->current->name : "", r->current ? ">" : "");
 	}
+	r->broken = c == -EINVAL && !r->failed;
 	XML_ParserFree(parser);
 	return c;
 }
@@ -571,5 +589,9 @@ int xml_read(struct xml_tree *t, const struct asset_source *assets, const char *
 	c = read_file(&r, file);
 	if (c == -ENOENT && !r.file)
 		return error_set(e, ENOENT, "%s: %s", file, strerror(ENOENT));
+	if (c && r.broken && t->missing_count < XML_MISSING_MAX && keep_beginning(&r)) {
+		t->holes = true;
+		c = note_missing(&r);
+	}
 	return c || t->missing_count ? c : define_check_used(&r.defines, e);
 }

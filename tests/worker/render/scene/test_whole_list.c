@@ -122,6 +122,7 @@ static void test_inside_unknown_types(void **state)
 		"type='diffus'/></bsdf></shape>\n<shape type='rock'><bsdf id='dull' type='dul'/></shape>" END;
 	const struct memory_file files[] = {{"s.xml", xml, sizeof xml - 1}, {0}};
 	static const char *const strict[] = {"s.xml:1: <sensor type=\"distant\">: this sensor of Mitsuba's",
+					     "s.xml:1: <float>: `x` is not a (finite) number",
 					     "s.xml:2: <integer>: <film type=\"hdrfilm\"> has no `widht`",
 					     "s.xml:3: <integer>: width=0 is outside",
 					     "s.xml:3: <rfilter type=\"gauss\">: there is no rfilter",
@@ -135,16 +136,149 @@ static void test_inside_unknown_types(void **state)
 	lists(files, false, strict);
 	/* What is left out may hold anything. */
 	static const char *const lenient[] = {"s.xml:1: <sensor type=\"distant\">: this sensor of Mitsuba's",
+					      "s.xml:1: <float>: `x` is not a (finite) number",
 					      "s.xml:3: <integer>: width=0 is outside", NULL};
 	lists(files, true, lenient);
+}
+
+/* Each step, with the attributes of the <transform> itself, in animations and textures as well. */
+static void test_wrong_steps(void **state)
+{
+	(void)state;
+	static const char xml[] =
+		S "<shape type='sphere'><transform name='to_world' nam='x'><translate x='a'/><scale value='2'/>\n"
+		  "<rotate x='1'/>\n<skale value='2'/>\n<lookat origin='0,0,0' target='0,0,0'/></transform>\n"
+		  "<bsdf type='diffuse'><texture name='reflectance' type='checkerboard'><transform name='to_uv'>\n"
+		  "<scale y='2' value='3'/>\n<matrix value='1 0'/></transform></texture></bsdf></shape>\n"
+		  "<shape type='cube'><animation name='to_world'><transform time='0'><translate x='0'/></transform>\n"
+		  "<transform time='1'><translate z='b'/>\n<translate z='c'/></transform>\n"
+		  "<transform time='2'><translate w='1'/></transform></animation></shape>" END;
+	static const char *const said[] = {"s.xml:1: <transform>: has no attribute `nam`",
+					   "s.xml:1: <translate>: x=\"a\" is not a (finite) number",
+					   "s.xml:2: <rotate>: needs an angle in degrees",
+					   "s.xml:3: <skale>: is not a transform; did you mean `scale`?",
+					   "s.xml:4: <lookat>: origin and target are equal",
+					   "s.xml:6: <scale>: needs either x, y, z or value",
+					   "s.xml:7: <matrix>: needs value=",
+					   "s.xml:9: <translate>: z=\"b\" is not a (finite) number",
+					   "s.xml:10: <translate>: z=\"c\" is not a (finite) number",
+					   "s.xml:11: <translate>: has no attribute `w`",
+					   NULL};
+	lists_of(xml, said);
+	/* Each step is fine; only all together are not. */
+	static const char *const product[] = {"s.xml:2: <scale>: the transform is out of range", NULL};
+	lists_of(
+		S
+		"<shape type='cube'><transform name='to_world'><scale value='1e30'/>\n<scale value='1e30'/></transform>"
+		"</shape>" END,
+		product);
+}
+
+/* What a parameter of an unknown plug-in means is not known, but how values are written is. */
+static void test_values_in_unknown_types(void **state)
+{
+	(void)state;
+	static const char xml[] = S
+		"<bsdf type='hair_of_a_fork'><float name='length' value='5cm'/><rgb name='tint' value='1 2'/>\n"
+		"<boolean name='wet' value='yes'/><float name='anything' value='1'/><integer name='count' valu='3'/>\n"
+		"<transform name='comb'><rotate x='1'/><translate x='p'/></transform><point name='p' x='1'/>\n"
+		"<spectrum name='melanin' filename='gone.spd'/><float name='unset' value='$u'/></bsdf>" END;
+	static const char *const said[] = {"s.xml:4: <float>: attribute `value`: $u is not defined",
+					   "s.xml:1: <bsdf type=\"hair_of_a_fork\">: there is no bsdf of this type",
+					   "s.xml:1: <float>: `5cm` is not a (finite) number",
+					   "s.xml:1: <rgb>: `1 2` is neither three numbers nor one",
+					   "s.xml:2: <boolean>: `yes` is neither true nor false",
+					   "s.xml:2: <integer>: has no attribute `valu`; did you mean `value`?",
+					   "s.xml:3: <rotate>: needs an angle",
+					   "s.xml:3: <translate>: x=\"p\" is not",
+					   "s.xml:4: <spectrum>: gone.spd",
+					   NULL};
+	lists_of(xml, said);
+}
+
+/* The whole objects before the place where a file breaks off are looked at, what is open there is not, and all that
+ * includes the file is. */
+static void test_included_files_that_break_off(void **state)
+{
+	(void)state;
+	static const char xml[] = S
+		"<include filename='half.xml'/>\n<shape type='sphere'><ref id='lost'/><ref id='kept'/><float name='radius' "
+		"value='r'/></shape>\n<bsdf type='mask'><include filename='inner.xml'/></bsdf>\n"
+		"<include filename='old.xml'/><include filename='empty.xml'/>\n<shape type='cub'/></scenes>";
+	static const char half[] = S "<bsdf type='diffus'/>\n<bsdf id='kept' type='twosided'><bsdf type='conduct'/>\n"
+				     "</bsdf><shape type='cylindr'><float name='radios' value='1'></shape>" END;
+	static const char inner[] = "<bsdf type='diffus' version='3.0.0'><float name='x' value='1'></bsdf>",
+			  old[] = "<scene version='0.4.0'><luminaire type='are'/><shape>" END;
+	const struct memory_file files[] = {{"s.xml", xml, sizeof xml - 1},
+					    {"half.xml", half, sizeof half - 1},
+					    {"inner.xml", inner, sizeof inner - 1},
+					    {"old.xml", old, sizeof old - 1},
+					    {"empty.xml", "", 0},
+					    {0}};
+	static const char *const said[] = {"half.xml:3: mismatched tag in <float>",
+					   "inner.xml:1: mismatched tag in <float>",
+					   "old.xml:1: mismatched tag in <shape>",
+					   "empty.xml: the file is empty",
+					   "s.xml:5: mismatched tag in <scene>",
+					   "half.xml:1: <bsdf type=\"diffus\">: there is no bsdf of this type",
+					   "half.xml:2: <bsdf type=\"conduct\">: there is no bsdf of this type",
+					   "s.xml:2: <float>: `r` is not a (finite) number",
+					   "s.xml:5: <shape type=\"cub\">: there is no shape of this type",
+					   NULL};
+	lists(files, false, said);
+}
+
+/* One wrong node, mesh, light or camera of a glTF file does not hide the others; each is said once. */
+static void test_gltf(void **state)
+{
+	(void)state;
+	static const char gltf[] =
+		"{\"asset\":{\"version\":\"2.0\"},\"extensionsRequired\":[\"EXT_no_one_knows\"],\n"
+		"\"extensions\":{\"KHR_lights_punctual\":{\"lights\":[{\"type\":\"lamp\"}]}},\n"
+		"\"scenes\":[{\"nodes\":[0,1,2,3,9,\"x\"]}],\n"
+		"\"nodes\":[{\"mesh\":0,\"children\":[7]},\n{\"rotation\":[0,0,0,0],\"mesh\":5},\n"
+		"{\"camera\":0,\"mesh\":0,\"extensions\":{\"KHR_lights_punctual\":{\"light\":0}}},\n"
+		"{\"children\":[3]}],\n"
+		"\"cameras\":[{\"type\":\"perspective\",\"perspective\":{\"yfov\":\"wide\"}}],\n"
+		"\"materials\":[{\"pbrMetallicRoughness\":{\"baseColorFactor\":[1]}}],\n"
+		"\"meshes\":[{\"primitives\":[{\"attributes\":{\"NORMAL\":0}},"
+		"{\"attributes\":{\"POSITION\":0},\"material\":0},{\"mode\":9},"
+		"{\"attributes\":{\"POSITION\":4}}]}],\n"
+		"\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}],\n"
+		"\"bufferViews\":[{\"buffer\":0,\"byteLength\":36}],\n"
+		"\"buffers\":[{\"uri\":\"b.bin\",\"byteLength\":36}]}";
+	static const unsigned char bytes[36] = {0};
+	const struct memory_file files[] = {{"s.gltf", gltf, sizeof gltf - 1}, {"b.bin", bytes, sizeof bytes}, {0}};
+	static const char *const said[] = {"s.gltf: it requires the extension EXT_no_one_knows",
+					   "s.gltf:10: meshes[0]: a primitive has no POSITION",
+					   "s.gltf:9: materials[0]: \"baseColorFactor\" is not an array of 4",
+					   "s.gltf:10: meshes[0]: a primitive without attributes, or of mode 9",
+					   "s.gltf: there is no accessors[4]",
+					   "s.gltf: there is no nodes[7]",
+					   "s.gltf:5: nodes[1]: its rotation is not a quaternion",
+					   "s.gltf: there is no meshes[5]",
+					   "s.gltf:8: cameras[0]: \"yfov\" is not a number",
+					   "s.gltf:1: lights[0]: a light of type \"lamp\"",
+					   "s.gltf:7: nodes[3]: it is its own ancestor",
+					   "s.gltf: there is no nodes[9]",
+					   "s.gltf:3: scenes[0]: its nodes are not indices",
+					   NULL};
+	lists(files, false, said);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_names_without_values),	 cmocka_unit_test(test_paths_without_values),
-		cmocka_unit_test(test_files_that_are_not_there), cmocka_unit_test(test_ids),
-		cmocka_unit_test(test_inside_unknown_types),	 cmocka_unit_test(test_files_that_break_off),
+		cmocka_unit_test(test_names_without_values),
+		cmocka_unit_test(test_paths_without_values),
+		cmocka_unit_test(test_files_that_are_not_there),
+		cmocka_unit_test(test_ids),
+		cmocka_unit_test(test_inside_unknown_types),
+		cmocka_unit_test(test_files_that_break_off),
+		cmocka_unit_test(test_wrong_steps),
+		cmocka_unit_test(test_values_in_unknown_types),
+		cmocka_unit_test(test_gltf),
+		cmocka_unit_test(test_included_files_that_break_off),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
