@@ -391,9 +391,9 @@ static int read_file(struct gltf *g)
 	gltf_go_on(g);
 	read_scene(g);
 	gltf_go_on(g);
-	if (!g->has_camera && !g->tree->holes)
+	if (!g->has_camera)
 		gltf_default_camera(g);
-	if (!g->has_light && !g->tree->holes)
+	if (!g->has_light)
 		gltf_default_light(g);
 	return g->failed;
 }

@@ -236,15 +236,12 @@ static void put_primitives(struct gltf *g, struct xml_element *parent, const str
 	const json_t *primitives = json_object_get(mesh->json, "primitives");
 	for (size_t i = 0; i < json_array_size(primitives) && !g->failed; i++) {
 		const json_t *primitive = json_array_get(primitives, i);
-		struct xml_element *before = parent ? parent->last : NULL;
 		if (++g->primitives > GLTF_PRIMITIVES_MAX)
 			gltf_fail(g, mesh, E2BIG, "more than %d primitives", GLTF_PRIMITIVES_MAX);
 		else if (json_is_object(primitive))
 			put_primitive(g, parent, mesh, node, primitive, *to_world);
 		else
 			gltf_fail(g, mesh, EINVAL, "its primitives are not objects");
-		if (g->failed && parent && parent->last != before)
-			parent->last->told = true; /* also in a group */
 		gltf_go_on(g);
 	}
 }

@@ -67,10 +67,7 @@ void gltf_go_on(struct gltf *g)
 			t->missing[t->missing_count++] = text;
 		g->failed = text || is_noted(g) ? 0 : -ENOMEM;
 		t->holes = true;
-		for (struct xml_element *el = g->settled ? g->settled->next : g->scene->first; el; el = el->next)
-			el->told = true;
 	}
-	g->settled = g->scene->last;
 }
 
 static void no_memory(struct gltf *g)

@@ -83,16 +83,16 @@ struct gltf {
 	size_t line_count[GLTF_ARRAYS], line_room[GLTF_ARRAYS];
 	struct gltf_range *buffers, *images; /* embedded data that has been located, by entry */
 	unsigned embedded, primitives;
-	unsigned char *material_made;	     /* bits 1 << enum gltf_colours */
-	struct gltf_open *plain, *decoded;   /* open buffers: the last that is a file; a list of those in base64 */
-	struct gltf_unpacked *unpacked;	     /* of each view; NULL: no compressed one was wanted so far */
-	uint64_t unpacked_bytes;	     /* of them all */
-	size_t *parents;		     /* of each node (gltf_node.h); NULL: not needed so far */
-	uint64_t embedded_bytes;	     /* of vertices that are computed */
-	uint64_t read;			     /* bytes of files with buffers, so far */
-	double *mesh_uses;		     /* number of nodes that have each mesh */
-	bool *mesh_made;		     /* it is a shapegroup already */
-	struct xml_element *scene, *settled; /* settled: the last of its elements that is not part of what failed */
+	unsigned char *material_made;	   /* bits 1 << enum gltf_colours */
+	struct gltf_open *plain, *decoded; /* open buffers: the last that is a file; a list of those in base64 */
+	struct gltf_unpacked *unpacked;	   /* of each view; NULL: no compressed one was wanted so far */
+	uint64_t unpacked_bytes;	   /* of them all */
+	size_t *parents;		   /* of each node (gltf_node.h); NULL: not needed so far */
+	uint64_t embedded_bytes;	   /* of vertices that are computed */
+	uint64_t read;			   /* bytes of files with buffers, so far */
+	double *mesh_uses;		   /* number of nodes that have each mesh */
+	bool *mesh_made;		   /* it is a shapegroup already */
+	struct xml_element *scene;
 	bool has_camera, has_light;
 	bool is_blenders;  /* its exporter wrote the file */
 	bool is_burleys;   /* its writer's diffuse surfaces are not Lambert's, as the format's are, but Burley's */
@@ -111,7 +111,7 @@ __attribute__((format(printf, 4, 5))) int gltf_fail(struct gltf *g, const struct
 						    const char *format, ...);
 
 /* After something that is complete by itself, a node or a primitive: a failure is put into the list of what is missing,
- * what was begun in the scene is not looked at, and reading goes on. Exceeded limits still end it. */
+ * and reading goes on. Exceeded limits still end it. */
 void gltf_go_on(struct gltf *g);
 
 /* Members of an object, with defaults for missing ones; another type is an error. */
