@@ -7,7 +7,7 @@
  */
 #include "worker/render/medium/medium.h"
 
-#include "worker/render/medium/measured.h"
+#include "worker/render/math/measured_media.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "worker/render/medium/measured.h"
+#include "worker/render/math/measured_media.h"
 
 #include "common/base/spelling.h"
 

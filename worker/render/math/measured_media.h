@@ -6,8 +6,8 @@
  * Narasimhan et al. 2006, Acquiring Scattering Properties of Participating Media by Dilution, table 3, with their mean
  * cosine g. Pure.
  */
-#ifndef WORKER_RENDER_MEDIUM_MEASURED_H
-#define WORKER_RENDER_MEDIUM_MEASURED_H
+#ifndef WORKER_RENDER_MATH_MEASURED_MEDIA_H
+#define WORKER_RENDER_MATH_MEASURED_MEDIA_H
 
 #include <stddef.h>
 
