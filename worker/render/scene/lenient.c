@@ -105,15 +105,26 @@ static bool has_parameter(const struct xml_element *el, const char *const *list)
 	return false;
 }
 
-/* Materials are told by their parameters, whose names most branches of Mitsuba keep. */
-static const char *material_of(const struct xml_element *el, const char *fallback)
+static bool is_called(const char *type, const char *const *parts)
 {
+	for (; *parts; parts++)
+		if (strcasestr(type, *parts))
+			return true;
+	return false;
+}
+
+/* Materials are told by their parameters, whose names most branches of Mitsuba keep, and glass by its name. */
+static const char *material_of(const struct xml_element *el, const char *type, const char *fallback)
+{
+	static const char *const glass[] = {"dielectric", "glass", NULL}, *const other[] = {"thin", "coat", NULL};
 	static const char *const base[] = {"base_color", "baseColor", NULL},
 				 *const disney[] = {"metallic", "roughness", NULL},
 				 *const metal[] = {"material", "eta", "k", NULL},
 				 *const rough[] = {"alpha", "roughness", NULL},
 				 *const diffuse[] = {"diffuse_reflectance", "diffuseReflectance", NULL},
 				 *const specular[] = {"specular_reflectance", "specularReflectance", NULL};
+	if (is_called(type, glass) && !is_called(type, other) && !has_parameter(el, diffuse))
+		return has_parameter(el, rough) ? "roughdielectric" : "dielectric";
 	if (has_parameter(el, base) && has_parameter(el, disney))
 		return "principled";
 	if (has_parameter(el, metal) && has_parameter(el, rough) && !has_parameter(el, diffuse))
@@ -131,7 +142,7 @@ enum lenient_way lenient_element(const struct xml_element *el, enum plugin_class
 	switch (cls) {
 	case PLUGIN_BSDF:
 		if (way == LENIENT_INNER)
-			*stand_in = material_of(el, *stand_in);
+			*stand_in = material_of(el, type, *stand_in);
 		return way;
 	case PLUGIN_SENSOR:
 		*stand_in = camera_of(type);
@@ -173,6 +184,11 @@ const char *lenient_param(const char *stand_in, const char *name)
 		return "reflectance";
 	if (strncmp(stand_in, "rough", strlen("rough")) == 0 && strcmp(name, "roughness") == 0)
 		return "alpha";
+	bool clear = strcmp(stand_in, "dielectric") == 0 || strcmp(stand_in, "roughdielectric") == 0;
+	if (clear && (strcmp(name, "eta") == 0 || strcmp(name, "ior") == 0))
+		return "int_ior";
+	if (clear && is_one_of(name, colors))
+		return "specular_transmittance";
 	for (size_t i = 0; i < sizeof shares / sizeof *shares && strcmp(stand_in, "principled") == 0; i++)
 		if (strcmp(shares[i].other, name) == 0)
 			return shares[i].principled;

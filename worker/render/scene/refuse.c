@@ -54,7 +54,9 @@ int refuse_element(const struct xml_element *el, struct error *e)
 {
 	char hint[128];
 	if (strcmp(el->name, "subsurface") == 0)
-		return xml_error(el, e, EINVAL, "subsurface scattering is not supported; --lenient leaves it out");
+		return xml_error(el, e, EINVAL,
+				 "subsurface scattering is not supported; --lenient leaves it out, or "
+				 "gives a diffuse base to the plastic above a dipole");
 	if (strcmp(el->name, "field") == 0)
 		return xml_error(el, e, EINVAL, "fields are not supported; --lenient leaves them out");
 	struct spelling s = {.wanted = el->name};

@@ -24,6 +24,7 @@
 #include "worker/render/scene/plugin.h"
 #include "worker/render/scene/remarks.h"
 #include "worker/render/scene/report.h"
+#include "worker/render/scene/subsurface.h"
 #include "worker/render/scene/texture_names.h"
 #include "worker/render/scene/value.h"
 #include "worker/render/scene/xml.h"
@@ -117,6 +118,8 @@ static int make_scene(struct maker *m)
 		r = id_table_make(&m->ids, m->tree, m->arena, &m->report, m->error);
 	if (!r)
 		r = texture_names_follow(m->tree->root, &m->ids, m->arena, m->error);
+	if (!r && m->lenient)
+		r = subsurface_settle(m);
 	if (!r)
 		r = obj_materials_spread(m->tree, &m->ids, m->assets_from, &m->assets, m->arena, &m->report, m->error);
 	if (!r)

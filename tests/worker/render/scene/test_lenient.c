@@ -121,17 +121,32 @@ static void test_likely_stand_ins(void **state)
 		"<bsdf type='grating' id='metal'><string name='material' value='Au'/><float name='alpha' value='0.2'/></bsdf>"
 		"<bsdf type='microfacet2' id='plastic'><rgb name='diffuseReflectance' value='0.2'/>"
 		"<rgb name='specularReflectance' value='0.5'/><float name='alpha' value='0.2'/></bsdf>"
-		"<bsdf type='rpv' id='other'><float name='k' value='0.2'/></bsdf></scene>";
-	static const char *const expected[][2] = {{"camera", "orthographic"},  {"mesh", "ply"},
-						  {"disney", "principled"},    {"metal", "roughconductor"},
-						  {"plastic", "roughplastic"}, {"other", "diffuse"},
-						  {"lens", "perspective"},     {"cmos", "perspective"},
-						  {"torrance", "roughplastic"}};
+		"<bsdf type='rpv' id='other'><float name='k' value='0.2'/></bsdf>"
+		"<bsdf type='smithdielectric' id='frosted'><string name='material' value='none'/>"
+		"<float name='alpha' value='0.3'/></bsdf><bsdf type='disneyglass' id='tinted'>"
+		"<rgb name='baseColor' value='0.5'/><float name='roughness' value='0.2'/><float name='eta' value='1.4'/>"
+		"</bsdf><bsdf type='clearGlass' id='clear'/><bsdf type='thinglass' id='pane'/></scene>";
+	static const char *const expected[][2] = {{"camera", "orthographic"},
+						  {"mesh", "ply"},
+						  {"disney", "principled"},
+						  {"metal", "roughconductor"},
+						  {"plastic", "roughplastic"},
+						  {"other", "diffuse"},
+						  {"lens", "perspective"},
+						  {"cmos", "perspective"},
+						  {"torrance", "roughplastic"},
+						  {"frosted", "roughdielectric"},
+						  {"tinted", "roughdielectric"},
+						  {"clear", "dielectric"},
+						  {"pane", "diffuse"}};
 	struct scene s = read_leniently(xml);
 	for (size_t i = 0; i < sizeof expected / sizeof *expected; i++)
 		assert_string_equal(scene_named(&s, expected[i][0])->type, expected[i][1]);
 	assert_true(node_float(scene_named(&s, "disney"), "spec_trans", 0) == 0.25);
 	assert_true(node_float(scene_named(&s, "torrance"), "alpha", 0) == 0.3);
+	assert_true(node_float(scene_named(&s, "tinted"), "alpha", 0) == 0.2);
+	assert_true(node_float(scene_named(&s, "tinted"), "int_ior", 0) == 1.4);
+	assert_true(node_find(scene_named(&s, "tinted"), "specular_transmittance")->value.as.rgb[1] == 0.5);
 	scene_fini(&s);
 	s = read_leniently(
 		"<scene version='3.0.0'><shape type='ellipsoids'><string name='filename' value='a.ply'/></shape>"
