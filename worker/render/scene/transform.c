@@ -186,9 +186,13 @@ static const struct step {
 	const char *element, *attributes;
 	int (*read)(const struct xml_element *el, mat4 *m, struct error *e);
 } steps[] = {
-	{"translate", "x|y|z|value", read_translate}, {"rotate", "x|y|z|value|angle", read_rotate},
-	{"scale", "x|y|z|value", read_scale},	      {"lookat", "origin|target|up", read_lookat},
-	{"lookAt", "origin|target|up", read_lookat},  {"matrix", "value", read_matrix},
+	{"translate", "x|y|z|value", read_translate},
+	{"rotate", "x|y|z|value|angle", read_rotate},
+	{"scale", "x|y|z|value", read_scale},
+	{"lookat", "origin|target|up", read_lookat},
+	{"lookAt", "origin|target|up", read_lookat},
+	{"look_at", "origin|target|up", read_lookat},
+	{"matrix", "value", read_matrix},
 };
 enum { STEPS = sizeof steps / sizeof *steps };
 

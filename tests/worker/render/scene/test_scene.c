@@ -159,6 +159,7 @@ static void test_transforms(void **state)
 	check_transform("<translate x='1'/><scale value='2'/>", p, (vec3){4, 4, 6});
 	check_transform("<translate x='1'/><rotate z='1' angle='90'/>", p, (vec3){-2, 2, 3});
 	check_transform("<lookAt origin='0,0,5' target='0,0,4' up='0 1 0'/>", (vec3){0, 0, 1}, (vec3){0, 0, 4});
+	check_transform("<look_at origin='0,0,5' target='0,0,4' up='0 1 0'/>", (vec3){0, 0, 1}, (vec3){0, 0, 4});
 	check_transform("<lookat origin='0,0,5' target='0,0,4' up='0 1 0'/>", (vec3){1, 0, 0}, (vec3){-1, 0, 5});
 	/* Where +y goes without `up`: worked out by hand of what each Mitsuba says. */
 	vec3 y = {0, 1, 0};
