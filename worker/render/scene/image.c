@@ -55,14 +55,26 @@ void image_grey(struct image *i, enum image_channel as)
 	i->channels = 1;
 }
 
+/* The alpha of an image of a format that has none. */
+static void make_opaque(struct image *img)
+{
+	for (size_t i = 0; i < (size_t)img->width * img->height; i++)
+		img->pixels[i] = 1;
+	img->channels = 1;
+}
+
 static int decode(const struct image_input *in, struct image *out)
 {
 	for (size_t i = 0; i < sizeof formats / sizeof *formats; i++) {
 		if (in->size < formats[i].size || memcmp(in->bytes, formats[i].magic, formats[i].size) != 0)
 			continue;
-		if (in->alpha && !formats[i].alpha)
+		bool opaque = formats[i].decode == image_decode_jpeg;
+		if (in->alpha && !formats[i].alpha && !opaque)
 			return error_set(in->error, ENOTSUP, "alpha is only read from PNG, WebP and TGA");
-		return formats[i].decode(in, out);
+		int r = formats[i].decode(in, out);
+		if (!r && in->alpha && opaque)
+			make_opaque(out);
+		return r;
 	}
 	if (image_is_tga(in)) /* the only one without a beginning of its own */
 		return image_decode_tga(in, out);

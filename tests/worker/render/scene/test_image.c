@@ -128,10 +128,15 @@ static void test_channels(void **state)
 	struct arena arena = {0};
 	struct image img;
 	struct error e;
-	assert_int_equal(image_decode(jpeg, size, "i", false, IMAGE_ALPHA, &arena, &img, &e), -ENOTSUP);
+	assert_int_equal(image_decode(jpeg, size, "i", false, IMAGE_ALPHA, &arena, &img, &e), 0);
+	assert_true(img.width == 8 && img.height == 8 && img.channels == 1);
+	for (size_t i = 0; i < 64; i++)
+		assert_true(img.pixels[i] == 1);
+	free(jpeg);
+	static const unsigned char exr[] = {0x76, 0x2f, 0x31, 0x01};
+	assert_int_equal(image_decode(exr, sizeof exr, "i", false, IMAGE_ALPHA, &arena, &img, &e), -ENOTSUP);
 	assert_string_equal(e.text, "i: alpha is only read from PNG, WebP and TGA");
 	arena_fini(&arena);
-	free(jpeg);
 }
 
 static void test_bad_png(void **state)
