@@ -117,7 +117,9 @@ static const char scene_xml[] =
 	SPHERE("<subsurface type='dipole'/>")	     /* 4 */
 	SPHERE("<subsurface type='dipole'><rgb name='sigmaS' value='1'/></subsurface>") /* 5 */
 	"<shape type='sphere'><bsdf type='diffuse'/><subsurface type='dipole'/></shape>"
-	"<shape type='sphere'><ref id='skin'/></shape><emitter type='constant'/></scene>";
+	"<shape type='sphere'><ref id='skin'/></shape>" /* 7 */
+	SPHERE("<subsurface type='dipole'><rgb name='sigmaS' value='1'/><rgb name='sigmaT' value='2'/></subsurface>")
+	"<emitter type='constant'/></scene>";
 /* clang-format on */
 
 static void test_scene(void **state)
@@ -134,6 +136,7 @@ static void test_scene(void **state)
 	is_base(base(&s, 4), 0, 0.74 / 0.772, eta); /* skin1 */
 	/* Not understood, or nothing to put it below; others that refer to the BSDF have it as it is. */
 	assert_null(node_find(node_child(s.objects[5], PLUGIN_BSDF, 0), "diffuse_reflectance"));
+	assert_null(node_find(node_child(s.objects[8], PLUGIN_BSDF, 0), "diffuse_reflectance"));
 	assert_string_equal(node_child(s.objects[6], PLUGIN_BSDF, 0)->type, "diffuse");
 	assert_true(node_float(node_child(s.objects[7], PLUGIN_BSDF, 0), "diffuse_reflectance", 1) == 0);
 	unsigned said = 0;
