@@ -17,6 +17,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/net/notify.h"
+#include "common/net/pool.h"
 #include "coordinator/jobs/recovery.h"
 #include "coordinator/jobs/start.h"
 #include "coordinator/server/limits.h"
@@ -219,8 +220,10 @@ int server_open(struct server **out, const struct server_config *c, struct error
 		mem_free(s);
 		return error_set(e, -rc, "no event loop: %s", uv_strerror(rc));
 	}
+	rc = pool_start(&s->loop, e);
 	init_handles(s);
-	rc = s->jobs.config.tls && *s->jobs.config.tls ? open_tls(s, e) : 0;
+	if (!rc)
+		rc = s->jobs.config.tls && *s->jobs.config.tls ? open_tls(s, e) : 0;
 	if (!rc)
 		rc = limits_connections(c->max_connections, &s->jobs.config.max_connections, e);
 	if (!rc)

@@ -14,6 +14,7 @@
 #include "common/base/text.h"
 #include "common/net/jitter.h"
 #include "common/net/notify.h"
+#include "common/net/pool.h"
 #include "worker/daemon/hang_watch.h"
 #include "worker/daemon/lease_queue.h"
 #include "worker/daemon/outgoing.h"
@@ -313,7 +314,9 @@ static int start(struct agent *a, struct error *e)
 	rc = uv_loop_init(&a->loop);
 	if (rc)
 		return error_set(e, -rc, "no event loop: %s", uv_strerror(rc));
-	rc = thread_pool_new(&a->thread_pool, &a->loop, a->config.threads, e);
+	rc = pool_start(&a->loop, e);
+	if (!rc)
+		rc = thread_pool_new(&a->thread_pool, &a->loop, a->config.threads, e);
 	if (rc) {
 		uv_run(&a->loop, UV_RUN_DEFAULT);
 		uv_loop_close(&a->loop);

@@ -365,10 +365,8 @@ void job_cache_note_company(struct job_cache *b, struct job_cache *all, bool bui
 		}
 }
 
-bool job_cache_lacked_room(const struct job_cache *b, bool no_memory)
+void job_cache_lacked_memory(const struct job_cache *b)
 {
-	if (!no_memory || !b->beside)
-		return false;
-	work_memory_short(clock_seconds());
-	return true;
+	if (b->beside)
+		work_memory_short(clock_seconds());
 }

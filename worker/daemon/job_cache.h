@@ -81,8 +81,7 @@ int job_cache_build(struct job_cache *b, struct thread_pool *c, struct error *e)
 
 /* A lease of b begins, or building its world does: notes which of all the worlds are in memory beside that of b. */
 void job_cache_note_company(struct job_cache *b, struct job_cache *all, bool building);
-/* Whether it failed for want of the memory that other worlds had, which is the machine's fault, and is noted for the
- * worker (work.h). no_memory: what failed was an allocation. */
-bool job_cache_lacked_room(const struct job_cache *b, bool no_memory);
+/* An allocation failed for b. If other worlds had that memory, it is noted for the worker (work.h). */
+void job_cache_lacked_memory(const struct job_cache *b);
 
 #endif

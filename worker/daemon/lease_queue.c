@@ -43,11 +43,20 @@ static void start_lease(struct agent *a, struct lease_task *l)
 	lease_task_start(l, a->thread_pool);
 }
 
+/* A lack of memory is the machine's fault: another one may have more, and the client that submitted the scene had
+ * enough. */
+static bool lacked_memory(const struct job_cache *b, bool no_memory)
+{
+	if (no_memory)
+		job_cache_lacked_memory(b);
+	return no_memory;
+}
+
 static void on_built(struct job_cache *b)
 {
 	struct agent *a = b->owner;
 	if (b->state == JOB_CACHE_FAILED) {
-		b->own |= job_cache_lacked_room(b, b->no_memory);
+		b->own |= lacked_memory(b, b->no_memory);
 		fail_job_cache(a, b, &b->error);
 	} else {
 		log_event(LOG_WORLD_BUILT, "job=j%llu seconds=%.3f embree_bytes=%zu", log_u64(b->job), b->build_seconds,
@@ -120,7 +129,7 @@ static void on_rendered(struct lease_task *l)
 			send_bad_states(a, &l->grant, l->error.text);
 		else
 			send_failed(a, &l->grant.key, l->rc ? l->error.text : "",
-				    job_cache_lacked_room(l->job_cache, l->rc == -ENOMEM));
+				    lacked_memory(l->job_cache, l->rc == -ENOMEM));
 		lease_list_drop(a, l);
 	} else {
 		send_result(a, l);

@@ -118,7 +118,7 @@ int thread_pool_new(struct thread_pool **out, uv_loop_t *loop, unsigned threads,
 	pthread_sigmask(SIG_SETMASK, &before, NULL);
 	if (rc) {
 		thread_pool_close(c);
-		return error_set(e, rc, "no thread: %s", strerror(rc));
+		return error_set(e, rc, "%u threads cannot be created: %s", threads, strerror(rc));
 	}
 	*out = c;
 	return 0;

@@ -283,7 +283,9 @@ static int build(struct accel *a, const struct accel_shape *shapes, uint32_t cou
 {
 	a->device = rtcNewDevice(has_avx2() ? "threads=1,isa=avx2" : "threads=1");
 	if (!a->device)
-		return error_set(e, EIO, "Embree's device cannot be created");
+		return rtcGetDeviceError(NULL) == RTC_ERROR_UNSUPPORTED_CPU
+			       ? error_set(e, ENOTSUP, "Embree does not support this processor")
+			       : error_set(e, ENOMEM, "no memory for Embree's device");
 	rtcSetDeviceMemoryMonitorFunction(a->device, memory_monitor, a);
 	a->scene = embree_scene(a->device);
 	if (!a->scene)

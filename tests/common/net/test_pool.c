@@ -1,0 +1,81 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* libuv's pool starts, or nothing is left of the attempt; uv_thread_create is wrapped (Makefile), and refuses here. */
+#include "common/net/pool.h"
+
+#include <errno.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static int created, refused_from; /* the threads of a test, and how many of them there may be */
+
+int __real_uv_thread_create(uv_thread_t *thread, uv_thread_cb run, void *arg);
+int __wrap_uv_thread_create(uv_thread_t *thread, uv_thread_cb run, void *arg);
+int __wrap_uv_thread_create(uv_thread_t *thread, uv_thread_cb run, void *arg)
+{
+	int rc = created < refused_from ? __real_uv_thread_create(thread, run, arg) : UV_EAGAIN;
+	created += !rc;
+	return rc;
+}
+
+static int threads_of_process(void)
+{
+	char line[256];
+	int n = 0;
+	FILE *f = fopen("/proc/self/status", "r");
+	assert_non_null(f);
+	while (fgets(line, sizeof line, f))
+		if (strncmp(line, "Threads:", 8) == 0)
+			n = atoi(line + 8);
+	fclose(f);
+	return n;
+}
+
+static int start(int most, struct error *e)
+{
+	uv_loop_t loop;
+	created = 0;
+	refused_from = most;
+	assert_int_equal(uv_loop_init(&loop), 0);
+	int rc = pool_start(&loop, e);
+	assert_int_equal(uv_loop_close(&loop), 0);
+	return rc;
+}
+
+/* Where the system refuses one of the threads, libuv would abort: its pool is not asked for any. */
+static void refused(void **state)
+{
+	struct error e;
+	(void)state;
+	int before = threads_of_process();
+	for (int most = 0; most < 4; most++) {
+		assert_int_equal(start(most, &e), -ENOMEM);
+		assert_non_null(strstr(e.text, "memory"));
+		assert_int_equal(created, most);
+		assert_int_equal(threads_of_process(), before);
+	}
+}
+
+static void started(void **state)
+{
+	struct error e;
+	(void)state;
+	int before = threads_of_process();
+	assert_int_equal(start(4, &e), 0);
+	assert_int_equal(created, 4);
+	assert_int_equal(threads_of_process(), before + 4); /* the pool's, before its first use */
+	assert_int_equal(start(4, &e), 0);
+	assert_int_equal(threads_of_process(), before + 4);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(refused), cmocka_unit_test(started)};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
