@@ -276,6 +276,11 @@ void blob_store_trim(struct blob_store *s)
 		continue;
 }
 
+uint64_t blob_store_bytes(const struct blob_store *s)
+{
+	return s->bytes + s->arrived;
+}
+
 static struct blob_entry *touch(struct blob_store *s, const struct blob_hash *h)
 {
 	struct blob_entry *n = find_there(s, h);

@@ -30,6 +30,46 @@ static uint64_t available(const struct jobs *jobs)
 	return disk_available(path);
 }
 
+/* A round with one sample per pixel of a fully lit image writes 1.6 bytes per pixel and group, its films have 72. */
+enum { ROUNDS_LONG = 64 };
+
+uint64_t room_for_plan(const struct plan *p)
+{
+	bool is_long = p->rounds != UINT64_MAX && p->rounds >= ROUNDS_LONG;
+	return canvas_bytes(p) * (is_long ? 2 : 1);
+}
+
+/* What ended and running jobs have on the disk besides their images and files. */
+static uint64_t job_bytes(const struct jobs *jobs)
+{
+	uint64_t sum = 0;
+	for (size_t i = 0; i < jobs->ended_count; i++)
+		sum += spool_film_bytes(jobs->spool, jobs->ended[i].id, 1);
+	for (const struct live_job *job = jobs->live; job; job = job->next) {
+		sum += spool_film_bytes(jobs->spool, job->id, 1);
+		if (job->canvas && canvas_is_mapped(job->canvas))
+			sum += canvas_bytes(&job->plan) - canvas_unreserved(job->canvas);
+	}
+	return sum;
+}
+
+int room_could_hold(const struct jobs *jobs, uint64_t bytes, struct error *e)
+{
+	uint64_t left = available(jobs), freed;
+	if (bytes <= left || jobs->found || jobs->reading)
+		return 0;
+	freed = blob_store_bytes(jobs->blobs) + job_bytes(jobs);
+	if (bytes - left <= freed)
+		return 0;
+	return error_set(
+		e, ENOSPC,
+		"it needs at least %llu bytes for its files, films and journal, and the disk of the "
+		"coordinator's spool has %llu: %llu are free, %llu belong to scenes and jobs that end: a smaller "
+		"--size or --crop, or fewer --groups",
+		(unsigned long long)bytes, (unsigned long long)(left + freed), (unsigned long long)left,
+		(unsigned long long)freed);
+}
+
 bool room_is_ample(const struct jobs *jobs)
 {
 	uint64_t need = 0, largest = 0;

@@ -15,10 +15,10 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "common/film/canvas.h"
 #include "common/plan/plan_text.h"
 #include "coordinator/job/incoming.h"
 #include "coordinator/jobs/listing.h"
+#include "coordinator/jobs/room.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/jobs/trust.h"
 #include "coordinator/peers/client_answers.h"
@@ -87,12 +87,12 @@ static int within_quota(const struct session *p, struct error *e)
 				 p->upload->submit.message->submit, e);
 }
 
-/* Whether it could be stored on an empty disk: otherwise it would be held for ever, and with it others. Whether memory
- * has room for its chain states, if workers send the longest that there are. */
+/* Whether it could be stored once all other jobs are over: otherwise it would be held for ever, and with it others.
+ * Whether memory has room for its chain states, if workers send the longest that there are. */
 static int fits(const struct session *p, struct error *e)
 {
 	const Farm__Submit *m = p->upload->submit.message->submit;
-	uint64_t bytes = canvas_bytes(&p->upload->plan), states = chain_states_max(&p->upload->plan);
+	uint64_t bytes = room_for_plan(&p->upload->plan), states = chain_states_max(&p->upload->plan);
 	if (states > p->jobs->config.state_bytes)
 		return error_set(e, ENOMEM,
 				 "the states of its %u chains could need %.3g MB of the coordinator's memory; the "
@@ -101,7 +101,8 @@ static int fits(const struct session *p, struct error *e)
 				 1e-6 * (double)p->jobs->config.state_bytes);
 	for (size_t i = 0; i < m->n_files; i++)
 		bytes += m->files[i]->size;
-	return spool_holds(p->jobs->spool, bytes, e);
+	int rc = spool_holds(p->jobs->spool, bytes, e);
+	return rc ? rc : room_could_hold(p->jobs, bytes, e);
 }
 
 /* All blobs have arrived: the core decides. */

@@ -31,7 +31,7 @@ grep -q "it needs at least .* MB for its files and films, and the disk of the co
 
 head -c 3000000 /dev/zero >"$DIR/spool/ballast" # a disk must have 4,700 KB in all for the films
 used=$(df --output=used -k "$DIR/spool" | tail -n 1)
-mount -o remount,size=$((used + 3000))k "$DIR/spool" # all batches take 5,000, and a checkpoint would as well
+mount -o remount,size=$((used + 4900))k "$DIR/spool" # all batches take 5,000, and a checkpoint would as well
 id=$(submit "$BOX" -o "$DIR/full.exr" $JOB)
 until_true 20 is_state "$id" held || fail "$id is $(value "$id" state), and $(df -k "$DIR/spool" | tail -n 1)"
 value "$id" waiting | grep -q 'No space left' || fail "it does not say why: $(value "$id" waiting)"
@@ -55,6 +55,12 @@ same "$DIR/quiet.exr" "$DIR/full.exr"
 
 used=$(df --output=used -k "$DIR/spool" | tail -n 1)
 mount -o remount,size=$((used + 3000))k "$DIR/spool"
+# What the end of no job would make room for is refused as well: what is free, and belongs to files and jobs, is too little.
+# shellcheck disable=SC2086
+code 6 "$BIN/hslt-submit" "$BOX" -o "$DIR/gone.exr" $JOB
+grep -q 'it needs at least [0-9]* bytes for .* spool has [0-9]*: [0-9]* are free, [0-9]* belong' "$DIR/err.log" ||
+	fail "the refusal does not say why: $(tail -n 1 "$DIR/err.log")"
+mount -o remount,size=$((used + 4900))k "$DIR/spool"
 id=$(submit "$BOX" -o "$DIR/gone.exr" $JOB)
 until_true 20 is_state "$id" held || fail "$id is $(value "$id" state)"
 "$BIN/hslt-job" cancel "$id"
@@ -84,7 +90,7 @@ rm "$DIR/spool/filler"
 head -c 3000000 /dev/zero >>"$DIR/spool/ballast"
 holder=$(submit "$DIR/long.xml" --path "$(dirname "$BOX")" -o "$DIR/long.exr" $JOB)
 "$BIN/hslt-job" hold "$holder" 2>/dev/null
-mount -o remount,size=$(($(df --output=used -k "$DIR/spool" | tail -n 1) + 3000))k "$DIR/spool"
+mount -o remount,size=$(($(df --output=used -k "$DIR/spool" | tail -n 1) + 4000))k "$DIR/spool"
 id=$(submit "$BOX" -o "$DIR/gone.exr" $JOB)
 until_true 20 is_state "$id" held || fail "$id is $(value "$id" state)"
 head -c 20000000 /dev/zero >"$DIR/spool/filler" 2>/dev/null && fail "there is room"

@@ -4,6 +4,8 @@
  * together.
  */
 #include "coordinator/jobs/room.h"
+
+#include "common/base/disk.h"
 #include "tests/support/folder.h"
 #include "tests/support/staged.h"
 
@@ -189,6 +191,66 @@ static void work_until(const unsigned *count, unsigned most)
 	}
 }
 
+static uint64_t four_thousand(const char *path)
+{
+	(void)path;
+	return 4000;
+}
+
+/* What will be free some day counts: the films of a job that ended, and the files of scenes. */
+static void what_no_end_makes_room_for(void **state)
+{
+	(void)state;
+	static const char bytes[3000];
+	struct jobs jobs = {0};
+	struct job_record over = {.id = 7};
+	struct blob_hash h;
+	struct blob_writer *w;
+	struct error e;
+	struct disk small = disk_system;
+	char folder_of[SPOOL_PATH_MAX];
+	assert_int_equal(spool_open(&jobs.spool, folder, &e), 0);
+	assert_int_equal(blob_store_open(&jobs.blobs, spool_blobs(jobs.spool), 0, &e), 0);
+	small.available = four_thousand;
+	disk_use(&small);
+	assert_int_equal(room_could_hold(&jobs, 4000, &e), 0);
+	assert_int_equal(room_could_hold(&jobs, 4001, &e), -ENOSPC);
+	assert_non_null(strstr(e.text, "needs at least 4001 bytes"));
+	assert_non_null(strstr(e.text, "has 4000: 4000 are free, 0 belong"));
+	assert_int_equal(blob_hash_bytes(bytes, 300, &h, &e), 0);
+	assert_int_equal(blob_write_begin(&w, jobs.blobs, &h, 300, &e), 0);
+	assert_int_equal(blob_write_add(w, bytes, 300, &e), 0);
+	assert_int_equal(room_could_hold(&jobs, 4301, &e), -ENOSPC);
+	assert_int_equal(blob_write_commit(w, &e), 0);
+	assert_int_equal(room_could_hold(&jobs, 4300, &e), 0);
+	spool_job_path(jobs.spool, over.id, NULL, folder_of);
+	assert_int_equal(disk_make_folder(folder_of, &e), 0);
+	assert_int_equal(spool_write(jobs.spool, over.id, "checkpoint", bytes, sizeof bytes, &e), 0);
+	assert_int_equal(room_could_hold(&jobs, 4301, &e), -ENOSPC);
+	jobs.ended = &over;
+	jobs.ended_count = 1;
+	assert_int_equal(room_could_hold(&jobs, 7300, &e), 0);
+	assert_int_equal(room_could_hold(&jobs, 7301, &e), -ENOSPC);
+	jobs.found = (struct found *)&jobs; /* not known yet: jobs of an earlier life are being read */
+	assert_int_equal(room_could_hold(&jobs, 7301, &e), 0);
+	disk_use(NULL);
+	blob_store_close(jobs.blobs);
+	spool_close(jobs.spool);
+}
+
+/* The journal of a long job reaches the size of its checkpoint, which is written beside it. */
+static void long_jobs_need_both(void **state)
+{
+	(void)state;
+	struct plan p = {.crop_width = 64, .crop_height = 64, .groups = 16, .rounds = 63};
+	assert_true(canvas_bytes(&p) > 0);
+	assert_int_equal(room_for_plan(&p), canvas_bytes(&p));
+	p.rounds = UINT64_MAX; /* a time or an error may end it soon */
+	assert_int_equal(room_for_plan(&p), canvas_bytes(&p));
+	p.rounds = 64;
+	assert_int_equal(room_for_plan(&p), 2 * canvas_bytes(&p));
+}
+
 static void order(uint64_t job, Farm__Verb verb)
 {
 	Farm__Control c;
@@ -232,6 +294,8 @@ int main(void)
 		cmocka_unit_test(all_end),
 		cmocka_unit_test(states_are_bounded),
 		cmocka_unit_test(small_jobs_pass_a_large_one),
+		cmocka_unit_test(long_jobs_need_both),
+		cmocka_unit_test_setup_teardown(what_no_end_makes_room_for, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(jobs_with_many_chains_take_turns, staged_set_up, folder_tear_down),
 	};
 	log_set_level(LOG_LEVEL_ERROR);
