@@ -270,10 +270,14 @@ static bool make_disk_room(struct blob_store *s)
 	return (s->limit && blob_store_evict(s)) || (s->more_room && s->more_room(s->user));
 }
 
-void blob_store_trim(struct blob_store *s)
+bool blob_store_trim(struct blob_store *s)
 {
-	while (s->limit && s->bytes + s->arrived > s->limit && blob_store_evict(s))
-		continue;
+	for (int i = 0; s->limit && s->bytes + s->arrived > s->limit; i++)
+		if (i == BLOB_TRIM_MOST)
+			return true;
+		else if (!blob_store_evict(s))
+			break;
+	return false;
 }
 
 uint64_t blob_store_bytes(const struct blob_store *s)
@@ -307,7 +311,10 @@ bool blob_has(struct blob_store *s, const struct blob_hash *h, uint64_t *size)
 
 bool blob_hold(struct blob_store *s, const struct blob_hash *h)
 {
-	struct blob_entry *n = touch(s, h);
+	struct blob_entry *n = find_there(s, h);
+	if (n &&
+	    !n->holds) /* otherwise its first holder has: thousands of files are held by an upload, then by its job */
+		touch(s, h);
 	if (n)
 		blob_take(s, n);
 	return n != NULL;

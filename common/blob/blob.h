@@ -30,8 +30,10 @@ void blob_store_ask(struct blob_store *s, bool (*more_room)(void *user), void *u
 /* Call if files that are lost with the power can be fetched again. They are then not flushed to the disk: after a
  * restart no file is used before blob_check has read it. */
 void blob_store_use_as_cache(struct blob_store *s);
-/* Evicts what exceeds the limit. Call once everything needed is held. */
-void blob_store_trim(struct blob_store *s);
+/* Evicts what exceeds the limit, at most BLOB_TRIM_MOST at once. Call once everything needed is held, and again while
+ * it returns true. */
+enum { BLOB_TRIM_MOST = 64 /* a millisecond */ };
+bool blob_store_trim(struct blob_store *s);
 
 bool blob_has(struct blob_store *s, const struct blob_hash *h, uint64_t *size); /* size may be NULL */
 /* Held blobs are not evicted; holds are counted. false: not in the store. */

@@ -57,6 +57,7 @@ struct jobs {
 	uv_loop_t *loop;
 	uv_timer_t wake;
 	uv_idle_t drain; /* while results are left that waited for a canvas */
+	uv_idle_t trim;	 /* while more files of scenes are stored than may be */
 	double read;	 /* s: all messages that arrived before have been read from all sockets */
 	struct farm *farm;
 	struct spool *spool;

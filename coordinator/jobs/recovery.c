@@ -150,6 +150,14 @@ static void fail(struct jobs *jobs, int rc, const struct error *e)
 	jobs->stop(jobs->stop_user);
 }
 
+/* With a smaller --blobs than before, a million files may have to go. */
+static void on_trim(uv_idle_t *h)
+{
+	struct jobs *jobs = h->data;
+	if (!blob_store_trim(jobs->blobs))
+		uv_idle_stop(h);
+}
+
 /* All have been read: tells the core. */
 static int finish(struct jobs *jobs, struct error *e)
 {
@@ -180,7 +188,7 @@ static int finish(struct jobs *jobs, struct error *e)
 	mem_free(r);
 	jobs->recovery = NULL;
 	jobs->changes++;
-	blob_store_trim(jobs->blobs); /* live jobs hold their files by now */
+	uv_idle_start(&jobs->trim, on_trim); /* live jobs hold their files by now */
 	keep_trim(jobs);
 	jobs->peers.jobs_read(jobs->peers.user);
 	return 0;

@@ -112,7 +112,8 @@ void jobs_init(struct jobs *jobs)
 	STAILQ_INIT(&jobs->checks);
 	uv_timer_init(jobs->loop, &jobs->wake);
 	uv_idle_init(jobs->loop, &jobs->drain);
-	jobs->wake.data = jobs->drain.data = jobs;
+	uv_idle_init(jobs->loop, &jobs->trim);
+	jobs->wake.data = jobs->drain.data = jobs->trim.data = jobs;
 	jobs->read = jobs_now(jobs);
 }
 
@@ -160,6 +161,7 @@ void jobs_stop(struct jobs *jobs)
 	jobs->stopping = true;
 	uv_close((uv_handle_t *)&jobs->wake, NULL);
 	uv_close((uv_handle_t *)&jobs->drain, NULL);
+	uv_close((uv_handle_t *)&jobs->trim, NULL);
 	recovery_stop(jobs);
 }
 

@@ -126,7 +126,8 @@ int cache_open(struct cache *c, const char *folder, uint64_t limit, struct error
 			return rc;
 		}
 		blob_store_use_as_cache(c->blobs);
-		blob_store_trim(c->blobs);
+		while (blob_store_trim(c->blobs))
+			continue;
 		return 0;
 	}
 	return error_set(e, EBUSY, "%s: %d workers use this cache already", base, SLOTS);

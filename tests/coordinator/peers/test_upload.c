@@ -17,6 +17,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 enum { FILES = 400 };
@@ -25,6 +26,7 @@ enum { FILES = 400 };
 static struct flushes {
 	_Atomic unsigned on_loop, elsewhere;
 	_Atomic unsigned looks_at_once; /* most looks at files in one turn of the loop */
+	_Atomic unsigned touched_at_once, removed_at_once, removed;
 } * flushes;
 
 static int counted_fsync(int fd)
@@ -46,6 +48,32 @@ static int counted_stat(const char *path, struct stat *st)
 	return disk_system.stat(path, st);
 }
 
+/* Counts one more of what may be done often in one turn. */
+static void count_in_turn(unsigned *turn, unsigned *count, _Atomic unsigned *most)
+{
+	*count = *turn == served_turn() ? *count + 1 : 1;
+	*turn = served_turn();
+	if (*count > *most)
+		*most = *count;
+}
+
+static int counted_touch(const char *path)
+{
+	static unsigned turn, count;
+	count_in_turn(&turn, &count, &flushes->touched_at_once);
+	return disk_system.touch(path);
+}
+
+static int counted_unlink(const char *path)
+{
+	static unsigned turn, count;
+	if (strstr(path, "/blobs/") && gettid() == getpid()) {
+		count_in_turn(&turn, &count, &flushes->removed_at_once);
+		flushes->removed++;
+	}
+	return unlink(path);
+}
+
 static void count_flushes(const char *spool)
 {
 	(void)spool;
@@ -53,13 +81,37 @@ static void count_flushes(const char *spool)
 	counted = disk_system;
 	counted.fsync = counted_fsync;
 	counted.stat = counted_stat;
+	counted.touch = counted_touch;
+	counted.unlink = counted_unlink;
 	disk_use(&counted);
+}
+
+/* Files of an earlier life with a higher limit: all but 64 exceed that of this one. */
+enum { STORED = 500, STORED_BYTES = 1 << 14, STORED_LEFT = (1 << 20) / STORED_BYTES };
+static void store_too_much(const char *spool)
+{
+	char path[256];
+	mkdir(spool, 0700);
+	snprintf(path, sizeof path, "%s/blobs", spool);
+	mkdir(path, 0700);
+	for (int i = 0; i < STORED; i++) {
+		snprintf(path, sizeof path, "%s/blobs/%064x", spool, i);
+		FILE *f = fopen(path, "w");
+		if (!f || ftruncate(fileno(f), STORED_BYTES) || fclose(f))
+			_exit(1);
+	}
+	count_flushes(spool);
+}
+
+static void share_flushes(void)
+{
+	flushes = mmap(NULL, sizeof *flushes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+	assert_true(flushes != MAP_FAILED);
 }
 
 static int set_up_for(double stall_seconds)
 {
-	flushes = mmap(NULL, sizeof *flushes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-	assert_true(flushes != MAP_FAILED);
+	share_flushes();
 	served_prepare(count_flushes);
 	return served_start(60, 60, stall_seconds);
 }
@@ -68,6 +120,14 @@ static int set_up(void **state)
 {
 	(void)state;
 	return set_up_for(60);
+}
+
+static int set_up_with_too_much(void **state)
+{
+	(void)state;
+	share_flushes();
+	served_prepare(store_too_much);
+	return served_start(60, 60, 60);
 }
 
 static int tear_down(void **state)
@@ -168,12 +228,25 @@ static void the_loop_flushes_no_file(void **state)
 	submit_many(client);
 	assert_int_equal(peer_submit_answer(client)->job, 2); /* none is missing */
 	assert_in_range(flushes->looks_at_once, 1, FILES / 2);
+	assert_in_range(flushes->touched_at_once, 0, FILES / 2);
 	struct scripted *other = call_client(); /* and two at once, one of which gives up */
 	submit_many(client);
 	submit_many(other);
 	scripted_hang_up(other);
 	assert_int_equal(peer_submit_answer(client)->job >= 3, true);
 	scripted_hang_up(client);
+}
+
+/* The loop answers between pieces of what has to go. */
+static void a_smaller_limit_is_reached_in_pieces(void **state)
+{
+	(void)state;
+	served_still_works();
+	for (int i = 0; i < 6000 && flushes->removed < STORED - STORED_LEFT; i++)
+		usleep(10000);
+	served_still_works();
+	assert_int_equal(flushes->removed, STORED - STORED_LEFT);
+	assert_in_range(flushes->removed_at_once, 1, STORED / 5);
 }
 
 static unsigned leftovers(void)
@@ -347,6 +420,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(the_loop_flushes_no_file, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(a_smaller_limit_is_reached_in_pieces, set_up_with_too_much, tear_down),
 		cmocka_unit_test_setup_teardown(who_goes_midway_leaves_nothing, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(a_file_that_was_sent_is_not_taken_again, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(half_a_file_is_not_open, set_up, tear_down),
