@@ -13,6 +13,7 @@
 #include "common/base/disk.h"
 #include "common/base/list.h"
 #include "common/base/mem.h"
+#include "common/net/key_pair.h"
 
 #include <dirent.h>
 #include <openssl/err.h>
@@ -356,22 +357,26 @@ static int put_in_place(const struct authority *a, const char *name, const char 
 	return !rc && disk_rename(next, path) ? error_file(e, errno, path) : rc;
 }
 
-/* Both are on the disk before either replaces the old one: on a full disk the old pair stays. Key first: a program that
- * reads in between finds that key and certificate do not match, and keeps its old pair. */
-static int write_pair(const struct authority *a, const char *name, X509 *cert, EVP_PKEY *key, struct error *e)
+/* Both are on the disk before either replaces the old one: on a full disk the old pair stays. Key first, and flushed: a
+ * program that starts in between, or after a loss of power there, finds its certificate beside it (key_pair.c). */
+static int write_pair(const struct authority *a, const char *name, X509 *cert, EVP_PKEY *key, bool *in_use,
+		      struct error *e)
 {
 	char path[PATH_SIZE];
 	struct error ignored;
-	int rc = write_pem(a->folder, name, "cert.pem.next", pem_cert(cert), 0644, e);
+	int rc = write_pem(a->folder, name, "cert.pem" KEY_PAIR_NEXT, pem_cert(cert), 0644, e);
 	if (!rc)
 		rc = write_pem(a->folder, name, "key.pem.next", pem_key(key), 0600, e);
 	if (!rc)
 		rc = put_in_place(a, name, "key.pem.next", "key.pem", e);
+	*in_use = !rc && has(a, name, "cert.pem"); /* there is no way back to the old pair */
+	if (!rc && !(rc = path_in(path, e, a->folder, "", name)))
+		rc = disk_sync_folder(path, e);
 	if (!rc)
-		rc = put_in_place(a, name, "cert.pem.next", "cert.pem", e);
-	static const char *const files[] = {"cert.pem.next", "key.pem.next"};
+		rc = put_in_place(a, name, "cert.pem" KEY_PAIR_NEXT, "cert.pem", e);
+	static const char *const files[] = {"cert.pem" KEY_PAIR_NEXT, "key.pem.next"};
 	for (size_t i = 0; i < 2; i++)
-		if (rc && path_in(path, &ignored, a->folder, name, files[i]) == 0) /* it will not be recorded */
+		if (!*in_use && path_in(path, &ignored, a->folder, name, files[i]) == 0) /* it will not be recorded */
 			disk_unlink(path);
 	return rc;
 }
@@ -380,6 +385,7 @@ static int write_issued(const struct authority *a, const char *name, X509 *cert,
 {
 	char file[80], path[PATH_SIZE];
 	struct tls_peer who;
+	bool in_use = false;
 	int rc = tls_read_peer(cert, &who, e);
 	if (rc)
 		return rc;
@@ -389,9 +395,9 @@ static int write_issued(const struct authority *a, const char *name, X509 *cert,
 	if (!rc)
 		rc = write_pem(a->folder, name, "ca.pem", pem_cert(a->cert), 0644, e);
 	if (!rc)
-		rc = write_pair(a, name, cert, key, e);
+		rc = write_pair(a, name, cert, key, &in_use, e);
 	struct error ignored;
-	if (rc && path_in(path, &ignored, a->folder, "issued", file) == 0) /* nobody has its key */
+	if (rc && !in_use && path_in(path, &ignored, a->folder, "issued", file) == 0) /* nobody has its key */
 		disk_unlink(path);
 	return rc;
 }

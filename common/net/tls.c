@@ -11,6 +11,7 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
+#include "common/net/key_pair.h"
 
 #include <openssl/err.h>
 #include <openssl/ssl.h>
@@ -291,18 +292,17 @@ static int load_store(const struct tls *t, SSL_CTX *context, bool revocations, s
 
 static int load_own(const struct tls *t, SSL_CTX *context, struct tls_peer *self, struct error *e)
 {
-	char path[4096];
+	char path[4096], key[4096];
 	struct stat st;
-	path_of(t, 2, path, sizeof path);
-	if (stat(path, &st))
-		return error_file(e, errno, path);
+	path_of(t, 2, key, sizeof key);
+	if (stat(key, &st))
+		return error_file(e, errno, key);
 	if (st.st_mode & 0007)
-		return error_set(e, EPERM, "%s: everybody on this machine can read the key: chmod 600", path);
-	if (SSL_CTX_use_PrivateKey_file(context, path, SSL_FILETYPE_PEM) != 1)
-		return broken(e, EBADMSG, path);
+		return error_set(e, EPERM, "%s: everybody on this machine can read the key: chmod 600", key);
 	path_of(t, 1, path, sizeof path);
-	if (SSL_CTX_use_certificate_chain_file(context, path) != 1 || SSL_CTX_check_private_key(context) != 1)
-		return broken(e, EBADMSG, path);
+	const char *bad = key_pair_use(context, key, path);
+	if (bad)
+		return broken(e, EBADMSG, bad);
 	int rc = tls_read_peer(SSL_CTX_get0_certificate(context), self, e);
 	return rc ? error_prefix(e, rc, "%s", path) : 0;
 }

@@ -2,7 +2,7 @@
 /*
  * Observed time, in seconds, from which ages of finished jobs are computed. It advances with the machine's boot-time
  * clock, which nobody sets, during a run of the coordinator and between runs. Across a reboot only the wall clock knows
- * how much time has passed, and it may be wrong: at most SEEN_CREDIT is added. Pure.
+ * how much time has passed, and it may be wrong: at most seen_credit is added. Pure.
  */
 #ifndef COORDINATOR_STORE_SEEN_H
 #define COORDINATOR_STORE_SEEN_H
