@@ -38,7 +38,7 @@ void ages_open(struct jobs *jobs)
 	if (rc && rc != -ENOENT)
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 	jobs->seen = clocks();
-	seen_go_on(&jobs->seen, rc ? NULL : &last);
+	seen_go_on(&jobs->seen, rc ? NULL : &last, seen_credit(jobs->config.clear_seconds));
 	ages_keep(jobs);
 }
 

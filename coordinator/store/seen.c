@@ -8,7 +8,12 @@
 #include <stdio.h>
 #include <string.h>
 
-void seen_go_on(struct seen *now, const struct seen *last)
+double seen_credit(double keep)
+{
+	return keep > 0 && keep < SEEN_SHARE * SEEN_CREDIT ? keep / SEEN_SHARE : SEEN_CREDIT;
+}
+
+void seen_go_on(struct seen *now, const struct seen *last, double credit)
 {
 	now->seconds = last ? last->seconds : 0;
 	if (!last)
@@ -16,7 +21,7 @@ void seen_go_on(struct seen *now, const struct seen *last)
 	if (*now->boot && strcmp(now->boot, last->boot) == 0)
 		now->seconds += fmax(0, now->up - last->up);
 	else
-		now->seconds += fmin(fmax(0, now->wall - last->wall), SEEN_CREDIT);
+		now->seconds += fmin(fmax(0, now->wall - last->wall), credit);
 }
 
 size_t seen_to_text(const struct seen *s, char text[SEEN_TEXT])

@@ -2,6 +2,7 @@
 /* Finished jobs that are old go, with all that is in their folders and their rows, and nobody waits for it. */
 #include "common/base/disk.h"
 #include "common/base/log.h"
+#include "coordinator/retention/ages.h"
 #include "coordinator/retention/clear.h"
 #include "tests/support/bytes_read.h"
 #include "tests/support/folder.h"
@@ -91,6 +92,47 @@ static void open_jobs(void)
 	struct timespec up;
 	clock_gettime(CLOCK_BOOTTIME, &up);
 	jobs.seen = (struct seen){.seconds = 100.0 * DAY, .up = (double)up.tv_sec};
+}
+
+/* As a coordinator starts after a reboot that has set the wall clock ahead by so many seconds. */
+static void reboot(double ahead)
+{
+	struct seen last = {
+		.seconds = 100.0 * DAY, .up = 1e9, .wall = (double)time(NULL) - ahead, .boot = "the-one-before"};
+	struct error e;
+	char text[SEEN_TEXT];
+	seen_to_text(&last, text);
+	assert_int_equal(ledger_set(jobs.ledger, "clock", text, &e), 0);
+	ages_open(&jobs);
+	jobs.clear_next = 0;
+	do
+		clear_tick(&jobs);
+	while (jobs.clearing);
+}
+
+/* A clock that jumps by years, and back, removes nothing that is young, nor of three results for which there is too
+ * little space another one than the oldest. */
+static void jumps_of_the_wall_clock_remove_nothing(void **state)
+{
+	(void)state;
+	static const double jumps[] = {10 * 365.0 * DAY, -10 * 365.0 * DAY, 2.0 * DAY, -2.0 * DAY};
+	double now = (double)time(NULL);
+	for (int days = 0; days <= 2; days++) { /* 0: a quarter */
+		open_jobs();
+		jobs.config.clear_seconds = days ? days * (double)DAY : DAY / 4;
+		for (uint64_t id = 1; id <= 3; id++)
+			add(id, now - 60 * (double)(4 - id));
+		for (unsigned k = 0; k < sizeof jumps / sizeof *jumps; k++) {
+			reboot(jumps[k]);
+			for (uint64_t id = 1; id <= 3; id++)
+				assert_true(has(id, "result.exr") == (id > 1 || k == 0 || days == 0));
+			jobs.config.clear_bytes = days ? 10 : 0; /* two results */
+		}
+		ledger_close(jobs.ledger);
+		spool_close(jobs.spool);
+		folder_tear_down(NULL);
+		folder_set_up(NULL);
+	}
 }
 
 static void old_jobs_go_bit_by_bit(void **state)
@@ -284,6 +326,8 @@ static void what_has_just_ended_is_fetched_first(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(jumps_of_the_wall_clock_remove_nothing, folder_set_up,
+						folder_tear_down),
 		cmocka_unit_test_setup_teardown(old_jobs_go_bit_by_bit, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(many_rows_are_read_bit_by_bit, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(of_unknown_age, folder_set_up, folder_tear_down),

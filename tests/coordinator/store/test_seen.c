@@ -19,7 +19,7 @@ static double after(const char *boot, double up, double wall)
 	struct seen last = {.seconds = 1000, .up = 500, .wall = 100 * DAY, .boot = "first"},
 		    now = {.up = up, .wall = wall};
 	snprintf(now.boot, sizeof now.boot, "%s", boot);
-	seen_go_on(&now, &last);
+	seen_go_on(&now, &last, SEEN_CREDIT);
 	return now.seconds;
 }
 
@@ -27,7 +27,7 @@ static void wall_clock_jumps(void **state)
 {
 	(void)state;
 	struct seen first = {.seconds = 7, .up = 1, .wall = 2};
-	seen_go_on(&first, NULL);
+	seen_go_on(&first, NULL, SEEN_CREDIT);
 	assert_true(first.seconds == 0);
 	assert_true(after("first", 600, 140 * DAY) == 1100); /* 40 days ahead */
 	assert_true(after("first", 600, 0) == 1100);
@@ -36,6 +36,15 @@ static void wall_clock_jumps(void **state)
 	assert_true(after("second", 10, 140 * DAY) == 1000 + SEEN_CREDIT);
 	assert_true(after("second", 10, 0) == 1000);
 	assert_true(after("", 600, 100 * DAY + 60) == 1060); /* a system without such a name */
+}
+
+/* However short results are kept. */
+static void credit_is_a_part_of_what_is_kept(void **state)
+{
+	(void)state;
+	assert_true(seen_credit(0) == SEEN_CREDIT && seen_credit(30 * DAY) == SEEN_CREDIT);
+	assert_true(seen_credit(300 * DAY) == SEEN_CREDIT);
+	assert_true(seen_credit(3 * DAY) == DAY / 10 && seen_credit(60) == 2);
 }
 
 static void as_text(void **state)
@@ -64,6 +73,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(wall_clock_jumps),
+		cmocka_unit_test(credit_is_a_part_of_what_is_kept),
 		cmocka_unit_test(as_text),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
