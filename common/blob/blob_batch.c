@@ -86,19 +86,23 @@ void blob_batch_enter(struct blob_batch *b)
 		blob_enter(b->store, kept_of(b, i));
 }
 
-void blob_batch_free(struct blob_batch *b)
+void blob_batch_discard(struct blob_batch *b)
 {
 	char path[PATH_MOST];
+	for (; b->renamed < b->kept.count; b->renamed++) {
+		blob_temporary_path(b->store, kept_of(b, b->renamed)->number, path, sizeof path);
+		disk_unlink(path);
+	}
+}
+
+void blob_batch_free(struct blob_batch *b)
+{
 	bool missing = false;
 	if (!b)
 		return;
-	for (size_t i = 0; i < b->kept.count; i++) {
-		if (i >= b->renamed) {
-			blob_temporary_path(b->store, kept_of(b, i)->number, path, sizeof path);
-			disk_unlink(path);
-		}
+	blob_batch_discard(b);
+	for (size_t i = 0; i < b->kept.count; i++)
 		missing |= blob_let_go(b->store, kept_of(b, i));
-	}
 	if (missing)
 		blob_store_sweep(b->store);
 	list_free(&b->kept);

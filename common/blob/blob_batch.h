@@ -20,6 +20,8 @@ const struct blob_hash *blob_batch_hash(const struct blob_batch *b, size_t i);
 int blob_batch_flush(struct blob_batch *b, struct error *e);
 /* After a flush without error: from now on its blobs exist. They are held until blob_batch_free. */
 void blob_batch_enter(struct blob_batch *b);
+/* Removes the files of a batch that was not flushed, or not without error. As above. */
+void blob_batch_discard(struct blob_batch *b);
 void blob_batch_free(struct blob_batch *b); /* NULL: nothing. Removes what was not entered */
 
 #endif

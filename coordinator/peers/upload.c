@@ -32,6 +32,7 @@ struct upload_flush {
 	uv_work_t work;
 	struct upload *upload; /* NULL: it was freed */
 	struct blob_batch *batch;
+	struct blob_batch *rest; /* what has arrived since for an upload that was freed; NULL: nothing */
 	upload_flushed done;
 	void *user;
 	int rc;
@@ -326,9 +327,12 @@ void upload_free(struct upload *u)
 {
 	if (u->writer)
 		blob_write_abort(u->writer);
-	if (u->flush)
+	if (u->flush) {
 		u->flush->upload = NULL;
-	blob_batch_free(u->batch);
+		u->flush->rest = u->batch;
+	} else {
+		blob_batch_free(u->batch);
+	}
 	const Farm__Submit *m = u->submit.message ? u->submit.message->submit : NULL;
 	for (size_t i = 0; m && i < m->n_files; i++) {
 		struct blob_hash h = file_hash_from_wire(m->files[i]);
@@ -398,6 +402,22 @@ static void run_flush(uv_work_t *work)
 {
 	struct upload_flush *f = work->data;
 	f->rc = blob_batch_flush(f->batch, &f->error);
+	if (f->rc)
+		blob_batch_discard(f->batch);
+}
+
+static void run_discard(uv_work_t *work)
+{
+	struct upload_flush *f = work->data;
+	blob_batch_discard(f->rest);
+}
+
+static void discarded(uv_work_t *work, int status)
+{
+	(void)status;
+	struct upload_flush *f = work->data;
+	blob_batch_free(f->rest);
+	mem_free(f);
 }
 
 static void flush_done(uv_work_t *work, int status)
@@ -407,12 +427,15 @@ static void flush_done(uv_work_t *work, int status)
 	struct upload *u = f->upload;
 	if (u)
 		u->flush = NULL;
-	if (u && !f->rc) {
+	if (!f->rc) /* also if nobody waits any more: they are on the disk, and count */
 		blob_batch_enter(f->batch);
-		for (size_t i = 0; i < blob_batch_count(f->batch); i++)
-			hold_blob(u, blob_batch_hash(f->batch, i));
-	}
+	for (size_t i = 0; u && !f->rc && i < blob_batch_count(f->batch); i++)
+		hold_blob(u, blob_batch_hash(f->batch, i));
 	blob_batch_free(f->batch);
+	/* Thousands of files may have arrived in the meantime. */
+	if (f->rest && uv_queue_work(work->loop, work, run_discard, discarded) == 0)
+		return;
+	blob_batch_free(f->rest);
 	if (u)
 		f->done(f->user, f->rc, &f->error);
 	mem_free(f);

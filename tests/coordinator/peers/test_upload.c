@@ -27,6 +27,7 @@ static struct flushes {
 	_Atomic unsigned on_loop, elsewhere;
 	_Atomic unsigned looks_at_once; /* most looks at files in one turn of the loop */
 	_Atomic unsigned touched_at_once, removed_at_once, removed;
+	_Atomic bool hold; /* flushes of files wait */
 } * flushes;
 
 static int counted_fsync(int fd)
@@ -35,6 +36,8 @@ static int counted_fsync(int fd)
 		flushes->on_loop++;
 	else
 		flushes->elsewhere++;
+	while (flushes->hold && gettid() != getpid())
+		usleep(1000);
 	return fsync(fd);
 }
 
@@ -279,6 +282,33 @@ static void who_goes_midway_leaves_nothing(void **state)
 	scripted_hang_up(client);
 }
 
+/* While the first file is flushed, all others of half a scene have arrived. */
+static void the_loop_removes_few_files(void **state)
+{
+	(void)state;
+	struct scripted *client = call_client();
+	submit_many(client);
+	assert_int_equal(peer_submit_answer(client)->n_missing, FILES);
+	flushes->hold = true;
+	send_files(client, 0, FILES / 2);
+	peer_say_empty(client, FARM__ENVELOPE__BODY_JOB_LIST);
+	assert_int_equal(scripted_hear(client)->body_case, FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
+	scripted_hang_up(client);
+	served_works_again();
+	assert_in_range(leftovers(), FILES / 2, FILES);
+	flushes->hold = false;
+	for (int i = 0; i < 6000 && leftovers(); i++)
+		usleep(10000);
+	assert_int_equal(leftovers(), 0);
+	served_still_works();
+	assert_in_range(flushes->removed, 0, 10);
+	/* What was flushed for nobody is in the store. */
+	client = call_client();
+	submit_many(client);
+	assert_in_range(peer_submit_answer(client)->n_missing, FILES / 2, FILES - 1);
+	scripted_hang_up(client);
+}
+
 /* Each is sent once. */
 static void a_file_that_was_sent_is_not_taken_again(void **state)
 {
@@ -422,6 +452,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(the_loop_flushes_no_file, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(a_smaller_limit_is_reached_in_pieces, set_up_with_too_much, tear_down),
 		cmocka_unit_test_setup_teardown(who_goes_midway_leaves_nothing, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(the_loop_removes_few_files, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(a_file_that_was_sent_is_not_taken_again, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(half_a_file_is_not_open, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(announcements_take_no_room, set_up, tear_down),
