@@ -9,7 +9,7 @@
 # the exit code is 0 when something ran and nothing failed. PATTERN: only names that hold it.
 #
 # As many programs run at a time as there are processors (HSLT_TEST_JOBS), the longest of the last run first. Scripts wait for most of
-# their time, so three of them share one processor; when they have ended, programs have that one too.
+# their time: three of them run beside the programs, which leave them the processor when they want it (nice).
 # HSLT_TEST_KINDS: "unit script" (default both). HSLT_TEST_WITHOUT: an extended regular expression for those that are left out. No test
 # has a limit of wall clock, which a busy machine would reach: it is ended when its processes have used HSLT_TEST_CPU seconds of processor
 # time (default 1800; with FULL=1 28800), or have been idle without output for HSLT_TEST_IDLE seconds (900; 3600), see
@@ -100,8 +100,9 @@ cpu=${HSLT_TEST_CPU:-$cpu} idle=${HSLT_TEST_IDLE:-$idle} limit='$limit' said='$b
 END
 took=$build/tests/took # seconds and file of the last run
 touch "$took"
-# Of a first run: what takes minutes of a core begins first.
-longest="worker/render/path/test_integrators image/test_reference worker/render/mutation/test_forced image/test_calibration worker/render/mutation/test_balance image/test_effects image/test_scenes numerics/test_hard"
+# Of a first run: what takes minutes begins first.
+longest="worker/render/path/test_integrators worker/render/mutation/test_balance worker/render/mutation/test_forced image/test_calibration worker/render/path/test_motion image/test_reference worker/render/path/test_volume_emission numerics/test_random worker/render/mutation/test_tolerance image/test_effects numerics/test_agree"
+longest="$longest e2e/faults.sh e2e/slurm.sh e2e/tls.sh e2e/orders.sh e2e/accuracy.sh e2e/disagree.sh e2e/estimate.sh e2e/restart.sh e2e/runner.sh e2e/small_disk.sh e2e/full.sh"
 
 # The tests of a kind, one per line; programs that took long the last time first, new ones before them.
 list() {
@@ -118,28 +119,20 @@ list() {
 					s[f[2]] = f[1]
 				}
 			}
-			{ name = $0; sub(/.*\/tests\//, "", name); print ($0 in s ? s[$0] : 1000000 + first[name]), NR, $0 }' | sort -k1,1nr -k2,2n | cut -d' ' -f3
+			{ name = $0; sub(/.*\/tests\/|^tests\//, "", name); print ($0 in s ? s[$0] : 1000000 + first[name]), NR, $0 }' | sort -k1,1nr -k2,2n | cut -d' ' -f3
 }
-one() { # one KIND TESTS_AT_A_TIME: the process is the caller's
-	exec xargs -r <"$run/$1.list" -n 1 -P "$2" --process-slot-var=HSLT_TEST_SLOT sh tests/run.sh --one "$run" "$1"
+one() { # one KIND TESTS_AT_A_TIME NICENESS
+	nice -n "$3" xargs -r <"$run/$1.list" -n 1 -P "$2" --process-slot-var=HSLT_TEST_SLOT sh tests/run.sh --one "$run" "$1"
 }
 
 for kind in unit script; do
 	case " $kinds " in *" $kind "*) list $kind ;; esac >"$run/$kind.list"
 done
-jobs=${HSLT_TEST_JOBS:-$(nproc 2>/dev/null || echo 2)} beside=0
-[ ! -s "$run/script.list" ] || [ "$jobs" -lt 2 ] || beside=1
-trap '' USR1 # until xargs takes it
-one script $((1 + 2 * beside)) &
-scripts=$!
-one unit $((jobs - beside)) &
-units=$!
-wait $scripts
-if [ $beside = 1 ]; then
-	sleep 1 # xargs has begun
-	kill -USR1 $units 2>/dev/null # one more at a time
-fi
-wait $units
+jobs=${HSLT_TEST_JOBS:-$(nproc 2>/dev/null || echo 2)} scripts=3
+[ "$jobs" -gt 1 ] || scripts=1
+one script $scripts 0 &
+one unit "$jobs" 5 &
+wait
 cat "$run"/*.took "$took" 2>/dev/null | awk '!seen[$2]++' >"$took.new" && mv "$took.new" "$took"
 cat "$run"/*.bad 2>/dev/null | sort | sed 's/^/failed: /'
 cat "$run"/*.skips 2>/dev/null | sort
