@@ -22,7 +22,7 @@ void *mem_grow(void *p, size_t old_size, size_t new_size)
 char *mem_strdup(const char *s)
 {
 	size_t n = strlen(s) + 1;
-	char *p = mem_alloc(n, 1);
+	char *p = malloc(n);
 	if (p)
 		memcpy(p, s, n);
 	return p;
