@@ -8,21 +8,22 @@
 # lines name what failed, as `failed: NAME: WHY`, what was skipped, as `skipped: NAME: WHY`, and sum up: `N passed, N failed, N skipped`;
 # the exit code is 0 when something ran and nothing failed. PATTERN: only names that hold it.
 #
-# As many programs run at a time as there are processors (HSLT_TEST_JOBS), the longest of the last run first. Scripts wait for most of
-# their time: three of them run beside the programs, which leave them the processor when they want it (nice).
+# As many programs run at a time as there are processors (HSLT_TEST_JOBS), the longest of the last run first. Scripts and the programs
+# that test connections wait for most of their time: three and two of them run beside the others, which leave them the processor when
+# they want it (nice).
 # HSLT_TEST_KINDS: "unit script" (default both). HSLT_TEST_WITHOUT: an extended regular expression for those that are left out. No test
 # has a limit of wall clock, which a busy machine would reach: it is ended when its processes have used HSLT_TEST_CPU seconds of processor
 # time (default 1800; with FULL=1 28800), or have been idle without output for HSLT_TEST_IDLE seconds (900; 3600), see
 # tests/limit/limit.c.
 set -u
-if [ "${1:-}" = --one ]; then # one test of the run in folder $2: its kind, its file
+if [ "${1:-}" = --one ]; then # one test of the run in folder $2: its list, its file
 	run=$2 kind=$3 file=$4
 	. "$run/settings"
 	log=$(mktemp -p "$run")
 	begin=$(date +%s)
 	case $kind in
-	unit) name=${file#"$BUILD"/tests/} && "$limit" "$cpu" "$idle" "$file" >"$log" 2>&1 ;;
-	*) name=${file#tests/} && "$limit" "$cpu" "$idle" sh "$file" "$BUILD" >"$log" 2>&1 ;;
+	script) name=${file#tests/} && "$limit" "$cpu" "$idle" sh "$file" "$BUILD" >"$log" 2>&1 ;;
+	*) name=${file#"$BUILD"/tests/} && "$limit" "$cpu" "$idle" "$file" >"$log" 2>&1 ;;
 	esac
 	code=$?
 	took=$(($(date +%s) - begin))
@@ -31,7 +32,7 @@ if [ "${1:-}" = --one ]; then # one test of the run in folder $2: its kind, its 
 	count() { # of cmocka's closing lines: "[  PASSED  ] 3 test(s).", of later versions "[  SKIPPED ] tests: 1 test(s), listed below:"
 		sed -n "s/^\[ *$1 *\] \([^ ]*: \)*\([0-9][0-9]*\) test(s).*/\2/p" "$log" | tail -n 1
 	}
-	if [ "$kind" = unit ]; then
+	if [ "$kind" != script ]; then
 		ok=$(count PASSED) bad=$(count FAILED) out=$(count SKIPPED)
 		# By name, with what the test said before.
 		awk -v of="$name" '/^\[ *RUN/ { why = "" }
@@ -65,7 +66,7 @@ if [ "${1:-}" = --one ]; then # one test of the run in folder $2: its kind, its 
 	fi
 	# Why: what a script's `fail` says, or the tests of a program that failed; else the last line.
 	if [ "${bad:-0}" != 0 ]; then
-		why=$(if [ "$kind" = unit ]; then
+		why=$(if [ "$kind" != script ]; then
 			sed -n 's/^\[ *FAILED *\] \([^ ]*\)$/\1/p' "$log" | sort -u | paste -sd ' ' -
 		else
 			sed -n 's/^FAILED: //p' "$log" | head -n 1
@@ -101,13 +102,15 @@ END
 took=$build/tests/took # seconds and file of the last run
 touch "$took"
 # Of a first run: what takes minutes begins first.
-longest="worker/render/path/test_integrators worker/render/mutation/test_balance worker/render/mutation/test_forced image/test_calibration worker/render/path/test_motion image/test_reference worker/render/path/test_volume_emission numerics/test_random worker/render/mutation/test_tolerance image/test_effects numerics/test_agree"
+longest="worker/render/path/test_integrators worker/render/mutation/test_balance worker/render/mutation/test_forced image/test_calibration worker/render/path/test_motion image/test_reference worker/render/path/test_volume_emission numerics/test_random worker/render/mutation/test_tolerance image/test_effects numerics/test_agree coordinator/status/test_status coordinator/peers/test_orders"
 longest="$longest e2e/faults.sh e2e/slurm.sh e2e/tls.sh e2e/orders.sh e2e/accuracy.sh e2e/disagree.sh e2e/estimate.sh e2e/restart.sh e2e/runner.sh e2e/small_disk.sh e2e/full.sh"
 
-# The tests of a kind, one per line; programs that took long the last time first, new ones before them.
+# The tests of a list, one per line; programs that took long the last time first, new ones before them.
 list() {
+	waits='/tests/(common/net|coordinator/(jobs|peers|server|status)|worker/daemon)/'
 	case $1 in
-	unit) find "$build/tests" -type f -name 'test_*' -perm -u+x | sort ;;
+	unit) find "$build/tests" -type f -name 'test_*' -perm -u+x | grep -vE "$waits" | sort ;;
+	wait) find "$build/tests" -type f -name 'test_*' -perm -u+x | grep -E "$waits" | sort ;;
 	script) ls tests/lint/*.sh tests/e2e/*.sh | grep -v '/lib\.sh$' ;;
 	esac | grep -F -e "$pattern" | if [ -n "${HSLT_TEST_WITHOUT:-}" ]; then grep -vE -e "$HSLT_TEST_WITHOUT"; else cat; fi |
 		awk -v took="$took" -v longest="$longest" 'BEGIN {
@@ -121,16 +124,17 @@ list() {
 			}
 			{ name = $0; sub(/.*\/tests\/|^tests\//, "", name); print ($0 in s ? s[$0] : 1000000 + first[name]), NR, $0 }' | sort -k1,1nr -k2,2n | cut -d' ' -f3
 }
-one() { # one KIND TESTS_AT_A_TIME NICENESS
+one() { # one LIST TESTS_AT_A_TIME NICENESS
 	nice -n "$3" xargs -r <"$run/$1.list" -n 1 -P "$2" --process-slot-var=HSLT_TEST_SLOT sh tests/run.sh --one "$run" "$1"
 }
 
 for kind in unit script; do
 	case " $kinds " in *" $kind "*) list $kind ;; esac >"$run/$kind.list"
 done
-jobs=${HSLT_TEST_JOBS:-$(nproc 2>/dev/null || echo 2)} scripts=3
-[ "$jobs" -gt 1 ] || scripts=1
-one script $scripts 0 &
+case " $kinds " in *" unit "*) list wait ;; esac >"$run/wait.list"
+jobs=${HSLT_TEST_JOBS:-$(nproc 2>/dev/null || echo 2)}
+one script $((jobs > 1 ? 3 : 1)) 0 &
+one wait $((jobs > 1 ? 2 : 1)) 0 &
 one unit "$jobs" 5 &
 wait
 cat "$run"/*.took "$took" 2>/dev/null | awk '!seen[$2]++' >"$took.new" && mv "$took.new" "$took"
