@@ -36,8 +36,10 @@ struct group {
 	const struct world *w;
 	const struct stationary_how *how;
 	const struct mixture_entry *entry;
-	uint64_t seed;
+	uint64_t seed, start_seed;
 	uint32_t number, starts, bootstrap;
+	bool resampled; /* starts are known: indices of the bootstrap */
+	uint64_t *index;
 	double weight;							  /* mean of the bootstrap */
 	double first[STATIONARY_FUNCTIONS], change[STATIONARY_FUNCTIONS]; /* means over the starts, times weight */
 	uint64_t proposals, accepted, checked;
@@ -130,27 +132,26 @@ static double evaluate(struct group *g, uint64_t index)
 {
 	static _Thread_local struct path_sample sample;
 	struct sampler_random s;
-	sampler_random_init(&s, g->seed, RNG_BOOTSTRAP, index, 0);
+	sampler_random_init(&s, g->start_seed, RNG_BOOTSTRAP, index, 0);
 	path_trace_both_ways(&g->context, &s.base, &sample);
 	return sample.intensity;
 }
 
 /* Indices in proportion to their weights, systematically. */
-static bool resample(struct group *g, uint64_t *index)
+static void resample(struct group *g)
 {
 	double *sum = calloc(g->bootstrap, sizeof *sum), total = 0, r[4];
 	uint64_t first = (uint64_t)g->number * g->bootstrap;
 	for (uint32_t i = 0; i < g->bootstrap; i++)
 		sum[i] = total += evaluate(g, first + i);
-	rng_uniform4(g->seed, RNG_RESAMPLING, g->number, 0, 0, r);
+	rng_uniform4(g->start_seed, RNG_RESAMPLING, g->number, 0, 0, r);
 	for (uint32_t i = 0, at = 0; total > 0 && i < g->starts; i++) {
 		while (at + 1 < g->bootstrap && sum[at] <= (i + r[0]) / g->starts * total)
 			at++;
-		index[i] = first + at;
+		g->index[i] = first + at;
 	}
 	free(sum);
 	g->weight = total / g->bootstrap;
-	return total > 0;
 }
 
 /* Of the edge at which x_b was joined. */
@@ -206,7 +207,7 @@ static void run_start(struct group *g, uint64_t chain, uint64_t index)
 {
 	struct full_path *x = &g->place[0], *y = &g->place[1];
 	double now[STATIONARY_FUNCTIONS], next[STATIONARY_FUNCTIONS], first[STATIONARY_FUNCTIONS], r[4];
-	if (!path_start(&g->context, g->seed, index, x)) {
+	if (!path_start(&g->context, g->start_seed, index, x)) {
 		snprintf(g->failure, sizeof g->failure, "start %llu is black", (unsigned long long)index);
 		return;
 	}
@@ -248,7 +249,6 @@ static void run_start(struct group *g, uint64_t chain, uint64_t index)
 
 static void run_group(struct group *g)
 {
-	uint64_t *index = calloc(g->starts, sizeof *index);
 	const struct scene_settings *s = &g->w->settings;
 	g->context = (struct path_context){.w = g->w,
 					   .window = {0, 0, s->width, s->height},
@@ -259,15 +259,15 @@ static void run_group(struct group *g)
 	g->mutation = (struct mutation_ctx){
 		.path = &g->context, .seed = g->seed, .count = g->strategy, .limits = walk_limits_of(&g->w->accuracy)};
 	bool watched = fptrap_watch();
-	if (resample(g, index))
-		for (uint32_t i = 0; i < g->starts && !g->failure[0]; i++)
-			run_start(g, (uint64_t)g->number * g->starts + i, index[i]);
+	if (!g->resampled)
+		resample(g);
+	for (uint32_t i = 0; g->weight > 0 && i < g->starts && !g->failure[0]; i++)
+		run_start(g, (uint64_t)g->number * g->starts + i, g->index[i]);
 	fptrap_unwatch(watched);
 	for (int f = 0; f < STATIONARY_FUNCTIONS; f++) {
 		g->first[f] *= g->weight / g->starts;
 		g->change[f] *= g->weight / g->starts / STATIONARY_STEPS;
 	}
-	free(index);
 }
 
 struct queue {
@@ -341,49 +341,82 @@ static void parse(const char *text, struct mixture_entry *out)
 	*out = m.entry[0];
 }
 
-void stationary_run(const struct world *w, const char *test, const struct stationary_how *how,
-		    struct stationary_result *out)
+static void run_groups(struct group *groups)
+{
+	struct queue q = {groups, 0};
+	pthread_t other;
+	bool two = pthread_create(&other, NULL, work, &q) == 0;
+	work(&q);
+	if (two)
+		pthread_join(other, NULL);
+}
+
+static void add_group(const struct group *from, struct stationary_result *out)
+{
+	out->starts += from->starts;
+	out->proposals += from->proposals;
+	out->accepted += from->accepted;
+	out->checked += from->checked;
+	for (int i = 0; i < BATCH_COUNTERS; i++)
+		out->counters[i] += from->counters[i];
+	for (int i = 0; i < STRATEGY_COUNTERS; i++)
+		out->strategy[i] += from->strategy[i];
+	if (from->failure[0])
+		memcpy(out->failure, from->failure, sizeof out->failure);
+}
+
+void stationary_run_from(const struct world *w, const char *test, const struct stationary_how *how,
+			 struct stationary_starts *from, struct stationary_result *out)
 {
 	struct group *groups = calloc(STATIONARY_GROUPS, sizeof *groups);
-	uint32_t scale = test_scale();
+	uint32_t scale = test_scale(), starts = how->starts / scale ? how->starts / scale : 1;
 	struct mixture_entry entry;
 	char name[160];
+	bool known = from->index;
 	snprintf(name, sizeof name, "%s %s %u..%u", test, how->mutation, how->min_edges, how->max_edges);
 	parse(how->mutation, &entry);
 	*out = (struct stationary_result){.worst = -1};
+	if (!known) {
+		from->index = calloc((size_t)STATIONARY_GROUPS * starts, sizeof *from->index);
+		from->seed = stats_seed(name);
+	}
 	for (uint32_t g = 0; g < STATIONARY_GROUPS; g++) {
 		groups[g].w = w;
 		groups[g].how = how;
 		groups[g].entry = &entry;
 		groups[g].seed = stats_seed(name);
+		groups[g].start_seed = from->seed;
 		groups[g].number = g;
-		groups[g].starts = how->starts / scale ? how->starts / scale : 1;
+		groups[g].starts = starts;
 		groups[g].bootstrap = how->bootstrap / scale > 16 ? how->bootstrap / scale : 16;
+		groups[g].resampled = known;
+		groups[g].index = from->index + (size_t)g * starts;
+		groups[g].weight = from->weight[g];
 	}
-	struct queue q = {groups, 0};
-	pthread_t other;
 	double begin = cpu_seconds();
-	bool two = pthread_create(&other, NULL, work, &q) == 0;
-	work(&q);
-	if (two)
-		pthread_join(other, NULL);
+	run_groups(groups);
 	out->seconds = cpu_seconds() - begin;
 	for (int g = 0; g < STATIONARY_GROUPS; g++) {
-		const struct group *from = &groups[g];
-		out->starts += from->starts;
-		out->proposals += from->proposals;
-		out->accepted += from->accepted;
-		out->checked += from->checked;
-		for (int i = 0; i < BATCH_COUNTERS; i++)
-			out->counters[i] += from->counters[i];
-		for (int i = 0; i < STRATEGY_COUNTERS; i++)
-			out->strategy[i] += from->strategy[i];
-		if (from->failure[0])
-			memcpy(out->failure, from->failure, sizeof out->failure);
+		from->weight[g] = groups[g].weight;
+		add_group(&groups[g], out);
 	}
 	judge_groups(groups, out);
 	out->share = (double)out->accepted / (double)(out->accepted + out->starts);
 	free(groups);
+}
+
+void stationary_forget(struct stationary_starts *s)
+{
+	free(s->index);
+	s->index = NULL;
+}
+
+void stationary_run(const struct world *w, const char *test, const struct stationary_how *how,
+		    struct stationary_result *out)
+{
+	struct stationary_starts own = {.index = NULL};
+	stationary_run_from(w, test, how, &own, out);
+	stationary_forget(&own);
 }
 
 bool stationary_holds(const struct stationary_result *r)

@@ -11,7 +11,7 @@
  * FULL=1 only, with k = 3, 10 % else. Of the accepted moves at least 10 % are the forced choice's, the starts counting
  * as accepted independent proposals.
  *
- * About 90 s of CPU time; FULL=1: every (b, c) and every mutation, k = 2..4 and 6 on every scene, k = 8 on two.
+ * About 70 s of CPU time; FULL=1: every (b, c) and every mutation, k = 2..4 and 6 on every scene, k = 8 on two.
  * SCENE="rough glass" runs one alone; HSLT_TEST_ROWS=1 prints reasons of failure as well.
  */
 #include "tests/support/length.h"
@@ -82,16 +82,20 @@ struct tally {
 	uint64_t mutations;
 };
 
+/* from: what all mutations on paths of that length start from. */
 static void check(const struct world *w, const char *scene, unsigned edges, const char *mutation, bool chosen,
-		  struct tally *t)
+		  struct stationary_starts *from, struct tally *t)
 {
 	static struct stationary_result r;
 	/* Fresh paths lie anywhere on the film: far less of the noise cancels. */
 	const struct mutation_ops *ops = mutation_find(mutation, strcspn(mutation, "@"));
 	bool fresh = ops && ops->independent, weak;
-	uint32_t more = fresh && test_full() && edges == 3 ? 16 : edges == 2 ? 2 : 1;
+	uint32_t enough = edges == 2 ? 2 : 1, more = fresh && test_full() && edges == 3 ? 16 : enough;
 	struct stationary_how how = {mutation, edges, edges, more * STARTS, more * BOOTSTRAP, STATIONARY_SOUND};
-	stationary_run(w, scene, &how, &r);
+	if (more == enough)
+		stationary_run_from(w, scene, &how, from, &r);
+	else
+		stationary_run(w, scene, &how, &r);
 	for (; (weak = !test_scaled() && r.least_block > 0.02 && !fresh) && test_full() && more < 16; more *= 2) {
 		how.starts *= 2;
 		how.bootstrap *= 2;
@@ -111,24 +115,28 @@ static void check(const struct world *w, const char *scene, unsigned edges, cons
 static void check_all(const struct world *w, const char *scene, unsigned k, struct tally *t)
 {
 	char text[32];
-	check(w, scene, k, "hslt@b0", false, t);
+	struct stationary_starts from = {.index = NULL};
+	check(w, scene, k, "hslt@b0", false, &from, t);
 	for (unsigned b = 1; b <= k; b++)
 		for (unsigned c = 0; c < b; c++) {
 			if (b == k && c + 1 == k)
 				continue;
 			snprintf(text, sizeof text, "hslt@b%uc%u", b, c);
-			check(w, scene, k, text, false, t);
+			check(w, scene, k, text, false, &from, t);
 		}
 	for (size_t i = 0; mutation_registry[i]; i++)
-		check(w, scene, k, mutation_registry[i]->name, false, t);
+		check(w, scene, k, mutation_registry[i]->name, false, &from, t);
+	stationary_forget(&from);
 }
 
 static void check_list(const struct world *w, const char *scene, const struct forced *f, struct tally *t)
 {
 	char list[256], *rest = list, *one;
+	struct stationary_starts from = {.index = NULL};
 	snprintf(list, sizeof list, "%s", f->mutations);
 	while ((one = strtok_r(rest, " ", &rest)))
-		check(w, scene, f->edges, one, true, t);
+		check(w, scene, f->edges, one, true, &from, t);
+	stationary_forget(&from);
 }
 
 static void test_scene(void **state)
@@ -173,12 +181,14 @@ static void test_planted(void **state)
 	};
 	static struct stationary_result r;
 	struct world *w = test_world("rough glass");
+	struct stationary_starts from = {.index = NULL};
 	for (size_t i = 0; i < sizeof planted / sizeof *planted; i++) {
 		struct stationary_how how = {planted[i].mutation, 4, 4, STARTS, BOOTSTRAP, planted[i].fault};
-		stationary_run(w, "planted", &how, &r);
+		stationary_run_from(w, "planted", &how, &from, &r);
 		printf("%s, %s: p %.1g by the %s\n", planted[i].what, how.mutation, r.p, stationary_function(r.worst));
 		assert_true(test_scaled() || !stationary_holds(&r));
 	}
+	stationary_forget(&from);
 	world_free(w);
 }
 
