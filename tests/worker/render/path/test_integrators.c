@@ -68,8 +68,8 @@ static void test_diffuse(void **state)
 	check_all("diffuse", "diffuse.xml",
 		  &(struct lengths){.path = 640,
 				    .bdpt = 640,
-				    .rare = 512,
-				    .spread = 1000,
+				    .rare = 384,
+				    .spread = 768,
 				    .rare_spread = at_length(1440),
 				    .chain = at_length(6656)});
 }
@@ -82,7 +82,7 @@ static void test_glossy(void **state)
 				    .bdpt = 1536,
 				    .rare = at_length(1280),
 				    .spread = at_length(3456),
-				    .rare_spread = 3456});
+				    .rare_spread = 2432});
 }
 
 static void test_glass(void **state)
@@ -113,7 +113,7 @@ static void test_environment(void **state)
 	check_all(
 		"environment", "environment.xml",
 		&(struct lengths){
-			.path = 512, .bdpt = 512, .spread = 900, .chain = at_length(6144), .single = at_length(12600)});
+			.path = 512, .bdpt = 384, .spread = 512, .chain = at_length(6144), .single = at_length(12600)});
 }
 
 int main(void)

@@ -390,7 +390,7 @@ static void test_lights(void **state)
 {
 	(void)state;
 	static const struct agree_side sides[] = {
-		{"path", 8192, 32, 0, 0}, {"bdpt", 8192, 32, 0, 0}, {"hslt", 163840, 32, 0, 0}};
+		{"path", 4096, 32, 0, 0}, {"bdpt", 4096, 32, 0, 0}, {"hslt", 163840, 32, 0, 0}};
 	check_integrators(LIGHTS, sides, test_full() ? 3 : 2);
 }
 
@@ -398,7 +398,7 @@ static void test_lamps(void **state)
 {
 	(void)state;
 	static const struct agree_side sides[] = {
-		{"path", 16384, 32, 0, 0},  {"bdpt", 8192, 32, 0, 0},	{"erpt", 8192, 32, 0, 0},
+		{"path", 8704, 32, 0, 0},   {"bdpt", 8192, 32, 0, 0},	{"erpt", 8192, 32, 0, 0},
 		{"bdpt8", 12288, 32, 0, 0}, {"erpt4", 12288, 32, 0, 0}, {"pssmlt", 65536, 32, 0, 0},
 		{"hslt", 458752, 32, 0, 0},
 	};
@@ -409,14 +409,14 @@ static void test_skies(void **state)
 {
 	(void)state;
 	static const struct agree_side sides[] = {
-		{"path", 4096, 32, 0, 0}, {"bdpt", 6144, 32, 0, 0}, {"hslt", 163840, 32, 0, 0}};
+		{"path", 1664, 32, 0, 0}, {"bdpt", 2688, 32, 0, 0}, {"hslt", 163840, 32, 0, 0}};
 	check_integrators(SKIES, sides, test_full() ? 3 : 2);
 }
 
 static void test_glow(void **state)
 {
 	(void)state;
-	static const struct agree_side sides[] = {{"bdpt", 16384, 32, 0, 0}, {"path", 16384, 32, 0, 0}};
+	static const struct agree_side sides[] = {{"bdpt", 11520, 32, 0, 0}, {"path", 16384, 32, 0, 0}};
 	check_integrators(MEDIA, sides, test_full() ? 2 : 1);
 }
 
