@@ -12,9 +12,9 @@ if [ -n "$unnamed" ]; then
 	exit 1
 fi
 echo "ok: each source names its licence"
-silent=$(for f in $sources; do
-	[ "$(wc -l < "$f")" -le 200 ] || sed -n 2p "$f" | grep -qE '^/[*/]' || echo "$f"
-done)
+silent=$(echo "$sources" | xargs awk '
+	FNR == 2 { opens = /^\/[*\/]/ }
+	FNR == 201 && !opens { print FILENAME }')
 if [ -n "$silent" ]; then
 	echo "WRONG: more than 200 lines, and no comment at the top that says what it does"
 	echo "$silent" | sed 's/^/	/'
