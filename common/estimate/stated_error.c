@@ -113,19 +113,26 @@ void stated_error(const struct canvas_image *img, char *text, size_t size)
 			 (unsigned long long)img->width * img->height);
 }
 
+/* Light that no sample has found adds to a bound that it would leave. */
+static double with_unseen(const struct canvas_image *img, double upper)
+{
+	double more = IMAGE_UNSEEN_FACTOR * img->rel_mse_unseen;
+	return img->rel_mse + more > upper * upper ? sqrt(upper * upper + more) : upper;
+}
+
 double stated_error_upper(const struct canvas_image *img, bool *doubtful)
 {
 	double error = sqrt(img->rel_mse), upper = sqrt(img->rel_mse_upper);
 	bool samples = !img->r_hat;
 	*doubtful = img->rel_mse_doubt != ERROR_KNOWN && img->rel_mse_doubt != ERROR_UNSEEN;
 	if (img->rel_mse_doubt == ERROR_UNSEEN)
-		return sqrt(img->rel_mse_upper + IMAGE_UNSEEN_FACTOR * img->rel_mse_unseen);
+		return with_unseen(img, upper);
 	for (size_t i = 0; i < RARE_RULES && samples; i++) {
 		const struct rare_rule *r = &rare_rules[i];
 		if (img->rel_mse_doubt != r->doubt || !(error <= r->small))
 			continue;
 		*doubtful = false;
-		return fmax(upper, r->factor * error);
+		return with_unseen(img, fmax(upper, r->factor * error));
 	}
 	return upper;
 }

@@ -30,7 +30,7 @@ void stated_error(const struct canvas_image *img, char *text, size_t size);
  * doubt because of rare light, the doubt may last forever, since the variance is infinite: then it is five times the
  * estimate where single groups outweigh all others, once that is 10 % or less, and two and a half times where the tail
  * of the errors is too long, once that is 20 % or less (tests/image/README.md, "Where the render stops"). If light
- * is unseen, it includes twice what that adds. doubtful: of no use for that.
+ * is unseen that may leave either bound, that includes twice what it adds. doubtful: of no use for that.
  */
 double stated_error_upper(const struct canvas_image *img, bool *doubtful);
 /* That is below or at the target: what ends a render. */

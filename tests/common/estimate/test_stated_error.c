@@ -411,6 +411,14 @@ static void words(void **state)
 		img.rel_mse_upper = 0.49; /* more than that */
 		assert_true(stated_error_meets(&img, 0.701) && !stated_error_meets(&img, 0.699));
 		img.rel_mse_upper = 0.0121;
+		/* Unseen light counts beside it, once it may leave that. */
+		double room = (least * least - small * small) / 2;
+		img.rel_mse_unseen = 0.99 * room;
+		assert_true(stated_error_meets(&img, 1.001 * least));
+		img.rel_mse_unseen = 2 * room;
+		double with = sqrt(least * least + 4 * room);
+		assert_true(stated_error_meets(&img, 1.001 * with) && !stated_error_meets(&img, 0.999 * with));
+		img.rel_mse_unseen = 0;
 	}
 	assert_true(stated_error_rare_factor(0.1, 0.121) == 0 &&
 		    fabs(stated_error_rare_stop(0.2, 0) / 0.08 - 1) < 1e-12);
