@@ -91,16 +91,14 @@ static int within_quota(const struct session *p, struct error *e)
  * Whether memory has room for its chain states, if workers send the longest that there are. */
 static int fits(const struct session *p, struct error *e)
 {
-	const Farm__Submit *m = p->upload->submit.message->submit;
-	uint64_t bytes = room_for_plan(&p->upload->plan), states = chain_states_max(&p->upload->plan);
+	uint64_t bytes = room_for_plan(&p->upload->plan) + upload_bytes(p->upload),
+		 states = chain_states_max(&p->upload->plan);
 	if (states > p->jobs->config.state_bytes)
 		return error_set(e, ENOMEM,
 				 "the states of its %u chains could need %.3g MB of the coordinator's memory; the "
 				 "limit is %.3g MB: fewer --chains, or a smaller --max-depth",
 				 p->upload->plan.chains, 1e-6 * (double)states,
 				 1e-6 * (double)p->jobs->config.state_bytes);
-	for (size_t i = 0; i < m->n_files; i++)
-		bytes += m->files[i]->size;
 	int rc = spool_holds(p->jobs->spool, bytes, e);
 	return rc ? rc : room_could_hold(p->jobs, bytes, e);
 }

@@ -211,6 +211,17 @@ static int sort_hashes(struct upload *u, struct error *e)
 	return 0;
 }
 
+uint64_t upload_bytes(const struct upload *u)
+{
+	const Farm__Submit *m = u->submit.message->submit;
+	uint64_t bytes = 0;
+	for (size_t i = 0; i < m->n_files; i++) {
+		const Farm__File *f = m->files[u->by_hash[i]], *before = i ? m->files[u->by_hash[i - 1]] : NULL;
+		bytes += before && memcmp(f->hash.data, before->hash.data, BLOB_HASH_SIZE) == 0 ? 0 : f->size;
+	}
+	return bytes;
+}
+
 /* The index of the first in by_hash that is not before h. */
 static size_t place_of(const struct upload *u, const struct blob_hash *h)
 {

@@ -40,6 +40,7 @@ struct upload {
 
 /* Takes the envelope of a Submit. bandwidth: as in struct plan_request. -EINVAL with a sentence for the client. */
 int upload_new(struct upload **u, struct envelope *submit, struct blob_store *blobs, double bandwidth, struct error *e);
+uint64_t upload_bytes(const struct upload *u); /* of its files; several with the same content are stored once */
 /* Then its files are looked for in the store, some at a time, each of which costs two calls of the system. -EAGAIN:
  * call it again in another turn of the loop. -EINPROGRESS: one is being read; it goes on after upload_file_read has
  * said true. Otherwise all are known: 0, or -EINVAL with a sentence. */

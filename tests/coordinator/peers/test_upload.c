@@ -5,6 +5,7 @@
  * announcement nor a part of a file keeps others out for long.
  */
 #include "common/base/disk.h"
+#include "coordinator/jobs/room.h"
 #include "tests/support/served.h"
 
 #include <stdarg.h>
@@ -27,7 +28,8 @@ static struct flushes {
 	_Atomic unsigned on_loop, elsewhere;
 	_Atomic unsigned looks_at_once; /* most looks at files in one turn of the loop */
 	_Atomic unsigned touched_at_once, removed_at_once, removed;
-	_Atomic bool hold; /* flushes of files wait */
+	_Atomic bool hold;     /* flushes of files wait */
+	_Atomic uint64_t room; /* bytes that the disk has; 0: those of the real one */
 } * flushes;
 
 static int counted_fsync(int fd)
@@ -77,6 +79,11 @@ static int counted_unlink(const char *path)
 	return unlink(path);
 }
 
+static uint64_t set_room(const char *path)
+{
+	return flushes->room ? flushes->room : disk_system.available(path);
+}
+
 static void count_flushes(const char *spool)
 {
 	(void)spool;
@@ -86,6 +93,7 @@ static void count_flushes(const char *spool)
 	counted.stat = counted_stat;
 	counted.touch = counted_touch;
 	counted.unlink = counted_unlink;
+	counted.available = set_room;
 	disk_use(&counted);
 }
 
@@ -139,9 +147,11 @@ static int tear_down(void **state)
 	return served_stop(state);
 }
 
+static bool alike; /* all files but the scene have the same content */
+
 static void text_of(int i, char text[32])
 {
-	snprintf(text, 32, i ? "v %d 0 0\n" : "<scene/>", i);
+	snprintf(text, 32, i ? "v %d 0 0\n" : "<scene/>", alike && i ? 7 : i);
 }
 
 /* A scene and FILES - 1 files of a few bytes. */
@@ -324,6 +334,28 @@ static void a_file_that_was_sent_is_not_taken_again(void **state)
 	scripted_hang_up(client);
 }
 
+/* The disk has room for the films and both contents, or for one byte less. */
+static void equal_files_need_room_once(void **state)
+{
+	(void)state;
+	struct plan_request r = peer_plan_request(NULL);
+	struct plan plan;
+	struct error e;
+	struct scripted *client = call_client();
+	assert_int_equal(plan_make(&r, &plan, &e), 0);
+	flushes->room = room_for_plan(&plan) + strlen("<scene/>") + strlen("v 7 0 0\n");
+	alike = true;
+	submit_many(client);
+	assert_int_equal(peer_submit_answer(client)->n_missing, 2);
+	scripted_hang_up(client);
+	flushes->room--;
+	client = call_client();
+	submit_many(client);
+	assert_non_null(strstr(peer_submit_answer(client)->refusal, "it needs at least"));
+	alike = false;
+	scripted_hang_up(client);
+}
+
 static void send_part(struct scripted *p, const char *text, size_t from, size_t to)
 {
 	Farm__BlobChunk c;
@@ -454,6 +486,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(who_goes_midway_leaves_nothing, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(the_loop_removes_few_files, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(a_file_that_was_sent_is_not_taken_again, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(equal_files_need_room_once, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(half_a_file_is_not_open, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(announcements_take_no_room, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(who_came_first_has_room, set_up, tear_down),
