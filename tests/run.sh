@@ -14,18 +14,23 @@
 # HSLT_TEST_KINDS: "unit script" (default both). HSLT_TEST_WITHOUT: an extended regular expression for those that are left out. No test
 # has a limit of wall clock, which a busy machine would reach: it is ended when its processes have used HSLT_TEST_CPU seconds of processor
 # time (default 1800; with FULL=1 28800), or have been idle without output for HSLT_TEST_IDLE seconds (900; 3600), see
-# tests/limit/limit.c.
+# tests/limit/limit.c. SIGINT, SIGTERM and SIGHUP end the tests that run, and the run.
 set -u
 if [ "${1:-}" = --one ]; then # one test of the run in folder $2: its list, its file
 	run=$2 kind=$3 file=$4
+	[ ! -e "$run/ended" ] || exit 0 # by a signal
 	. "$run/settings"
 	log=$(mktemp -p "$run")
 	begin=$(date +%s)
 	case $kind in
-	script) name=${file#tests/} && "$limit" "$cpu" "$idle" sh "$file" "$BUILD" >"$log" 2>&1 ;;
-	*) name=${file#"$BUILD"/tests/} && "$limit" "$cpu" "$idle" "$file" >"$log" 2>&1 ;;
+	script) name=${file#tests/} && set -- sh "$file" "$BUILD" ;;
+	*) name=${file#"$BUILD"/tests/} && set -- "$file" ;;
 	esac
+	"$limit" "$cpu" "$idle" "$@" >"$log" 2>&1 &
+	echo $! >"$log.limit"
+	wait $!
 	code=$?
+	rm "$log.limit"
 	took=$(($(date +%s) - begin))
 	echo "$took $file" >"$log.took"
 
@@ -133,10 +138,25 @@ for kind in unit script; do
 done
 case " $kinds " in *" unit "*) list wait ;; esac >"$run/wait.list"
 jobs=${HSLT_TEST_JOBS:-$(nproc 2>/dev/null || echo 2)}
-one script $((jobs > 1 ? 3 : 1)) 0 &
-one wait $((jobs > 1 ? 2 : 1)) 0 &
-one unit "$jobs" 5 &
-wait
+{
+	one script $((jobs > 1 ? 3 : 1)) 0 &
+	one wait $((jobs > 1 ? 2 : 1)) 0 &
+	one unit "$jobs" 5 &
+	wait
+} &
+lists=$!
+# Ends the tests that run, again and again for those that were just beginning; the others are not begun.
+end() {
+	trap '' INT TERM HUP
+	: >"$run/ended"
+	while :; do cat "$run"/*.limit | xargs -r kill; sleep 0.5; done 2>/dev/null &
+	wait $lists
+	kill -9 $!
+	echo "tests/run.sh: ended by a signal" >&2
+	exit 130
+}
+trap end INT TERM HUP
+wait $lists
 cat "$run"/*.took "$took" 2>/dev/null | awk '!seen[$2]++' >"$took.new" && mv "$took.new" "$took"
 cat "$run"/*.bad 2>/dev/null | sort | sed 's/^/failed: /'
 cat "$run"/*.skips 2>/dev/null | sort

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # tests/run.sh counts and names what was skipped, as a whole and in part, and what failed; where everything is installed a test that
-# lacks something fails. A test ends by the processor time that it uses, or when it has long been idle; not because a machine is busy.
+# lacks something fails. A run that is ended leaves nothing. A test ends by the processor time that it uses, or when it has long been
+# idle; not because a machine is busy.
 . "$(dirname "$0")/lib.sh"
 LIMIT=$BUILD/tests/limit/limit
 [ -x "$LIMIT" ] || lacks "$LIMIT is not built"
@@ -76,6 +77,24 @@ skipped: one/test_one: wet: no rain
 2 passed, 3 failed, 3 skipped
 TEXT
 [ $CODE -eq 1 ] || fail "two tests of a program failed: $CODE"
+
+# A run that is ended ends its tests, whose processes hold the other end of a pipe, and begins no others.
+mkdir -p "$DIR/slow/tests/one" "$DIR/tmp"
+cp -r "$DIR/build/tests/limit" "$DIR/slow/tests/"
+for i in 1 2 3; do
+	printf '#!/bin/sh\necho >"%s/begun.%s"\nsleep 20\n' "$DIR" $i >"$DIR/slow/tests/one/test_$i"
+done
+chmod +x "$DIR"/slow/tests/one/*
+{
+	TMPDIR=$DIR/tmp HSLT_TEST_KINDS=unit HSLT_TEST_JOBS=1 sh "$DIR/tests/run.sh" "$DIR/slow" >"$DIR/said" 2>&1 &
+	until [ -e "$DIR/begun.1" ]; do sleep 0.1; done
+	kill $!
+	wait $! || echo $? >"$DIR/code"
+} 7>&1 | cat
+[ "$(cat "$DIR/code")" = 130 ] || fail "a run that was ended: $(cat "$DIR/code" "$DIR/said")"
+[ ! -e "$DIR/begun.2" ] || fail "a run that was ended goes on"
+[ -z "$(ls "$DIR/tmp")" ] || fail "a run that was ended leaves $(ls "$DIR/tmp")"
+rm "$DIR/code"
 
 # limited CPU IDLE CODE SAID SCRIPT [ARGUMENT...]: how it ends, and that nothing of it is left: its processes hold the other end of a pipe
 limited() {
