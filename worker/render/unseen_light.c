@@ -28,6 +28,9 @@
 #include <math.h>
 #include <string.h>
 
+/* However long the render is: a job that is extended has what a longer one has. */
+enum { SAMPLES = 1 << 13 };
+
 enum { SETS = 2, ACROSS = 8, CELLS = ACROSS * ACROSS, CLASSES = 24 };
 static const double few = 3;
 
@@ -144,14 +147,12 @@ struct pilot {
 static int look(struct pilot *p, const struct world *w, const struct plan *film, const struct integrator *of,
 		struct plan_request *r, struct error *e)
 {
-	uint64_t n = pilot_samples(r, (uint64_t)film->crop_width * film->crop_height);
-	n = n < PILOT_SAMPLES ? n : PILOT_SAMPLES;
 	path_context_for_samples(&p->context, w, film, p->counters);
 	p->context.refract = halfvec_refract;
 	int rc = brightness_of_samples(&p->map, &p->context, path_trace_candidates, r->seed, RNG_CHOICE,
-				       PILOT_UNSEEN_MAP, n, e);
+				       PILOT_UNSEEN_MAP, SAMPLES, e);
 	double with_light = of->face.from_camera ? 0 : of->light_every > 1 ? 1.0 / of->light_every : 1;
-	if (!rc && unseen_light(&p->context, &p->map, with_light, r->seed, PILOT_UNSEEN, n, &r->unseen))
+	if (!rc && unseen_light(&p->context, &p->map, with_light, r->seed, PILOT_UNSEEN, SAMPLES, &r->unseen))
 		rc = error_set(e, ENOMEM, "no memory for a pilot");
 	brightness_fini(&p->map);
 	return rc;

@@ -12,8 +12,8 @@
 #include "worker/render/world/world.h"
 
 /* Fills in r->unseen. r: complete, with the integrator chosen. All 0: its image is one of chains, no lobe is narrow, so
- * that nothing hides, or media scatter, which merging does not know. Draws a share of the render's samples. -ENOMEM,
- * -EINVAL */
+ * that nothing hides, or media scatter, which merging does not know. Takes 0.1 to 0.3 s, however long the render.
+ * -ENOMEM, -EINVAL */
 int render_unseen_light(const struct world *w, struct plan_request *r, struct error *e);
 
 /* The same of a context and a map of brightness. with_light: share of the samples that have a light sub-path. samples:
