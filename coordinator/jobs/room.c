@@ -30,15 +30,6 @@ static uint64_t available(const struct jobs *jobs)
 	return disk_available(path);
 }
 
-/* A round with one sample per pixel of a fully lit image writes 1.6 bytes per pixel and group, its films have 72. */
-enum { ROUNDS_LONG = 64 };
-
-uint64_t room_for_plan(const struct plan *p)
-{
-	bool is_long = p->rounds != UINT64_MAX && p->rounds >= ROUNDS_LONG;
-	return canvas_bytes(p) * (is_long ? 2 : 1);
-}
-
 /* What ended and running jobs have on the disk besides their images and files. */
 static uint64_t job_bytes(const struct jobs *jobs)
 {
@@ -63,7 +54,7 @@ int room_could_hold(const struct jobs *jobs, uint64_t bytes, struct error *e)
 		return 0;
 	return error_set(
 		e, ENOSPC,
-		"it needs at least %llu bytes for its files, films and journal, and the disk of the "
+		"it may need %llu bytes for its files and films, and the disk of the "
 		"coordinator's spool has %llu: %llu are free, %llu belong to scenes and jobs that end: a smaller "
 		"--size or --crop, or fewer --groups",
 		(unsigned long long)bytes, (unsigned long long)(left + freed), (unsigned long long)left,

@@ -12,9 +12,6 @@ bool room_make(const struct jobs *jobs);
  * scenes, the films of finished jobs and other running jobs are gone. -ENOSPC; 0 also where it cannot be known yet,
  * while jobs are read. */
 int room_could_hold(const struct jobs *jobs, uint64_t bytes, struct error *e);
-/* What a job has to write at least, apart from its files: its films, or a checkpoint of them; if it is so long that its
- * journal reaches that size, the journal as well, for the checkpoint is written beside it. */
-uint64_t room_for_plan(const struct plan *p);
 /* Whether the journals of all running jobs can grow to their limits, and a checkpoint be written then. */
 bool room_is_ample(const struct jobs *jobs);
 

@@ -15,6 +15,7 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
+#include "common/film/canvas.h"
 #include "common/plan/plan_text.h"
 #include "coordinator/job/incoming.h"
 #include "coordinator/jobs/listing.h"
@@ -91,7 +92,7 @@ static int within_quota(const struct session *p, struct error *e)
  * Whether memory has room for its chain states, if workers send the longest that there are. */
 static int fits(const struct session *p, struct error *e)
 {
-	uint64_t bytes = room_for_plan(&p->upload->plan) + upload_bytes(p->upload),
+	uint64_t bytes = canvas_bytes(&p->upload->plan) + upload_bytes(p->upload),
 		 states = chain_states_max(&p->upload->plan);
 	if (states > p->jobs->config.state_bytes)
 		return error_set(e, ENOMEM,

@@ -178,11 +178,10 @@ int spool_holds(const struct spool *s, uint64_t bytes, struct error *e)
 	uint64_t capacity = disk_capacity(s->folder);
 	if (!capacity || bytes <= capacity)
 		return 0;
-	return error_set(
-		e, ENOSPC,
-		"it needs at least %.3g MB for its files and films, and the disk of the coordinator's spool has "
-		"%.3g MB in all: a smaller --size or --crop, or less --groups",
-		1e-6 * (double)bytes, 1e-6 * (double)capacity);
+	return error_set(e, ENOSPC,
+			 "it may need %.3g MB for its files and films, and the disk of the coordinator's spool has "
+			 "%.3g MB in all: a smaller --size or --crop, or less --groups",
+			 1e-6 * (double)bytes, 1e-6 * (double)capacity);
 }
 
 const char *spool_blobs(const struct spool *s)

@@ -215,7 +215,7 @@ static void what_no_end_makes_room_for(void **state)
 	disk_use(&small);
 	assert_int_equal(room_could_hold(&jobs, 4000, &e), 0);
 	assert_int_equal(room_could_hold(&jobs, 4001, &e), -ENOSPC);
-	assert_non_null(strstr(e.text, "needs at least 4001 bytes"));
+	assert_non_null(strstr(e.text, "may need 4001 bytes"));
 	assert_non_null(strstr(e.text, "has 4000: 4000 are free, 0 belong"));
 	assert_int_equal(blob_hash_bytes(bytes, 300, &h, &e), 0);
 	assert_int_equal(blob_write_begin(&w, jobs.blobs, &h, 300, &e), 0);
@@ -236,19 +236,6 @@ static void what_no_end_makes_room_for(void **state)
 	disk_use(NULL);
 	blob_store_close(jobs.blobs);
 	spool_close(jobs.spool);
-}
-
-/* The journal of a long job reaches the size of its checkpoint, which is written beside it. */
-static void long_jobs_need_both(void **state)
-{
-	(void)state;
-	struct plan p = {.crop_width = 64, .crop_height = 64, .groups = 16, .rounds = 63};
-	assert_true(canvas_bytes(&p) > 0);
-	assert_int_equal(room_for_plan(&p), canvas_bytes(&p));
-	p.rounds = UINT64_MAX; /* a time or an error may end it soon */
-	assert_int_equal(room_for_plan(&p), canvas_bytes(&p));
-	p.rounds = 64;
-	assert_int_equal(room_for_plan(&p), 2 * canvas_bytes(&p));
 }
 
 static void order(uint64_t job, Farm__Verb verb)
@@ -294,7 +281,6 @@ int main(void)
 		cmocka_unit_test(all_end),
 		cmocka_unit_test(states_are_bounded),
 		cmocka_unit_test(small_jobs_pass_a_large_one),
-		cmocka_unit_test(long_jobs_need_both),
 		cmocka_unit_test_setup_teardown(what_no_end_makes_room_for, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(jobs_with_many_chains_take_turns, staged_set_up, folder_tear_down),
 	};
