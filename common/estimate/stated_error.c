@@ -21,9 +21,10 @@ static const char no_spread[] = "a single group of samples gives no error; use -
  */
 static void add_own(const struct canvas_image *img, struct text *t)
 {
-	if (img->rel_mse_own < 0.25 * img->rel_mse)
+	double own = img->rel_mse_own + img->rel_mse_unseen; /* what highlights have no part in is missing still */
+	if (own < 0.25 * img->rel_mse)
 		text_put(t, "; if the bright ones are highlights and not fireflies, the error is about %.3g %%",
-			 100 * sqrt(img->rel_mse_own));
+			 100 * sqrt(own));
 }
 
 void stated_error_doubt(const struct canvas_image *img, char *text, size_t size)

@@ -235,6 +235,12 @@ static void one_sample_decides_nothing(void **state)
 	print_message("with its own brightness %.5f, by hand %.5f\n", img.rel_mse_own, own);
 	assert_true(fabs(img.rel_mse_own / own - 1) < 0.05);
 	assert_non_null(strstr(text, "; if the bright ones are highlights and not fireflies, the error is about 6."));
+	img.rel_mse_unseen = 3 * img.rel_mse_own; /* is missing also if they are */
+	stated_error(&img, text, sizeof text);
+	assert_non_null(strstr(text, "; if the bright ones are highlights and not fireflies, the error is about 1"));
+	img.rel_mse_unseen = img.rel_mse;
+	stated_error(&img, text, sizeof text);
+	assert_null(strstr(text, "highlights"));
 	/* The same picture without it is known, and meets a target. */
 	img.rel_mse_doubt = ERROR_KNOWN;
 	assert_int_equal(merge_end_of(&p, 1, 0, &img), MERGE_ERROR);
