@@ -145,6 +145,12 @@ static int find_moments(const struct making *m, struct error *e)
 	return moments_image(m->c->moments, groups, m->c->rounds, m->open_rounds, m->img, e);
 }
 
+static void state_no_interval(struct canvas_image *img, enum error_doubt why)
+{
+	img->rel_mse_doubt = why;
+	img->rel_mse_95[0] = img->rel_mse_95[1] = NAN;
+}
+
 /* Chains are flagged but too short to be judged: the extent of their errors is not known. */
 static void doubt_short_chains(struct making *m)
 {
@@ -152,8 +158,7 @@ static void doubt_short_chains(struct making *m)
 	convergence_judge(&m->c->plan, m->img, &a);
 	if (a.verdict != CHAINS_TOO_SHORT || m->img->rel_mse_doubt)
 		return;
-	m->img->rel_mse_doubt = ERROR_SHORT;
-	m->img->rel_mse_95[0] = m->img->rel_mse_95[1] = NAN;
+	state_no_interval(m->img, ERROR_SHORT);
 }
 
 /* If what no sample has found were in the image, its error would leave the interval. Once samples find such light, it
@@ -167,8 +172,7 @@ static void doubt_unseen_light(struct making *m)
 	img->rel_mse_unseen = plan_unseen_after(p, (double)p->groups * (double)p->epoch * (double)m->c->rounds);
 	if (img->rel_mse_doubt || img->rel_mse + IMAGE_UNSEEN_FACTOR * img->rel_mse_unseen <= img->rel_mse_95[1])
 		return;
-	img->rel_mse_doubt = ERROR_UNSEEN;
-	img->rel_mse_95[0] = img->rel_mse_95[1] = NAN;
+	state_no_interval(img, ERROR_UNSEEN);
 }
 
 int canvas_image(const struct canvas *c, bool open_rounds, struct canvas_image *img, struct error *e)
@@ -209,10 +213,10 @@ int canvas_image(const struct canvas *c, bool open_rounds, struct canvas_image *
 	int rc = errors ? canvas_error(&m, e) : 0;
 	if (rc == 0)
 		rc = find_moments(&m, e);
-	if (rc == 0 && errors)
+	if (rc == 0 && errors) {
 		doubt_short_chains(&m);
-	if (rc == 0 && errors)
 		doubt_unseen_light(&m);
+	}
 	if (rc)
 		canvas_image_fini(img);
 	mem_free(m.all);

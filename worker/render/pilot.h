@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What the pilots have in common that look at a scene before its plan is made: their film, how many samples they draw,
- * and their random numbers, which no render draws. Pure; any thread.
+ * What the pilots have in common that look at a scene before its plan is made: their film, what its scene has, and
+ * their random numbers, which no render draws. Pure; any thread.
  */
 #ifndef WORKER_RENDER_PILOT_H
 #define WORKER_RENDER_PILOT_H

@@ -4,9 +4,9 @@
  * Contributions beyond RENDER_RARE times the brightness of their place count.
  *
  * The map of brightness is made of few samples: where they did not find light it is too dark, and a bright spot in a
- * dark corner would be called rare however easily it is found. So each place is as bright as its photons say, if that
- * is more. Light that no photon brings to a rough surface visible to the camera is not detected: light through a
- * keyhole, or seen in a mirror by a mirror.
+ * dark corner would be called rare however easily it is found, but for its photons (merging_scale). Light that no
+ * photon brings to a rough surface visible to the camera is not detected: light through a keyhole, or seen in a mirror
+ * by a mirror.
  */
 #include "worker/render/rare_light.h"
 
@@ -16,11 +16,6 @@ struct sums {
 	double scale;	     /* of the place */
 	double here, beyond; /* of its photons */
 };
-
-static void add_here(void *user, const struct merged *m)
-{
-	((struct sums *)user)->here += m->brings;
-}
 
 static void add_beyond(void *user, const struct merged *m)
 {
@@ -39,9 +34,7 @@ int rare_light(struct path_context *c, const struct brightness *map, uint64_t se
 		struct sums s = {0};
 		if (!merging_walk(&m, c, seed, step + 1, i, &place))
 			continue;
-		merging_each(&m, c, &place, add_here, &s);
-		double scale = brightness_scale(map, place.film[0], place.film[1]);
-		s.scale = scale / fmax(1, scale * s.here);
+		s.scale = merging_scale(&m, c, &place, map, &s.here);
 		if (!(s.scale > 0))
 			continue;
 		merging_each(&m, c, &place, add_beyond, &s);

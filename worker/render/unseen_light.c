@@ -43,14 +43,9 @@ struct seen_by_merging {
 
 struct place {
 	struct seen_by_merging *to;
-	double with_light, scale, brings;
+	double with_light, scale;
 	unsigned cell;
 };
-
-static void add_brightness(void *user, const struct merged *m)
-{
-	((struct place *)user)->brings += m->brings;
-}
 
 static void add_to_class(void *user, const struct merged *m)
 {
@@ -75,15 +70,13 @@ static int merge_one_set(struct path_context *c, const struct brightness *map, d
 	int rc = merging_photons(&m, c, seed, step, samples);
 	for (uint64_t i = 0; i < m.paths && !rc; i++) {
 		struct merging_place at;
+		double photons;
 		bool rough = merging_walk(&m, c, seed, step + 1, i, &at);
 		struct place p = {.to = out, .with_light = with_light, .cell = cell_of(&c->window, at.film)};
 		out->samples[p.cell]++;
 		if (!rough || !m.count)
 			continue;
-		merging_each(&m, c, &at, add_brightness, &p);
-		/* The map may be too dark, see rare_light.c. */
-		p.scale = brightness_scale(map, at.film[0], at.film[1]);
-		p.scale /= fmax(1, p.scale * p.brings);
+		p.scale = merging_scale(&m, c, &at, map, &photons);
 		if (p.scale > 0)
 			merging_each(&m, c, &at, add_to_class, &p);
 	}

@@ -286,3 +286,17 @@ void merging_each(const struct merging *m, struct path_context *c, const struct 
 	struct gathering g = {m, c, place, take, user};
 	point_tree_within(&m->tree, c->camera[place->t].x.p, place->radius, merge, &g);
 }
+
+static void add_brought(void *user, const struct merged *m)
+{
+	*(double *)user += m->brings;
+}
+
+double merging_scale(const struct merging *m, struct path_context *c, const struct merging_place *place,
+		     const struct brightness *map, double *photons)
+{
+	double scale = brightness_scale(map, place->film[0], place->film[1]);
+	*photons = 0;
+	merging_each(m, c, place, add_brought, photons);
+	return scale / fmax(1, scale * *photons);
+}

@@ -9,7 +9,7 @@
 #define WORKER_RENDER_PATH_MERGING_H
 
 #include "worker/render/math/point_tree.h"
-#include "worker/render/path/path.h"
+#include "worker/render/path/brightness.h"
 
 /* Where a light sub-path hit a rough surface: its vertex s, s >= 2, since direct light is easily found otherwise. */
 struct photon {
@@ -60,6 +60,11 @@ bool merging_walk(const struct merging *m, struct path_context *c, uint64_t seed
 /* Each path that this sample makes with the photons around its place. */
 void merging_each(const struct merging *m, struct path_context *c, const struct merging_place *place,
 		  void (*take)(void *user, const struct merged *found), void *user);
+
+/* 1 over the brightness there, as brightness_scale has it. A map of few samples is too dark where they did not find
+ * light: each place is as bright as its photons say, if that is more. photons: what these bring, X + Y + Z. */
+double merging_scale(const struct merging *m, struct path_context *c, const struct merging_place *place,
+		     const struct brightness *map, double *photons);
 
 /* The parts of it: c->light's vertex s as a photon, and the path that it makes with c->camera's vertex t, as of one
  * photon and a disk of area 1. false: black. */
