@@ -13,19 +13,19 @@ static const struct format {
 	const char *magic;
 	size_t size;
 	int (*decode)(const struct image_input *in, struct image *out);
-	bool alpha;
+	enum { NOT_READ, READ, OPAQUE } alpha; /* OPAQUE: the format has none */
 } formats[] = {
-	{"\x89PNG\r\n\x1a\n", 8, image_decode_png, true},
-	{"\xff\xd8\xff", 3, image_decode_jpeg, false},
-	{"\x76\x2f\x31\x01", 4, image_decode_exr, false},
-	{"#?RADIANCE", 10, image_decode_hdr, false},
-	{"#?RGBE", 6, image_decode_hdr, false},
-	{"RIFF", 4, image_decode_webp, true},
-	{"BM", 2, image_decode_bmp, false},
-	{"P5", 2, image_decode_pnm, false},
-	{"P6", 2, image_decode_pnm, false},
-	{"PF", 2, image_decode_pnm, false},
-	{"Pf", 2, image_decode_pnm, false},
+	{"\x89PNG\r\n\x1a\n", 8, image_decode_png, READ},
+	{"\xff\xd8\xff", 3, image_decode_jpeg, OPAQUE},
+	{"\x76\x2f\x31\x01", 4, image_decode_exr, NOT_READ},
+	{"#?RADIANCE", 10, image_decode_hdr, NOT_READ},
+	{"#?RGBE", 6, image_decode_hdr, NOT_READ},
+	{"RIFF", 4, image_decode_webp, READ},
+	{"BM", 2, image_decode_bmp, NOT_READ},
+	{"P5", 2, image_decode_pnm, NOT_READ},
+	{"P6", 2, image_decode_pnm, NOT_READ},
+	{"PF", 2, image_decode_pnm, NOT_READ},
+	{"Pf", 2, image_decode_pnm, NOT_READ},
 };
 
 /* A grey value as three equal ones, in place. */
@@ -68,11 +68,10 @@ static int decode(const struct image_input *in, struct image *out)
 	for (size_t i = 0; i < sizeof formats / sizeof *formats; i++) {
 		if (in->size < formats[i].size || memcmp(in->bytes, formats[i].magic, formats[i].size) != 0)
 			continue;
-		bool opaque = formats[i].decode == image_decode_jpeg;
-		if (in->alpha && !formats[i].alpha && !opaque)
+		if (in->alpha && formats[i].alpha == NOT_READ)
 			return error_set(in->error, ENOTSUP, "alpha is only read from PNG, WebP and TGA");
 		int r = formats[i].decode(in, out);
-		if (!r && in->alpha && opaque)
+		if (!r && in->alpha && formats[i].alpha == OPAQUE)
 			make_opaque(out);
 		return r;
 	}

@@ -86,14 +86,23 @@ static const char *mesh_of(const struct xml_element *el)
 	return NULL;
 }
 
+/* The first of them that is part of the type's name; NULL: none is. */
+static const char *part_of(const char *type, const char *const *parts)
+{
+	while (*parts && !strcasestr(type, *parts))
+		parts++;
+	return *parts;
+}
+
 /* The camera whose name is part of this one, as in "codedOrthographic" and "thinlens_srf". Others that are called a
  * lens or a camera are taken for one without a lens. NULL: what projects, or measures light, in some other way. */
 static const char *camera_of(const char *type)
 {
-	static const char *const cameras[] = {"perspective", "thinlens", "orthographic", "telecentric", "spherical"};
-	for (size_t i = 0; i < sizeof cameras / sizeof *cameras; i++)
-		if (strcasestr(type, cameras[i]))
-			return cameras[i];
+	static const char *const cameras[] = {"perspective", "thinlens",  "orthographic",
+					      "telecentric", "spherical", NULL};
+	const char *camera = part_of(type, cameras);
+	if (camera)
+		return camera;
 	return strcasestr(type, "lens") || strcasestr(type, "camera") ? "perspective" : NULL;
 }
 
@@ -101,14 +110,6 @@ static bool has_parameter(const struct xml_element *el, const char *const *list)
 {
 	for (const struct xml_element *c = el->first; c; c = c->next)
 		if (xml_attribute(c, "name") && is_one_of(xml_attribute(c, "name"), list))
-			return true;
-	return false;
-}
-
-static bool is_called(const char *type, const char *const *parts)
-{
-	for (; *parts; parts++)
-		if (strcasestr(type, *parts))
 			return true;
 	return false;
 }
@@ -123,7 +124,7 @@ static const char *material_of(const struct xml_element *el, const char *type, c
 				 *const rough[] = {"alpha", "roughness", NULL},
 				 *const diffuse[] = {"diffuse_reflectance", "diffuseReflectance", NULL},
 				 *const specular[] = {"specular_reflectance", "specularReflectance", NULL};
-	if (is_called(type, glass) && !is_called(type, other) && !has_parameter(el, diffuse))
+	if (part_of(type, glass) && !part_of(type, other) && !has_parameter(el, diffuse))
 		return has_parameter(el, rough) ? "roughdielectric" : "dielectric";
 	if (has_parameter(el, base) && has_parameter(el, disney))
 		return "principled";

@@ -174,7 +174,7 @@ static int read_property(struct maker *m, struct draft *d, const struct xml_elem
 	bool strange = d->stands_in && (r == -EINVAL || r == -ERANGE);
 	if (strange || (r == -EINVAL && m->lenient && p->choices))
 		return leave_out(&m->notes, el, written, xml_attribute(el, "value"), "the value");
-	if (r && strcmp(el->name, "transform") == 0)
+	if (r)
 		return transform_report(el, r, &m->report, m->error);
 	if (!r && v.type == VALUE_STRING && strcmp(p->name, "filename") == 0)
 		r = *v.as.string ? maker_add_asset(m, v.as.string, owner)
@@ -338,11 +338,9 @@ static int read_unknown(struct maker *m, const struct xml_element *el)
 	struct value unused;
 	if (element_is_unset(el))
 		return REPORT_TOLD;
-	bool motion = strcmp(el->name, "animation") == 0;
-	int r = motion ? animation_read(&el, m->arena, &moves, m->error)
-		       : value_read(el, m->assets_from, m->arena, &unused, m->error);
-	return r && (motion || strcmp(el->name, "transform") == 0) ? transform_report(whole, r, &m->report, m->error)
-								   : r;
+	int r = strcmp(el->name, "animation") == 0 ? animation_read(&el, m->arena, &moves, m->error)
+						   : value_read(el, m->assets_from, m->arena, &unused, m->error);
+	return transform_report(whole, r, &m->report, m->error);
 }
 
 /* What is wrong inside an object that is refused: in its objects, such as the film of a sensor of an unknown type, and

@@ -255,7 +255,8 @@ static int report_steps(const struct xml_element *el, const struct error *known,
 int transform_report(const struct xml_element *el, int failure, struct report *report, struct error *e)
 {
 	const struct error first = *e;
-	if (failure != -EINVAL && failure != -ERANGE)
+	bool has_steps = strcmp(el->name, "transform") == 0 || strcmp(el->name, "animation") == 0;
+	if (!has_steps || (failure != -EINVAL && failure != -ERANGE))
 		return failure;
 	int r = report_problem(report, failure, e);
 	if (!r)

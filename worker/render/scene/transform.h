@@ -9,8 +9,9 @@
 
 int transform_read(const struct xml_element *el, mat4 *out, struct error *e);
 
-/* After a failure in a <transform> or an <animation>, which is in e: reports it, and what is wrong in each of their
- * elements. REPORT_TOLD, or what report_problem returns; other failures than wrong elements are returned unchanged. */
+/* After a failure in the value el, which is in e: if that is a <transform> or an <animation>, reports it, and what is
+ * wrong in each of their elements. REPORT_TOLD, or what report_problem returns; failures of other values, and others
+ * than wrong elements, are returned unchanged. */
 int transform_report(const struct xml_element *el, int failure, struct report *report, struct error *e);
 
 /* x=, y=, z= (default `missing`) or value="x, y, z"; one_for_all: value="s" stands for three equal ones. */
