@@ -55,6 +55,8 @@ static const struct trial_scene {
 	{"window", "tests/bench/scenes/window.xml", true, 160, 90},
 	{"rough-caustic", "tests/bench/scenes/rough-caustic.xml", true, 160, 90},
 	{"glossy-room", "tests/bench/scenes/glossy-room.xml", true, 160, 90},
+	{"hall", "tests/bench/scenes/hall.xml", true, 160, 120},
+	{"daylight", "tests/bench/scenes/daylight.xml", true, 160, 120},
 	{"ring", "tests/bench/scenes/ring.xml", true, 160, 90},
 	{"torus", "tests/bench/scenes/torus.xml", true, 160, 90},
 	{"bulb", "tests/scenes/bulb/scene.xml", true, 160, 90},

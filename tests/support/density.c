@@ -12,6 +12,7 @@
 #include "tests/support/stats.h"
 #include "worker/render/path/connect.h"
 #include "worker/render/world/build.h"
+#include "worker/render/world/emitter_choice.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -354,7 +355,8 @@ static double toward(const struct path_context *c, const struct route *r)
 {
 	const struct emitter *em = &c->w->emitters[r->x[0].emitter];
 	struct emitter_point p = emitter_point_of(&r->x[0]);
-	return c->w->emitter_pdf[r->x[0].emitter] * emitter_pdf_toward(em, r->x[joined_to(c, r, 1)].x.p, &p);
+	vec3 lit = r->x[joined_to(c, r, 1)].x.p;
+	return emitter_choice_denser(c->w, lit, r->x[0].emitter, em, &p) * emitter_pdf_toward(em, lit, &p);
 }
 
 static double cosine_at(const struct path_vertex *v, vec3 w)

@@ -3,12 +3,6 @@
 
 typedef struct point_tree_node node;
 
-/* The axis changes from level to level; the middle of a range is the node that divides it. */
-static double along(vec3 p, unsigned axis)
-{
-	return axis == 0 ? p.x : axis == 1 ? p.y : p.z;
-}
-
 static void exchange(node *a, node *b)
 {
 	node t = *a;
@@ -16,18 +10,17 @@ static void exchange(node *a, node *b)
 	*b = t;
 }
 
-/* Makes nodes[middle] what it would be if all were sorted, with none before it above and none after it below (Hoare
- * 1961, Algorithm 65). */
-static void partition(node *nodes, size_t count, size_t middle, unsigned axis)
+/* Hoare 1961, Algorithm 65. */
+void point_tree_partition(node *nodes, size_t count, size_t middle, unsigned axis)
 {
 	size_t low = 0, high = count - 1;
 	while (low < high) {
-		double pivot = along(nodes[low + (high - low) / 2].p, axis);
+		double pivot = point_along(nodes[low + (high - low) / 2].p, axis);
 		size_t i = low, j = high;
 		for (;;) {
-			while (along(nodes[i].p, axis) < pivot)
+			while (point_along(nodes[i].p, axis) < pivot)
 				i++;
-			while (along(nodes[j].p, axis) > pivot)
+			while (point_along(nodes[j].p, axis) > pivot)
 				j--;
 			if (i >= j)
 				break;
@@ -40,11 +33,12 @@ static void partition(node *nodes, size_t count, size_t middle, unsigned axis)
 	}
 }
 
+/* The axis changes from level to level; the middle of a range is the node that divides it. */
 static void build(node *nodes, size_t count, unsigned axis)
 {
 	while (count > 1) {
 		size_t middle = count / 2;
-		partition(nodes, count, middle, axis);
+		point_tree_partition(nodes, count, middle, axis);
 		axis = (axis + 1) % 3;
 		build(nodes, middle, axis);
 		nodes += middle + 1;
@@ -70,7 +64,7 @@ static void search(const struct search *s, const node *nodes, size_t count, unsi
 		size_t middle = count / 2;
 		const node *m = &nodes[middle];
 		vec3 d = vec3_sub(m->p, s->at);
-		double across = along(d, axis);
+		double across = point_along(d, axis);
 		if (vec3_dot(d, d) <= s->radius * s->radius)
 			s->found(s->user, m->id);
 		axis = (axis + 1) % 3;

@@ -26,6 +26,7 @@ enum rng_stream {
 	RNG_REDISTRIBUTION = 13,
 	RNG_BRIGHTNESS = 14,
 	RNG_ERPT4 = 15,
+	RNG_EMITTERS = 16,
 };
 
 /* Four values: dimensions 4*block .. 4*block+3 of one (stream, index, step). */

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/path/next_event.h"
 
+#include "worker/render/world/emitter_choice.h"
+
 double path_pdf_emitter(const struct path_context *c, const struct path_vertex *v)
 {
 	struct emitter_room room;
@@ -16,22 +18,22 @@ double path_pdf_toward(const struct path_context *c, const struct path_vertex *v
 	const struct emitter *em = world_emitter(c->w, v->emitter, v->x.prim.time, &room);
 	struct emitter_point p = world_emitter_point(&v->x);
 	p.infinite = v->kind == VERTEX_INFINITE;
-	return c->w->emitter_pdf[v->emitter] * emitter_pdf_toward(em, ref, &p);
+	return emitter_choice_denser(c->w, ref, v->emitter, em, &p) * emitter_pdf_toward(em, ref, &p);
 }
 
 bool path_next_event(const struct path_context *c, const struct path_vertex *z, struct path_vertex *y, double *pdf)
 {
 	const struct world *w = c->w;
-	int32_t chosen = world_pick_emitter(w, z->next_event[2]);
-	if (chosen < 0)
+	struct emitter_pick pick;
+	if (!emitter_choice_pick(w, z->x.p, z->next_event, &pick))
 		return false;
 	struct emitter_room room;
-	const struct emitter *em = world_emitter(w, chosen, z->x.prim.time, &room);
+	const struct emitter *em = world_emitter(w, pick.emitter, z->x.prim.time, &room);
 	struct emitter_point p;
-	if (!emitter_sample_toward(em, z->x.p, z->next_event, &p, pdf) || !(*pdf > 0))
+	if (!emitter_sample_toward(em, z->x.p, pick.u, &p, pdf) || !(*pdf > 0))
 		return false;
-	*pdf *= w->emitter_pdf[chosen];
-	*y = path_emitter_vertex(w, chosen, &p, z->x.prim.time);
-	y->pdf = w->emitter_pdf[chosen] * em->ops->pdf_point(em, &p);
+	*pdf *= pick.denser;
+	*y = path_emitter_vertex(w, pick.emitter, &p, z->x.prim.time);
+	y->pdf = w->emitter_pdf[pick.emitter] * em->ops->pdf_point(em, &p);
 	return true;
 }

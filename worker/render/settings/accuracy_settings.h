@@ -36,6 +36,7 @@ struct render_setting {
 const struct render_setting *render_setting_at(size_t index);
 
 enum { SETTING_DOUBLE, SETTING_SINGLE };			      /* precision */
+enum { SETTING_BY_PLACE, SETTING_BY_POWER };			      /* emitter_choice */
 enum { SETTING_BACKS_AUTO, SETTING_BACKS_LIT, SETTING_BACKS_BLACK };  /* backs */
 enum { SETTING_MEDIA_AUTO, SETTING_MEDIA_SHOWN, SETTING_MEDIA_NONE }; /* media */
 

@@ -26,6 +26,10 @@ SETTING(tessellation, "tessellation", SETTING_REAL, SETTING_WORLD, 1, 1e-3, 64, 
 	"Scales the number of pieces into which displacement cuts an edge", "0.125", "0.25", "0.5", "1", "2")
 SETTING(colour, "colour", SETTING_CHOICE, SETTING_WORLD, 0, 0, 1, "spectral rgb",
 	"Light and colours are spectra, or R, G and B as in most renderers: then nothing disperses", NULL)
+SETTING(emitter_choice, "emitter-choice", SETTING_CHOICE, SETTING_WORLD, SETTING_BY_PLACE, SETTING_BY_PLACE,
+	SETTING_BY_POWER, "place power",
+	"How one of several emitters is chosen: by what arrives from each at the place it is to light, or by power",
+	NULL)
 SETTING(backs, "backs", SETTING_CHOICE, SETTING_WORLD, SETTING_BACKS_AUTO, SETTING_BACKS_AUTO, SETTING_BACKS_BLACK,
 	"auto lit black",
 	"Whether backs of opaque materials without twosided scatter light as fronts do, or are black; auto: black in files of 3.x",

@@ -21,6 +21,7 @@
 #include "worker/render/world/effects_analyse.h"
 #include "worker/render/world/effects_apply.h"
 #include "worker/render/world/effects_text.h"
+#include "worker/render/world/emitter_choice.h"
 #include "worker/render/world/geometry.h"
 #include "worker/render/world/moving.h"
 #include "worker/render/world/node_table.h"
@@ -427,6 +428,8 @@ static int new_world(struct world **out, bool with_accel, const struct scene *s,
 		rc = build_accel(&b);
 	if (!rc && b.w->accel)
 		rc = build_scattering(&b);
+	if (!rc && b.w->accel && with_accel && emitter_choice_make(b.w) < 0)
+		rc = build_out_of_memory(e);
 	if (!rc && look && b.w->accel)
 		backs_note(b.w);
 	crash_place(NULL, NULL, 0);

@@ -14,6 +14,7 @@
 #include "worker/render/world/box.h"
 #include "worker/render/world/effects.h"
 
+struct emitter_choice;
 struct refracting_point;
 
 struct world_shape {
@@ -53,13 +54,14 @@ struct world {
 	struct box refracting; /* around all that may refract them; may be empty */
 	struct refracting_point *refracting_points; /* on these: refracting.h */
 	uint32_t refracting_point_count;
-	uint32_t *emitter_medium;	     /* around emitters whose shapes state none; only where media scatter */
-	uint32_t *emitter_shape;	     /* that it belongs to; UINT32_MAX: none */
-	double *emitter_pdf, *emitter_cdf;   /* choice among emitters by power */
-	int32_t environment;		     /* index of the emitter that escaping rays meet; -1: none */
-	double grey_xyz[3];		     /* CIE XYZ of grey value 1 */
-	struct coincidence *coincidence;     /* coinciding surfaces; NULL: none */
-	struct render_coincident coincident; /* notes about them */
+	uint32_t *emitter_medium;	       /* around emitters whose shapes state none; only where media scatter */
+	uint32_t *emitter_shape;	       /* that it belongs to; UINT32_MAX: none */
+	double *emitter_pdf, *emitter_cdf;     /* choice among emitters by light sub-paths */
+	struct emitter_choice *emitter_choice; /* by points that are lit; NULL: by emitter_pdf everywhere */
+	int32_t environment;		       /* index of the emitter that escaping rays meet; -1: none */
+	double grey_xyz[3];		       /* CIE XYZ of grey value 1 */
+	struct coincidence *coincidence;       /* coinciding surfaces; NULL: none */
+	struct render_coincident coincident;   /* notes about them */
 	struct world_notes notes;
 	struct accel *accel;
 };

@@ -1,0 +1,243 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * How emitters are chosen by place: what each point gets against closed forms, chances against how often emitters are
+ * drawn, and images against those of the choice by power. Level of the statistical tests: 1e-6 each; power is said with
+ * each.
+ */
+#include "tests/support/agree.h"
+#include "tests/support/dice.h"
+#include "tests/support/stats.h"
+#include "tests/support/worlds.h"
+#include "worker/render/world/emitter_choice.h"
+#include "worker/render/world/emitter_part.h"
+#include "worker/render/world/emitter_points.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+
+#include <cmocka.h>
+
+/* clang-format off */
+#define FLOOR                                                                                                         \
+	"<shape type='rectangle'><transform name='to_world'><scale value='9'/><rotate x='1' angle='-90'/></transform>"    \
+	"<bsdf type='diffuse'/></shape>"
+#define POINT_LIGHT(x, y, z, i)                                                                                       \
+	"<emitter type='point'><point name='position' x='" x "' y='" y "' z='" z "'/>"                                    \
+	"<rgb name='intensity' value='" i "'/></emitter>"
+#define BALL(x, y, z, r, inside)                                                                                      \
+	"<shape type='sphere'><point name='center' x='" x "' y='" y "' z='" z "'/><float name='radius' value='" r "'/>"   \
+	inside "</shape>"
+#define LAMP(x, y, z, r, radiance)                                                                                    \
+	BALL(x, y, z, r, "<emitter type='area'><rgb name='radiance' value='" radiance "'/></emitter>")
+#define ROOM(x)                                                                                                       \
+	"<shape type='cube'><transform name='to_world'><scale value='2'/><translate x='" x "'/></transform>"              \
+	"<bsdf type='twosided'><bsdf type='diffuse'/></bsdf></shape>"
+#define SKY "<emitter type='constant'><rgb name='radiance' value='0.3'/></emitter>"
+/* clang-format on */
+
+static struct world *world_by(const char *choice, const char *shapes)
+{
+	worlds_accuracy = choice;
+	struct world *w = world_of_text(64, 64, "%s%s", SENSOR("0,5,6", "0,0,0"), shapes);
+	worlds_accuracy = NULL;
+	return w;
+}
+
+static vec3 in_world(const struct world *w, double x, double y, double z)
+{
+	return vec3_scale(w->scale, vec3_sub((vec3){x, y, z}, w->center));
+}
+
+static void find(const struct world *w, uint32_t most, struct arena *arena, struct emitter_points *out)
+{
+	assert_int_equal(emitter_points_find(w, most, arena, out), 0);
+}
+
+/* On a floor, lights of intensities 1 and 3 bring I (0.1 + 0.9 cos) / d^2. */
+static void test_shares_of_point_lights(void **state)
+{
+	(void)state;
+	struct world *w = world_by(NULL, FLOOR POINT_LIGHT("1", "2", "0", "1") POINT_LIGHT("-2", "1", "1", "3"));
+	const vec3 at[2] = {in_world(w, 1, 2, 0), in_world(w, -2, 1, 1)};
+	struct arena arena = {0};
+	struct emitter_points points;
+	find(w, 300, &arena, &points);
+	assert_int_equal(points.count, 300);
+	for (uint32_t i = 0; i < points.count; i++) {
+		double brought[2];
+		for (int e = 0; e < 2; e++) {
+			vec3 d = vec3_sub(at[e], points.nodes[i].p);
+			double r = vec3_length(d);
+			brought[e] = (e ? 3 : 1) * (0.1 + 0.9 * d.y / r) / (r * r);
+		}
+		assert_int_equal(points.nodes[i].id, i);
+		for (int e = 0; e < 2; e++)
+			assert_true(fabs((double)points.share[2 * i + (uint32_t)e] -
+					 brought[e] / (brought[0] + brought[1])) < 1e-5);
+	}
+	arena_fini(&arena);
+	world_free(w);
+}
+
+static double share_of_second(const char *shapes)
+{
+	struct world *w = world_by(NULL, shapes);
+	struct arena arena = {0};
+	struct emitter_points points;
+	double sum = 0;
+	find(w, 300, &arena, &points);
+	assert_true(points.count >= 250);
+	for (uint32_t i = 0; i < points.count; i++)
+		sum += (double)points.share[emitter_part_count(w) * i + 1] / points.count;
+	arena_fini(&arena);
+	world_free(w);
+	return sum;
+}
+
+/* Light passes glass, and not a ball that is opaque; what the latter encloses lights nothing. */
+static void test_obstacles(void **state)
+{
+	(void)state;
+#define TWO POINT_LIGHT("1", "2", "0", "1") POINT_LIGHT("-2", "2", "1", "1")
+	double open = share_of_second(FLOOR TWO),
+	       glass = share_of_second(FLOOR TWO BALL("-2", "2", "1", "0.3", "<bsdf type='dielectric'/>")),
+	       hidden = share_of_second(FLOOR TWO BALL("-2", "2", "1", "0.3", "<bsdf type='diffuse'/>"));
+	assert_true(open > 0.3 && fabs(glass - open) < 0.1);
+	/* Points are inside the ball, too, if walks begin there; none does. */
+	assert_true(hidden < 1e-9);
+}
+
+/* Of lamps in two closed rooms, one camera: only that of its room lights anything, however strong the other is. */
+static void test_rooms(void **state)
+{
+	(void)state;
+	worlds_accuracy = NULL;
+	struct world *w =
+		world_of_text(64, 64, "%s%s", SENSOR("0,0,1.5", "0,0,0"),
+			      ROOM("0") ROOM("9") LAMP("0", "1", "0", "0.1", "1") LAMP("9", "1", "0", "0.1", "1000"));
+	assert_non_null(w->emitter_choice);
+	double u[3] = {0.5, 0.5, 0};
+	unsigned ours = 0;
+	for (int i = 0; i < 1000; i++) {
+		struct emitter_pick pick;
+		u[2] = (i + 0.5) / 1000;
+		assert_true(emitter_choice_pick(w, in_world(w, 0.5, -1.9, 0.3), u, &pick));
+		ours += pick.emitter == 0;
+	}
+	/* Power gives it a thousandth. Cells choose so in a tenth of all cases, half of which are again by place. */
+	assert_true(ours > 940 && ours < 960);
+	assert_true(w->emitter_pdf[0] > 0.499 && w->emitter_pdf[0] < 0.502);
+	assert_true(w->emitter_cdf[2] == 1 && fabs(w->emitter_cdf[1] - w->emitter_pdf[0]) < 1e-12);
+	world_free(w);
+}
+
+/* One emitter, which is not divided, needs no choice. */
+static void test_without(void **state)
+{
+	(void)state;
+	struct world *w = world_by(NULL, FLOOR LAMP("0", "2", "0", "0.2", "1"));
+	assert_null(w->emitter_choice);
+	world_free(w);
+	w = world_by("emitter-choice=power", FLOOR LAMP("0", "2", "0", "0.2", "1") SKY);
+	assert_null(w->emitter_choice);
+	assert_true(fabs(w->emitter_pdf[0] - w->emitters[0].power / (w->emitters[0].power + w->emitters[1].power)) <
+		    1e-12);
+	world_free(w);
+	/* No light reaches anything by a straight line. */
+	w = world_by(NULL, FLOOR POINT_LIGHT("1", "-2", "0", "1") POINT_LIGHT("-2", "-2", "1", "1"));
+	assert_null(w->emitter_choice);
+	world_free(w);
+}
+
+/* At places within the scene and far from it: emitters are drawn as often as densities say. For an emitter that is not
+ * divided `denser` is its chance; for the environment its mean over evenly drawn points is. 100,000 draws find a chance
+ * that is off by 2 %. */
+static void test_densities(void **state)
+{
+	(void)state;
+	struct world *w = world_by(NULL, FLOOR LAMP("2", "1", "0", "0.2", "9") LAMP("-2", "0.6", "1", "0.1", "20")
+						 POINT_LIGHT("0", "3", "-2", "1") SKY);
+	struct dice dice = dice_of("densities of choices");
+	const vec3 places[] = {in_world(w, 2, 0, 0.3), in_world(w, -1, 0, 1), in_world(w, 30, 20, -70)};
+	assert_non_null(w->emitter_choice);
+	for (size_t k = 0; k < sizeof places / sizeof *places; k++) {
+		uint64_t seen[4] = {0};
+		double chance[4] = {0};
+		size_t draws = dice_count(100000);
+		for (size_t i = 0; i < draws; i++) {
+			const double u[3] = {dice_throw(&dice), dice_throw(&dice), dice_throw(&dice)};
+			struct emitter_pick pick;
+			struct emitter_point y;
+			double pdf;
+			assert_true(emitter_choice_pick(w, places[k], u, &pick));
+			const struct emitter *em = &w->emitters[pick.emitter];
+			seen[pick.emitter]++;
+			assert_true(emitter_sample_toward(em, places[k], pick.u, &y, &pdf));
+			double denser = emitter_choice_denser(w, places[k], pick.emitter, em, &y);
+			assert_true(fabs(denser - pick.denser) < 1e-12);
+			if (pick.emitter != w->environment)
+				chance[pick.emitter] = denser;
+			assert_true(w->emitters[3].ops->sample_point(&w->emitters[3], u, &y, &pdf));
+			chance[3] += emitter_choice_denser(w, places[k], 3, &w->emitters[3], &y) / (double)draws;
+		}
+		double sum = 0, expected[4];
+		for (int e = 0; e < 4; e++) {
+			sum += chance[e];
+			expected[e] = chance[e] * (double)draws;
+		}
+		assert_true(fabs(sum - 1) < 0.02);
+		assert_true(stats_counts_p(seen, expected, 4) > 1e-6);
+	}
+	world_free(w);
+}
+
+static void test_the_same_twice(void **state)
+{
+	(void)state;
+	struct world *a = world_by(NULL, FLOOR LAMP("2", "1", "0", "0.2", "9") SKY),
+		     *b = world_by(NULL, FLOOR LAMP("2", "1", "0", "0.2", "9") SKY);
+	struct dice dice = dice_of("the same twice");
+	for (int i = 0; i < 1000; i++) {
+		const double u[3] = {dice_throw(&dice), dice_throw(&dice), dice_throw(&dice)};
+		vec3 p = {dice_between(&dice, -1, 1), dice_between(&dice, -1, 1), dice_between(&dice, -1, 1)};
+		struct emitter_pick of_a, of_b;
+		assert_true(emitter_choice_pick(a, p, u, &of_a) && emitter_choice_pick(b, p, u, &of_b));
+		assert_true(of_a.emitter == of_b.emitter && of_a.denser == of_b.denser && of_a.u[0] == of_b.u[0] &&
+			    of_a.u[1] == of_b.u[1]);
+	}
+	world_free(a);
+	world_free(b);
+}
+
+/* Light does not depend on how emitters are chosen: agree.h says level and power. */
+static void test_the_same_image(void **state)
+{
+	(void)state;
+#define LIGHTS \
+	FLOOR LAMP("2", "1", "0", "0.5", "2") LAMP("-2", "1.5", "1", "0.4", "3") POINT_LIGHT("0", "3", "-2", "3") SKY
+	struct world *place = world_by(NULL, LIGHTS), *power = world_by("emitter-choice=power", LIGHTS);
+	const struct agree_side path = {.integrator = "path", .spp = dice_count(256), .groups = 16},
+				bdpt = {.integrator = "bdpt", .spp = dice_count(128), .groups = 16};
+	static struct agree_image a, b, c;
+	agree_render(place, "emitters by place", "place", &path, &a);
+	agree_render(power, "emitters by place", "power", &path, &b);
+	agree_render(place, "emitters by place", "bdpt", &bdpt, &c);
+	agree_check("emitters by place, path", &a, &b);
+	agree_check("emitters by place, bdpt", &c, &b);
+	world_free(place);
+	world_free(power);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_shares_of_point_lights),
+		cmocka_unit_test(test_obstacles),
+		cmocka_unit_test(test_rooms),
+		cmocka_unit_test(test_without),
+		cmocka_unit_test(test_densities),
+		cmocka_unit_test(test_the_same_twice),
+		cmocka_unit_test(test_the_same_image),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,227 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Points at which paths from the camera scatter (emitter_points.h) are sorted into cells by halving them across the
+ * longest axis of their box, again and again. Each cell has its chances.
+ *
+ * If emitter e is chosen with probability p_e, the second moment of the light that a point gets is sum c_e^2 / p_e, c_e
+ * being what e brings. Relative to all light there, and averaged over the points of a cell, it is sum a_e / p_e, a_e
+ * the mean of the squared shares of e; and that is least for p_e proportional to sqrt(a_e). As a cell has few points,
+ * a_e counts BORROWED points of the cell around it as well, and so on up to the whole scene. Light sub-paths choose
+ * their emitter by power and by the shares of the whole scene, one half each; in DEFENSIVE of all cases cells do so,
+ * too, so that light which no point has met is chosen as well, and weights stay bounded.
+ *
+ * Failures: without memory. Where too few points get direct light (all lamps are in frosted glass), or emitters are too
+ * many, power alone decides.
+ */
+#include "worker/render/world/emitter_choice.h"
+
+#include "worker/render/math/search.h"
+#include "worker/render/world/emitter_part.h"
+#include "worker/render/world/emitter_points.h"
+
+#include <errno.h>
+
+enum {
+	VALUES = 1 << 21, /* points times parts, and one point a pixel, within these bounds: */
+	POINTS_MOST = 1 << 13,
+	POINTS_LEAST = 1 << 9,
+	CELL_POINTS = 16,
+};
+static const double BORROWED = 4, DEFENSIVE = 0.1;
+
+/* Nodes are those of a heap: 1 is the whole scene, and 2 i and 2 i + 1 are the halves of i. */
+struct emitter_choice {
+	uint32_t first_cell; /* the first node that is not halved; as many nodes are not */
+	struct cut {
+		unsigned axis;
+		double at;
+	} * cuts; /* where node i is halved */
+	uint32_t parts;
+	double *edge; /* parts + 1 edges of chances for each cell: part i is chosen between edges i and i + 1 */
+};
+
+struct maker {
+	const struct world *w;
+	struct emitter_choice *to;
+	const struct emitter_points *points;
+	double *sum;   /* of squared shares: one number for each part and node */
+	double *light; /* chances of parts as if light sub-paths chose them */
+};
+
+static const double *cell_of(const struct emitter_choice *c, vec3 p)
+{
+	uint32_t node = 1;
+	while (node < c->first_cell)
+		node = 2 * node + (point_along(p, c->cuts[node].axis) >= c->cuts[node].at);
+	return &c->edge[(size_t)(node - c->first_cell) * (c->parts + 1)];
+}
+
+static double chance_of(const double *edge, uint32_t part)
+{
+	return edge[part + 1] - edge[part];
+}
+
+bool emitter_choice_pick(const struct world *w, vec3 p, const double u[3], struct emitter_pick *out)
+{
+	const struct emitter_choice *c = w->emitter_choice;
+	if (!c) {
+		*out = (struct emitter_pick){.emitter = world_pick_emitter(w, u[2]), .u = {u[0], u[1]}};
+		if (out->emitter >= 0)
+			out->denser = w->emitter_pdf[out->emitter];
+		return out->emitter >= 0;
+	}
+	const double *edge = cell_of(c, p);
+	uint32_t part = search_cell(edge, c->parts, u[2]);
+	out->emitter = emitter_of_part(w, part);
+	out->denser = chance_of(edge, part) * emitter_part_denser(w, part);
+	emitter_part_narrow(w, part, u, out->u);
+	return true;
+}
+
+double emitter_choice_denser(const struct world *w, vec3 p, int32_t emitter, const struct emitter *em,
+			     const struct emitter_point *y)
+{
+	const struct emitter_choice *c = w->emitter_choice;
+	if (!c)
+		return w->emitter_pdf[emitter];
+	uint32_t part = emitter_part_of(w, emitter, em, y);
+	return chance_of(cell_of(c, p), part) * emitter_part_denser(w, part);
+}
+
+/* ---- making it ---- */
+
+static unsigned longest_axis(const struct point_tree_node *nodes, size_t count)
+{
+	struct box box = box_empty();
+	for (size_t i = 0; i < count; i++)
+		box_grow(&box, nodes[i].p);
+	vec3 side = vec3_sub(box.high, box.low);
+	return side.x >= side.y && side.x >= side.z ? 0 : side.y >= side.z ? 1 : 2;
+}
+
+static double *sums_of(const struct maker *m, uint32_t node)
+{
+	return &m->sum[(size_t)node * m->to->parts];
+}
+
+/* Divides the points, and adds up the squares of their shares. */
+static void halve(const struct maker *m, uint32_t node, struct point_tree_node *nodes, size_t count)
+{
+	const uint32_t n = m->to->parts;
+	double *sum = sums_of(m, node);
+	if (node >= m->to->first_cell) {
+		for (size_t i = 0; i < count; i++)
+			for (uint32_t e = 0; e < n; e++) {
+				double share = (double)m->points->share[(size_t)nodes[i].id * n + e];
+				sum[e] += share * share;
+			}
+		return;
+	}
+	size_t middle = count / 2;
+	unsigned axis = longest_axis(nodes, count);
+	point_tree_partition(nodes, count, middle, axis);
+	m->to->cuts[node] = (struct cut){axis, point_along(nodes[middle].p, axis)};
+	halve(m, 2 * node, nodes, middle);
+	halve(m, 2 * node + 1, &nodes[middle], count - middle);
+	for (uint32_t e = 0; e < n; e++)
+		sum[e] = sums_of(m, 2 * node)[e] + sums_of(m, 2 * node + 1)[e];
+}
+
+/* sqrt(a), scaled to a sum of 1, mixed with the chances of light sub-paths. */
+static void chances(const double *a, uint32_t n, const double *light, double *out)
+{
+	double sum = 0;
+	for (uint32_t e = 0; e < n; e++)
+		sum += sqrt(a[e]);
+	for (uint32_t e = 0; e < n; e++)
+		out[e] = (1 - DEFENSIVE) * (sqrt(a[e]) / sum) + DEFENSIVE * light[e];
+}
+
+/* edge[n] is 1, and nothing is chosen that has no chance. */
+static void edges(const double *chance, uint32_t n, double *edge)
+{
+	double sum = 0;
+	for (uint32_t e = 0; e < n; e++) {
+		edge[e] = sum;
+		sum += chance[e];
+	}
+	for (uint32_t e = 0; e < n; e++)
+		edge[e] /= sum;
+	edge[n] = 1;
+	for (uint32_t e = n; e > 0 && chance[e - 1] == 0; e--)
+		edge[e - 1] = 1;
+}
+
+/* From sums to means with what is borrowed from the node around it; `count` points are in the node. */
+static void fill(const struct maker *m, uint32_t node, size_t count)
+{
+	const uint32_t n = m->to->parts;
+	double *a = sums_of(m, node);
+	const double *around = node > 1 ? sums_of(m, node / 2) : NULL;
+	for (uint32_t e = 0; e < n; e++)
+		a[e] = around ? (a[e] + BORROWED * around[e]) / ((double)count + BORROWED) : a[e] / (double)count;
+	if (node >= m->to->first_cell) {
+		chances(a, n, m->light, a);
+		edges(a, n, &m->to->edge[(size_t)(node - m->to->first_cell) * (n + 1)]);
+		return;
+	}
+	fill(m, 2 * node, count / 2);
+	fill(m, 2 * node + 1, count - count / 2);
+}
+
+/* Sets chances of light sub-paths, and their chances of parts. */
+static void choose_for_light(struct world *w, const struct maker *m)
+{
+	const struct emitter_points *p = m->points;
+	const uint32_t n = m->to->parts;
+	for (uint32_t e = 0; e < w->emitter_count; e++)
+		w->emitter_pdf[e] /= 2;
+	for (size_t i = 0; i < (size_t)p->count * n; i++)
+		w->emitter_pdf[emitter_of_part(w, (uint32_t)(i % n))] += (double)p->share[i] / 2 / p->count;
+	edges(w->emitter_pdf, w->emitter_count, w->emitter_cdf);
+	for (uint32_t i = 0; i < n; i++)
+		m->light[i] =
+			emitter_is_part(w, i) ? w->emitter_pdf[emitter_of_part(w, i)] / emitter_part_denser(w, i) : 0;
+}
+
+static int make(struct world *w, struct arena *scratch, uint32_t parts, uint32_t most)
+{
+	struct emitter_points points;
+	int rc = emitter_points_find(w, most, scratch, &points);
+	if (rc || points.count < CELL_POINTS)
+		return rc;
+	struct emitter_choice *c = arena_alloc(&w->arena, 1, sizeof *c);
+	struct maker m = {.w = w, .to = c, .points = &points, .light = arena_alloc(scratch, parts, sizeof *m.light)};
+	if (!c || !m.light)
+		return -ENOMEM;
+	c->parts = parts;
+	for (c->first_cell = 1; 2 * c->first_cell * CELL_POINTS <= points.count;)
+		c->first_cell *= 2;
+	c->cuts = arena_alloc(&w->arena, c->first_cell, sizeof *c->cuts);
+	c->edge = arena_alloc(&w->arena, c->first_cell * (parts + (size_t)1), sizeof *c->edge);
+	m.sum = arena_alloc(scratch, 2 * c->first_cell * (size_t)parts, sizeof *m.sum);
+	if (!c->cuts || !c->edge || !m.sum)
+		return -ENOMEM;
+	halve(&m, 1, points.nodes, points.count);
+	choose_for_light(w, &m);
+	fill(&m, 1, points.count);
+	w->emitter_choice = c;
+	return 0;
+}
+
+int emitter_choice_make(struct world *w)
+{
+	uint32_t shining = 0, parts = emitter_part_count(w);
+	for (uint32_t i = 0; i < parts; i++)
+		shining += emitter_is_part(w, i) && w->emitters[emitter_of_part(w, i)].power > 0;
+	if (shining < 2 || w->emitter_count > EMITTER_CHOICE_MOST || w->accuracy.emitter_choice != SETTING_BY_PLACE)
+		return 0;
+	uint32_t most = VALUES / parts;
+	uint64_t pixels = (uint64_t)w->settings.width * w->settings.height;
+	most = most < pixels ? most : (uint32_t)pixels;
+	most = most > POINTS_MOST ? POINTS_MOST : most < POINTS_LEAST ? POINTS_LEAST : most;
+	struct arena scratch = {0};
+	int rc = make(w, &scratch, parts, most);
+	arena_fini(&scratch);
+	return rc;
+}

@@ -1,0 +1,66 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * What points are joined to: emitters, and parts of the environment, of which different places see different ones
+ * (through a window, above a floor). The square of numbers from which the environment's points are drawn is divided
+ * evenly, so its parts are equally bright, or equally large where it is even. Parts 0 to emitter_count - 1 are whole
+ * emitters; those of a divided environment follow. Pure.
+ */
+#ifndef WORKER_RENDER_WORLD_EMITTER_PART_H
+#define WORKER_RENDER_WORLD_EMITTER_PART_H
+
+#include "worker/render/world/world.h"
+
+enum { ENVIRONMENT_SIDE = 8, ENVIRONMENT_PARTS = ENVIRONMENT_SIDE * ENVIRONMENT_SIDE };
+
+/* Points of an emitter are found in the square again if they are drawn alike for all that they light. */
+static inline bool emitter_is_divided(const struct world *w, int32_t emitter)
+{
+	return emitter == w->environment && !w->emitters[emitter].ops->sample_toward &&
+	       w->emitters[emitter].ops->point_inverse && w->emitters[emitter].power > 0;
+}
+
+static inline uint32_t emitter_part_count(const struct world *w)
+{
+	bool divided = w->environment >= 0 && emitter_is_divided(w, w->environment);
+	return w->emitter_count + (divided ? ENVIRONMENT_PARTS : 0);
+}
+
+/* Divided emitters are no part themselves. */
+static inline bool emitter_is_part(const struct world *w, uint32_t part)
+{
+	return part >= w->emitter_count || !emitter_is_divided(w, (int32_t)part);
+}
+
+static inline int32_t emitter_of_part(const struct world *w, uint32_t part)
+{
+	return part < w->emitter_count ? (int32_t)part : w->environment;
+}
+
+/* How many times denser points of a part lie, if the part is drawn, than those of its emitter. */
+static inline double emitter_part_denser(const struct world *w, uint32_t part)
+{
+	return part < w->emitter_count ? 1 : ENVIRONMENT_PARTS;
+}
+
+/* From two numbers in [0,1) those by which its emitter draws a point of the part. */
+static inline void emitter_part_narrow(const struct world *w, uint32_t part, const double u[2], double out[2])
+{
+	uint32_t k = part - w->emitter_count;
+	bool whole = part < w->emitter_count;
+	out[0] = whole ? u[0] : (k % ENVIRONMENT_SIDE + u[0]) / ENVIRONMENT_SIDE;
+	out[1] = whole ? u[1] : (k / ENVIRONMENT_SIDE + u[1]) / ENVIRONMENT_SIDE;
+}
+
+/* The part that has a point of em, which is that emitter at some time. */
+static inline uint32_t emitter_part_of(const struct world *w, int32_t emitter, const struct emitter *em,
+				       const struct emitter_point *y)
+{
+	double u[2];
+	if (!emitter_is_divided(w, emitter))
+		return (uint32_t)emitter;
+	em->ops->point_inverse(em, y, u);
+	return w->emitter_count + (uint32_t)(u[1] * ENVIRONMENT_SIDE) * ENVIRONMENT_SIDE +
+	       (uint32_t)(u[0] * ENVIRONMENT_SIDE);
+}
+
+#endif

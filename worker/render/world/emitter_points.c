@@ -1,0 +1,286 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Walks leave the camera, and scatter evenly around the normal wherever they meet a surface that scatters, or straight
+ * on and by reflection where it is specular: what materials would do more exactly does not matter for which lamps are
+ * near. At each point x, emitter e offers what one point of it would bring if nothing were between. The greatest offers
+ * are tested by shadow rays, until what is left is faint; so the work grows with the emitters that matter at x, not
+ * with all.
+ *
+ * Failures: without memory. There may be fewer points than wanted, or none, where walks leave the scene.
+ */
+#include "worker/render/world/emitter_points.h"
+
+#include "worker/render/geom/accel.h"
+#include "worker/render/math/rng.h"
+#include "worker/render/world/emitter_part.h"
+
+#include <errno.h>
+#include <string.h>
+
+enum {
+	WALKS = 4,	/* for each point wanted, at most */
+	POINTS = 4,	/* per walk, at most */
+	STEPS = 16,	/* the same, with those that leave no point */
+	TESTS = 96,	/* shadow rays per point, */
+	RAYS = 1 << 18, /* and of all */
+	SURFACES = 8,	/* that one of them passes */
+};
+static const double GLOSS = 0.1, /* what gloss may reflect of what comes from anywhere */
+	FAINT = 0.01;		 /* a share of the light that has arrived */
+
+struct point {
+	vec3 p, ng; /* ng: on the side that the walk came from; 0 in a medium */
+	struct prim_ref prim;
+	bool opaque;
+};
+
+struct finder {
+	const struct world *w;
+	bool opens; /* some surface lets light through */
+	uint32_t rays;
+	uint32_t most, parts;
+	struct emitter_points *out;
+	struct offer {
+		double light;
+		bool tested;
+	} * offers; /* one for each part */
+};
+
+/* ---- what emitters bring ---- */
+
+static bool lets_light_through(const struct world *w, uint32_t shape)
+{
+	const struct world_shape *part = &w->parts[shape];
+	return part->passable || (w->bsdfs[part->bsdf].modes & BSDF_TRANSMIT);
+}
+
+/* Where a shadow ray ends. */
+struct target {
+	struct ray_end end; /* not at infinity */
+	bool infinite;
+	vec3 d; /* unit */
+};
+
+/* Whether light arrives along a straight line, not bent by what it passes. */
+static bool arrives(const struct finder *f, const struct point *x, const struct target *y)
+{
+	const struct world *w = f->w;
+	struct ray_end from = {x->p, x->ng, x->prim};
+	for (int n = 0; n < SURFACES; n++) {
+		struct ray_hit hit;
+		struct surface_point at;
+		if (y->infinite ? !accel_occluded_to_infinity(w->accel, &from, y->d)
+				: !accel_occluded(w->accel, &from, &y->end))
+			return true;
+		double end = y->infinite ? INFINITY : vec3_length(vec3_sub(y->end.p, from.p));
+		if (!f->opens || !accel_closest(w->accel, &from, y->d, 0, end, &hit) ||
+		    !lets_light_through(w, hit.prim.shape))
+			return false;
+		surface_from_hit(&w->shapes[hit.prim.shape], from.p, y->d, &hit, &at);
+		from = (struct ray_end){at.p, at.ng, hit.prim};
+	}
+	return false;
+}
+
+/* A point of the part by u, and the density with which it was drawn, toward x. false: it offers nothing. */
+static bool draw_point(const struct world *w, uint32_t part, const struct emitter *em, const struct point *x,
+		       const double u[2], struct emitter_point *y, struct target *to, double *pdf)
+{
+	double narrowed[2];
+	emitter_part_narrow(w, part, u, narrowed);
+	if (!emitter_sample_toward(em, x->p, narrowed, y, pdf) || !(*pdf > 0))
+		return false;
+	*pdf *= emitter_part_denser(w, part);
+	*to = (struct target){.infinite = y->infinite, .d = y->p};
+	if (y->infinite)
+		return true;
+	uint32_t shape = w->emitter_shape[part];
+	double time = x->prim.time;
+	to->end = (struct ray_end){
+		y->p, y->n, shape == UINT32_MAX ? prim_none_at(time) : (struct prim_ref){shape, y->where.prim, time}};
+	vec3 d = vec3_sub(y->p, x->p);
+	double distance = vec3_length(d);
+	if (!(distance > 0))
+		return false;
+	to->d = vec3_scale(1 / distance, d);
+	*pdf *= distance * distance;
+	if (!em->delta)
+		*pdf /= fmax(fabs(vec3_dot(y->n, to->d)), 0x1p-30);
+	return true;
+}
+
+/* What the part would bring to x if nothing were between. */
+static double offer(const struct world *w, uint32_t part, const struct point *x, const double u[2],
+		    const struct wavelengths *wl, struct target *to)
+{
+	struct emitter_room room;
+	const struct emitter *em = world_emitter(w, emitter_of_part(w, part), x->prim.time, &room);
+	struct emitter_point y;
+	double pdf, sum = 0;
+	if (!emitter_is_part(w, part) || !draw_point(w, part, em, x, u, &y, to, &pdf))
+		return 0;
+	double cosine = vec3_dot(x->ng, to->d);
+	if (x->opaque && !(cosine > 0))
+		return 0;
+	spectrum light = em->ops->radiance(em, &y, vec3_neg(to->d), wl);
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		sum += light.v[i];
+	double brought = sum / pdf * (GLOSS + (1 - GLOSS) * fabs(cosine));
+	return isfinite(brought) ? brought : 0;
+}
+
+static uint32_t greatest_untested(const struct offer *o, uint32_t n)
+{
+	uint32_t best = UINT32_MAX;
+	for (uint32_t i = 0; i < n; i++)
+		if (!o[i].tested && o[i].light > 0 && (best == UINT32_MAX || o[i].light > o[best].light))
+			best = i;
+	return best;
+}
+
+/* The numbers of one point or step; `use` counts from 0. */
+static void numbers(uint64_t walk, uint64_t step, uint64_t use, double u[4])
+{
+	rng_uniform4(0, RNG_EMITTERS, walk, step, use, u);
+}
+
+/* Adds x with its shares, if any light arrives. */
+static void add(struct finder *f, const struct point *x, uint64_t walk, uint64_t step)
+{
+	const struct world *w = f->w;
+	struct target to;
+	double u[4], arrived = 0, sum = 0;
+	numbers(walk, step, 1, u);
+	const struct wavelengths wl = world_wavelengths(w, u[2]);
+	for (uint32_t i = 0; i < f->parts; i++)
+		f->offers[i] = (struct offer){offer(w, i, x, u, &wl, &to), false};
+	for (int n = 0; n < TESTS; n++) {
+		uint32_t i = greatest_untested(f->offers, f->parts);
+		if (i == UINT32_MAX || f->offers[i].light < FAINT * arrived)
+			break;
+		offer(w, i, x, u, &wl, &to);
+		f->offers[i].tested = true;
+		f->rays++;
+		if (arrives(f, x, &to))
+			arrived += f->offers[i].light;
+		else
+			f->offers[i].light = 0;
+	}
+	for (uint32_t i = 0; i < f->parts; i++)
+		sum += f->offers[i].light;
+	if (!(sum > 0) || !isfinite(sum))
+		return;
+	struct emitter_points *out = f->out;
+	float *share = &out->share[(size_t)out->count * f->parts];
+	for (uint32_t i = 0; i < f->parts; i++)
+		share[i] = (float)(f->offers[i].light / sum);
+	out->nodes[out->count] = (struct point_tree_node){x->p, out->count};
+	out->count++;
+}
+
+/* ---- walks ---- */
+
+struct step {
+	struct ray_end from;
+	vec3 d;
+	double t_min, t_max;
+};
+
+/* false: the film has nothing there. */
+static bool leave_camera(const struct world *w, uint64_t walk, struct step *s)
+{
+	const struct scene_settings *set = &w->settings;
+	struct camera room;
+	double u[4], v[4];
+	numbers(walk, 0, 0, u);
+	numbers(walk, 0, 2, v);
+	const struct camera *c = camera_at(&w->camera, u[2], &room);
+	double width = set->crop_width ? set->crop_width : set->width,
+	       height = set->crop_width ? set->crop_height : set->height;
+	double x = set->crop_x + u[0] * width, y = set->crop_y + u[1] * height;
+	if (!camera_has(c, x, y))
+		return false;
+	s->from = (struct ray_end){.p = camera_point(c, v), .prim = prim_none_at(u[2])};
+	s->d = camera_direction(c, s->from.p, x, y);
+	camera_clip(c, s->d, &s->t_min, &s->t_max);
+	return true;
+}
+
+static vec3 mirrored(vec3 d, vec3 n)
+{
+	return vec3_madd(d, -2 * vec3_dot(d, n), n);
+}
+
+/* Where a walk goes on that came along d; n: unit, on that side. */
+static vec3 scattered(const struct bsdf *b, vec3 d, vec3 n, const double u[4])
+{
+	bool through = (b->modes & BSDF_TRANSMIT) && (u[2] < 0.5 || !(b->modes & BSDF_REFLECT));
+	if (!b->has_smooth || (b->has_delta && u[3] < 0.5))
+		return through ? d : mirrored(d, n);
+	/* By the cosine. */
+	struct frame axes = frame_around(through ? vec3_neg(n) : n);
+	double r = sqrt(u[0]), phi = 2 * M_PI * u[1];
+	return frame_to_world(&axes, (vec3){r * cos(phi), r * sin(phi), sqrt(1 - u[0])});
+}
+
+/* A point of the way to the next surface, which is at `distance`. */
+static void add_in_medium(struct finder *f, const struct step *s, double distance, uint64_t walk, uint64_t step)
+{
+	double u[4];
+	numbers(walk, step, 2, u);
+	const struct point x = {.p = vec3_madd(s->from.p, s->t_min + u[0] * (distance - s->t_min), s->d),
+				.prim = prim_none_at(s->from.prim.time)};
+	add(f, &x, walk, STEPS + step);
+}
+
+/* Goes to the next surface, which leaves a point if it scatters: *points is counted. false: the walk ends. */
+static bool advance(struct finder *f, struct step *s, uint64_t walk, uint64_t number, int *points)
+{
+	const struct world *w = f->w;
+	struct ray_hit hit;
+	struct surface_point at;
+	double u[4];
+	if (!accel_closest(w->accel, &s->from, s->d, s->t_min, s->t_max, &hit))
+		return false;
+	surface_from_hit(&w->shapes[hit.prim.shape], s->from.p, s->d, &hit, &at);
+	if (EFFECT_IS_ON(w, scattering) && f->out->count < f->most)
+		add_in_medium(f, s, vec3_length(vec3_sub(at.p, s->from.p)), walk, number);
+	const struct world_shape *part = &w->parts[hit.prim.shape];
+	const struct bsdf *b = &w->bsdfs[part->bsdf];
+	vec3 n = vec3_dot(at.ng, s->d) > 0 ? vec3_neg(at.ng) : at.ng;
+	if (!part->passable && b->has_smooth && f->out->count < f->most) {
+		const struct point x = {at.p, n, hit.prim, !(b->modes & BSDF_TRANSMIT)};
+		add(f, &x, walk, number);
+		++*points;
+	}
+	numbers(walk, number, 0, u);
+	if (!part->passable)
+		s->d = scattered(b, s->d, n, u);
+	s->from = (struct ray_end){at.p, at.ng, hit.prim};
+	s->t_min = 0;
+	s->t_max = INFINITY;
+	return part->passable || !b->black;
+}
+
+int emitter_points_find(const struct world *w, uint32_t most, struct arena *arena, struct emitter_points *out)
+{
+	struct finder f = {.w = w, .most = most, .parts = emitter_part_count(w), .out = out};
+	out->count = 0;
+	out->nodes = arena_alloc(arena, most, sizeof *out->nodes);
+	out->share = arena_alloc(arena, (size_t)most * f.parts, sizeof *out->share);
+	f.offers = arena_alloc(arena, f.parts, sizeof *f.offers);
+	if (!out->nodes || !out->share || !f.offers)
+		return -ENOMEM;
+	for (uint32_t i = 0; i < w->shape_count; i++)
+		f.opens |= lets_light_through(w, i);
+	for (uint64_t walk = 0; walk < (uint64_t)WALKS * most && out->count < most && f.rays < RAYS; walk++) {
+		struct step s;
+		int points = 0;
+		if (!leave_camera(w, walk, &s))
+			continue;
+		for (uint64_t n = 1; n <= STEPS && points < POINTS; n++)
+			if (!advance(&f, &s, walk, n, &points))
+				break;
+	}
+	return 0;
+}
