@@ -140,6 +140,7 @@ $(BUILD)/tests/worker/render/test_groups: TEST_WRAP := -Wl,--wrap=rng_uniform4,-
 # A file system without hard links, or without renames that replace nothing; a name with two addresses.
 $(BUILD)/tests/common/net/test_client: TEST_WRAP := -Wl,--wrap=link,--wrap=renameat2,--wrap=getaddrinfo
 $(BUILD)/tests/common/net/test_pool: TEST_WRAP := -Wl,--wrap=uv_thread_create
+$(BUILD)/tests/worker/daemon/test_supervise: TEST_WRAP := -Wl,--wrap=fork
 $(BUILD)/tests/coordinator/server/test_listen: TEST_WRAP := -Wl,--wrap=getaddrinfo
 # What tests/run.sh ends a test by. It needs no library, and no sanitizer: it is no test.
 LIMIT := $(BUILD)/tests/limit/limit

@@ -22,8 +22,27 @@ struct supervisor {
 	sigset_t signals, mask; /* the signals that it waits for; the previous mask */
 	pid_t child;
 	int asked;    /* the last signal passed on; 0: none */
+	bool again;   /* an earlier process was ended by a signal */
 	double pause; /* s before the next start */
 };
+
+/* nohup ignores SIGHUP, and so does the rendering process. sigwaitinfo would receive it all the same. */
+static bool is_ignored(int number)
+{
+	struct sigaction a;
+	return sigaction(number, NULL, &a) == 0 && a.sa_handler == SIG_IGN;
+}
+
+static void choose_signals(struct supervisor *s)
+{
+	sigemptyset(&s->signals);
+	sigaddset(&s->signals, SIGCHLD);
+	sigaddset(&s->signals, SIGTERM);
+	sigaddset(&s->signals, SIGINT);
+	if (!is_ignored(SIGHUP))
+		sigaddset(&s->signals, SIGHUP);
+	sigprocmask(SIG_BLOCK, &s->signals, &s->mask);
+}
 
 /* The rendering process feeds the service manager's watchdog. */
 static void take_over_watchdog(pid_t parent)
@@ -79,35 +98,56 @@ static bool pause_before_start(struct supervisor *s)
 	return true;
 }
 
+/* Only a process that cannot start ends with these: a name is not resolved at the moment, a certificate is being
+ * replaced, the disk is full. */
+static bool says_it_cannot_start(int status)
+{
+	return WIFEXITED(status) && (WEXITSTATUS(status) == 1 || WEXITSTATUS(status) == 2);
+}
+
+/* Waits for a process that was started. true: another one is to follow. Otherwise *code is the program's exit code. */
+static bool is_lost(struct supervisor *s, int *code)
+{
+	int status = wait_for_end(s), number = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
+	unsigned lost = work_lose(number, clock_seconds());
+	bool unable = s->again && says_it_cannot_start(status);
+	*code = WEXITSTATUS(status);
+	if (!number && !lost && !unable)
+		return false;
+	if (s->asked) {
+		*code = number == s->asked ? 0 : 1;
+		return false;
+	}
+	if (unable)
+		log_event(LOG_PROCESS_LOST, "code=%d text=\"the rendering process cannot start: it is tried again\"",
+			  *code);
+	else
+		log_event(LOG_PROCESS_LOST, "signal=%d text=\"the rendering process was ended by %s\" leases=%u",
+			  number, crash_signal_name(number), lost);
+	return true;
+}
+
 int supervise(unsigned threads, int (*run)(void *), void *user)
 {
 	struct supervisor s = {.pause = first_pause};
 	struct error e;
+	int code;
 	if (work_share(threads, &e)) {
 		fprintf(stderr, "hslt-worker: %s\n", e.text);
 		return 1;
 	}
-	sigemptyset(&s.signals);
-	sigaddset(&s.signals, SIGCHLD);
-	sigaddset(&s.signals, SIGTERM);
-	sigaddset(&s.signals, SIGINT);
-	sigaddset(&s.signals, SIGHUP);
-	sigprocmask(SIG_BLOCK, &s.signals, &s.mask);
-	for (;;) {
+	choose_signals(&s);
+	for (;; s.again = true) {
 		double begun = clock_seconds();
 		int rc = start(&s, run, user);
-		if (rc) {
+		if (rc && !s.again) {
 			fprintf(stderr, "hslt-worker: no process: %s\n", strerror(-rc));
 			return 1;
 		}
-		int status = wait_for_end(&s), number = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
-		unsigned lost = work_lose(number, clock_seconds());
-		if (!number && !lost)
-			return WEXITSTATUS(status);
-		if (s.asked)
-			return number == s.asked ? 0 : 1;
-		log_event(LOG_PROCESS_LOST, "signal=%d text=\"the rendering process was ended by %s\" leases=%u",
-			  number, crash_signal_name(number), lost);
+		if (rc)
+			log_event(LOG_PROCESS_LOST, "text=\"no process: %s: it is tried again\"", strerror(-rc));
+		else if (!is_lost(&s, &code))
+			return code;
 		s.pause = clock_seconds() - begun > long_life ? first_pause
 			  : s.pause * 2 < longest_pause	      ? s.pause * 2
 							      : longest_pause;

@@ -1,0 +1,137 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* A supervisor with processes that end as they are told: which of them are followed by another, and what its exit code
+ * is. Each runs in a process of its own. */
+#include "worker/daemon/supervise.h"
+
+#include <errno.h>
+#include <setjmp.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+enum { LIVES_MOST = 8, BY_SIGNAL = 1000, NEVER = -1 };
+
+/* Shared with the processes. */
+static struct {
+	int ends[LIVES_MOST]; /* of each life: its exit code, BY_SIGNAL and a signal, or NEVER */
+	atomic_int lives;
+	atomic_int forks, failing_forks; /* so many of the supervisor's, after the first, fail */
+	int hang_up;			 /* the life that sends SIGHUP to the supervisor before it ends; 0: none does */
+	bool counts;			 /* in the supervisor */
+} * plan;
+
+pid_t __real_fork(void);
+pid_t __wrap_fork(void);
+pid_t __wrap_fork(void)
+{
+	if (plan->counts && atomic_fetch_add(&plan->forks, 1) > 0 && atomic_fetch_sub(&plan->failing_forks, 1) > 0) {
+		errno = EAGAIN;
+		return -1;
+	}
+	return __real_fork();
+}
+
+static int live(void *user)
+{
+	(void)user;
+	int life = atomic_fetch_add(&plan->lives, 1), end = life < LIVES_MOST ? plan->ends[life] : 99;
+	if (plan->hang_up == life + 1)
+		kill(getppid(), SIGHUP); /* which it receives before this process ends: SIGCHLD has a higher number */
+	while (end == NEVER)
+		pause();
+	if (end >= BY_SIGNAL)
+		kill(getpid(), end - BY_SIGNAL);
+	return end;
+}
+
+/* The exit code of a supervisor that was started with SIGHUP at that. */
+static int supervised(void (*hang_up)(int))
+{
+	int status;
+	atomic_store(&plan->lives, 0);
+	atomic_store(&plan->forks, 0);
+	pid_t p = __real_fork();
+	assert_true(p >= 0);
+	if (p == 0) {
+		signal(SIGHUP, hang_up);
+		plan->counts = true;
+		_exit(supervise(1, live, NULL));
+	}
+	assert_int_equal(waitpid(p, &status, 0), p);
+	plan->counts = false;
+	assert_true(WIFEXITED(status));
+	return WEXITSTATUS(status);
+}
+
+static void first_ends(void **state)
+{
+	(void)state;
+	static const int codes[] = {0, 1, 2, 6, 75};
+	for (size_t i = 0; i < sizeof codes / sizeof *codes; i++) {
+		plan->ends[0] = codes[i];
+		assert_int_equal(supervised(SIG_DFL), codes[i]);
+		assert_int_equal(plan->lives, 1);
+	}
+}
+
+static void later_ones_cannot_start(void **state)
+{
+	(void)state;
+	static const int codes[] = {0, 6, 75};
+	plan->ends[0] = BY_SIGNAL + SIGKILL;
+	plan->ends[1] = 1;
+	plan->ends[2] = 2;
+	for (size_t i = 0; i < sizeof codes / sizeof *codes; i++) {
+		plan->ends[3] = codes[i];
+		assert_int_equal(supervised(SIG_DFL), codes[i]);
+		assert_int_equal(plan->lives, 4);
+	}
+}
+
+static void no_process_for_a_while(void **state)
+{
+	(void)state;
+	plan->ends[0] = BY_SIGNAL + SIGKILL;
+	plan->ends[1] = 6;
+	atomic_store(&plan->failing_forks, 2);
+	assert_int_equal(supervised(SIG_DFL), 6);
+	assert_int_equal(plan->lives, 2);
+	assert_int_equal(plan->forks, 4);
+}
+
+/* As under nohup, when its terminal ends. */
+static void ignored_hang_up(void **state)
+{
+	(void)state;
+	plan->hang_up = 1;
+	plan->ends[0] = BY_SIGNAL + SIGKILL;
+	plan->ends[1] = 6;
+	assert_int_equal(supervised(SIG_IGN), 6);
+	assert_int_equal(plan->lives, 2);
+	plan->ends[0] = NEVER; /* it is passed on */
+	assert_int_equal(supervised(SIG_DFL), 0);
+	assert_int_equal(plan->lives, 1);
+	plan->hang_up = 0;
+}
+
+int main(void)
+{
+	plan = mmap(NULL, sizeof *plan, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+	if (plan == MAP_FAILED)
+		return 1;
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(first_ends),
+		cmocka_unit_test(later_ones_cannot_start),
+		cmocka_unit_test(no_process_for_a_while),
+		cmocka_unit_test(ignored_hang_up),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
