@@ -464,30 +464,30 @@ int authority_issue(const char *folder, const char *name, enum tls_role role, do
 	return rc;
 }
 
-/* Calls `each` for every certificate in issued/, until it fails. */
+/* Calls `each` for every certificate in issued/, until it fails. What is no certificate keeps nobody from the others:
+ * damage says what is wrong with the first such file; "": there is none. */
 static int for_each_issued(const char *folder,
 			   int (*each)(void *user, X509 *cert, const struct tls_peer *who, struct error *e), void *user,
-			   struct error *e)
+			   struct error *damage, struct error *e)
 {
 	char path[PATH_SIZE];
 	int rc = path_in(path, e, folder, "", "issued");
 	DIR *d = rc ? NULL : disk_opendir(path);
+	damage->text[0] = 0;
 	if (!rc && !d)
 		return error_file(e, errno, path);
 	for (struct dirent *x; !rc && (x = readdir(d));) {
-		X509 *cert;
+		X509 *cert = NULL;
 		struct tls_peer who;
+		struct error wrong;
 		size_t length = strlen(x->d_name);
 		if (length < 5 || strcmp(x->d_name + length - 4, ".pem") != 0)
 			continue;
 		rc = path_in(path, e, folder, "issued", x->d_name);
-		if (!rc)
-			rc = read_cert(path, &cert, e);
-		if (rc)
-			break;
-		rc = tls_read_peer(cert, &who, e);
-		if (!rc)
+		if (!rc && !read_cert(path, &cert, &wrong) && !tls_read_peer(cert, &who, &wrong))
 			rc = each(user, cert, &who, e);
+		else if (!rc && !*damage->text)
+			*damage = wrong;
 		X509_free(cert);
 	}
 	if (d)
@@ -531,16 +531,20 @@ int authority_revoke(const char *folder, const char *what, unsigned *count, stru
 	if (rc)
 		return rc;
 	struct revocation r = {.a = &a, .what = what};
-	rc = for_each_issued(folder, revoke_one, &r, e);
+	struct error damage;
+	rc = for_each_issued(folder, revoke_one, &r, &damage, e);
 	if (!rc && !r.count && !r.before)
-		rc = error_set(e, ENOENT, "no valid certificate has the name or serial number '%s'", what);
+		rc = error_set(e, ENOENT, "no valid certificate has the name or serial number '%s'%s%s", what,
+			       *damage.text ? "; " : "", damage.text);
 	if (!rc && r.count)
 		rc = sign_list(&a, e);
 	if (!rc) /* also if all were revoked before: the coordinators may not have been told, if that was interrupted */
 		rc = write_list(&a, "", e);
+	*count = rc ? 0 : r.count;
 	if (!rc)
-		rc = for_each_issued(folder, tell_coordinator, &a, e);
-	*count = r.count;
+		rc = for_each_issued(folder, tell_coordinator, &a, &damage, e);
+	if (!rc && *damage.text)
+		rc = error_set(e, EBADMSG, "%s: if that was a certificate of %s, it is not revoked", damage.text, what);
 	authority_close(&a);
 	return rc;
 }
@@ -582,12 +586,13 @@ int authority_list(const char *folder, struct authority_entry **entries, size_t 
 {
 	struct authority a;
 	struct listing l = {.a = &a};
+	struct error damage;
 	*entries = NULL;
 	*count = 0;
 	int rc = authority_open(&a, folder, false, e);
 	if (rc)
 		return rc;
-	rc = for_each_issued(folder, list_one, &l, e);
+	rc = for_each_issued(folder, list_one, &l, &damage, e);
 	authority_close(&a);
 	if (rc) {
 		mem_free(l.entries);
@@ -597,5 +602,5 @@ int authority_list(const char *folder, struct authority_entry **entries, size_t 
 		qsort(l.entries, l.count, sizeof *l.entries, by_name);
 	*entries = l.entries;
 	*count = l.count;
-	return 0;
+	return *damage.text ? error_set(e, EBADMSG, "%s", damage.text) : 0;
 }

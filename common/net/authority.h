@@ -23,7 +23,7 @@ int authority_issue(const char *folder, const char *name, enum tls_role role, do
 
 /* Revokes whatever has this name or serial number. Writes crl.pem, also into the coordinators' folders. *count: of
  * certificates that were not revoked before; if there are none, crl.pem is copied again. -ENOENT: no valid certificate
- * has it. */
+ * has it. -EBADMSG: *count are revoked, and a damaged file in issued/ may have been another one. */
 int authority_revoke(const char *folder, const char *name_or_serial, unsigned *count, struct error *e);
 
 struct authority_entry {
@@ -31,7 +31,7 @@ struct authority_entry {
 	time_t from, until;
 	bool revoked;
 };
-/* Sorted by name, then by time; mem_alloc'd. */
+/* Sorted by name, then by time; mem_alloc'd. -EBADMSG: these are all but what is damaged. */
 int authority_list(const char *folder, struct authority_entry **entries, size_t *count, struct error *e);
 
 #endif

@@ -97,11 +97,11 @@ static int revoke(const struct arguments *a, struct error *e)
 {
 	unsigned count = 0;
 	int rc = authority_revoke(a->ca, a->what, &count, e);
-	if (!rc && !count)
-		printf("'%s' was revoked before; ", a->what);
-	else if (!rc)
+	if (count)
 		printf("revoked %u; ", count);
-	if (!rc)
+	else if (!rc)
+		printf("'%s' was revoked before; ", a->what);
+	if (!rc || count)
 		printf("%s/crl.pem must reach every coordinator\n", a->ca);
 	return rc;
 }
@@ -112,8 +112,6 @@ static int list(const struct arguments *a, struct error *e)
 	size_t count;
 	time_t now = time(NULL);
 	int rc = authority_list(a->ca, &entries, &count, e);
-	if (rc)
-		return rc;
 	if (count)
 		printf("%-24s %-12s %-8s %-20s %s\n", "NAME", "ROLE", "STATE", "UNTIL", "SERIAL");
 	for (size_t i = 0; i < count; i++) {
@@ -128,7 +126,7 @@ static int list(const struct arguments *a, struct error *e)
 		       until, x->who.serial);
 	}
 	mem_free(entries);
-	return 0;
+	return rc;
 }
 
 static int run_command(const struct arguments *a, struct error *e)

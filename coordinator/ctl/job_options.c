@@ -5,7 +5,7 @@
  * Happy path: the first word is looked up among the verbs, the second is a job (j12 or 12), a third is the new
  * priority; options fill in the rest of struct job_options, and check() checks that they fit the verb.
  *
- * Failures: an invalid command (unknown verb, no job, a bound for a verb other than extend, no coordinator) exits with
+ * Failures: an invalid command (unknown verb, no job, an option of another verb, no coordinator) exits with
  * 2 and a sentence on stderr. Nothing is sent before the whole command is checked.
  */
 #include "coordinator/ctl/job_options.h"
@@ -103,6 +103,11 @@ static int check(void *target, struct error *e)
 		return error_set(e, EINVAL, "a bound is missing: --spp, --mutations, --time or --target-error");
 	if (o->verb != JOB_EXTEND && more)
 		return error_set(e, EINVAL, "bounds are only for extend");
+	if (o->verb != JOB_FETCH && (o->output || o->preview))
+		return error_set(e, EINVAL, "%s is only for fetch%s", o->output ? "--output" : "--preview",
+				 o->verb == JOB_LOG ? ": the log goes to stdout" : "");
+	if (o->verb != JOB_LIST && o->json)
+		return error_set(e, EINVAL, "--json is only for list");
 	return 0;
 }
 

@@ -102,6 +102,12 @@ code 2 "$BIN/hslt-status" banana
 code 2 "$BIN/hslt-status" j
 code 1 "$BIN/hslt-job" cancel j1
 code 2 "$BIN/hslt-job" cancel j18446744073709551616 # more than there can be
+# Options of another verb, which nobody would miss: the log is not in the file, the job is cancelled.
+code 2 "$BIN/hslt-job" log j1 -o "$DIR/j1.txt"
+grep -q -- '--output is only for fetch: the log goes to stdout' "$DIR/err.log" || fail "hslt-job log -o says: $(cat "$DIR/err.log")"
+code 2 "$BIN/hslt-job" cancel j1 --preview
+code 2 "$BIN/hslt-job" hold j1 --json
+code 2 "$BIN/hslt-job" list -o "$DIR/list.txt"
 
 id=$(submit "$BOX" -o "$DIR/cancelled.exr" --integrator path --spp 1000000)
 [ "$id" = j1 ] || fail "the first job is $id"

@@ -201,10 +201,46 @@ static void a_failure_between_key_and_certificate(void **state)
 	the_rest_can_be_done(ca, RENEWED);
 }
 
+/* A record that is empty keeps nobody from the others: they are listed and revoked, and it is named. */
+static void a_damaged_record(void **state)
+{
+	(void)state;
+	char ca[120], path[160], copy[160];
+	struct error e;
+	struct authority_entry *list;
+	size_t n, before, after;
+	unsigned count;
+	snprintf(ca, sizeof ca, "%s/damaged", folder);
+	for (int s = INIT; s < RENEWED; s++)
+		assert_int_equal(run_step(ca, (enum step)s, &e), 0);
+	assert_int_equal(authority_list(ca, &list, &before, &e), 0);
+	mem_free(list);
+	snprintf(path, sizeof path, "%s/issued/0.pem", ca);
+	FILE *f = fopen(path, "w");
+	assert_non_null(f);
+	fclose(f);
+	assert_int_equal(authority_list(ca, &list, &after, &e), -EBADMSG);
+	assert_non_null(strstr(e.text, "/issued/0.pem: "));
+	assert_int_equal(after, before);
+	mem_free(list);
+	assert_int_equal(authority_revoke(ca, "nobody", &count, &e), -ENOENT);
+	assert_int_equal(count, 0);
+	assert_non_null(strstr(e.text, "/issued/0.pem: "));
+	assert_int_equal(authority_revoke(ca, "node", &count, &e), -EBADMSG);
+	assert_int_equal(count, 1);
+	assert_non_null(strstr(e.text, "if that was a certificate of node, it is not revoked"));
+	snprintf(copy, sizeof copy, "%s/away", ca);
+	assert_int_equal(rename(path, copy), 0);
+	assert_int_equal(listed(ca, "node", &n), 1);
+	assert_int_equal(n, 1);
+	same_file(ca, "crl.pem", "farm/crl.pem");
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(a_failure_between_key_and_certificate),
+		cmocka_unit_test(a_damaged_record),
 		cmocka_unit_test(a_loss_of_power_undoes_nothing_that_was_reported),
 	};
 	shared = mmap(NULL, sizeof *shared, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
