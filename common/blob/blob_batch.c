@@ -10,12 +10,15 @@
 #include "common/base/mem.h"
 #include "common/blob/blob_state.h"
 
+#include <stdatomic.h>
+
 enum { PATH_MOST = 4096 };
 
 struct blob_batch {
 	struct blob_store *store;
 	struct list kept; /* struct blob_kept */
 	size_t renamed;
+	atomic_bool unwanted;
 };
 
 struct blob_batch *blob_batch_new(struct blob_store *s)
@@ -68,7 +71,8 @@ int blob_batch_flush(struct blob_batch *b, struct error *e)
 	int rc = 0;
 	for (size_t i = 0; !rc && i < b->kept.count; i++) {
 		blob_temporary_path(b->store, kept_of(b, i)->number, from, sizeof from);
-		rc = flush_file(from, e);
+		rc = atomic_load(&b->unwanted) ? error_set(e, ECANCELED, "nobody waits for the files")
+					       : flush_file(from, e);
 	}
 	for (; !rc && b->renamed < b->kept.count; b->renamed += !rc) {
 		const struct blob_kept *k = kept_of(b, b->renamed);
@@ -78,6 +82,11 @@ int blob_batch_flush(struct blob_batch *b, struct error *e)
 			rc = error_file(e, errno, to);
 	}
 	return rc ? rc : disk_sync_folder(b->store->folder, e);
+}
+
+void blob_batch_give_up(struct blob_batch *b)
+{
+	atomic_store(&b->unwanted, true);
 }
 
 void blob_batch_enter(struct blob_batch *b)

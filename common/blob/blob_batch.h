@@ -16,8 +16,10 @@ struct blob_batch *blob_batch_new(struct blob_store *s); /* NULL: no memory */
 int blob_batch_add(struct blob_batch *b, struct blob_writer *w, struct error *e);
 size_t blob_batch_count(const struct blob_batch *b);
 const struct blob_hash *blob_batch_hash(const struct blob_batch *b, size_t i);
-/* Flushes and renames the files. Any thread, once; nothing else may use the batch meanwhile. */
+/* Flushes and renames the files. Any thread, once; nothing else but blob_batch_give_up may use the batch meanwhile. */
 int blob_batch_flush(struct blob_batch *b, struct error *e);
+/* Any thread, also during a flush, which ends with -ECANCELED after the current file, unless that is the last one. */
+void blob_batch_give_up(struct blob_batch *b);
 /* After a flush without error: from now on its blobs exist. They are held until blob_batch_free. */
 void blob_batch_enter(struct blob_batch *b);
 /* Removes the files of a batch that was not flushed, or not without error. As above. */

@@ -341,6 +341,7 @@ void upload_free(struct upload *u)
 	if (u->flush) {
 		u->flush->upload = NULL;
 		u->flush->rest = u->batch;
+		blob_batch_give_up(u->flush->batch); /* others wait for a thread of the pool */
 	} else {
 		blob_batch_free(u->batch);
 	}

@@ -29,6 +29,7 @@ static struct flushes {
 	_Atomic unsigned looks_at_once; /* most looks at files in one turn of the loop */
 	_Atomic unsigned touched_at_once, removed_at_once, removed;
 	_Atomic bool hold;     /* flushes of files wait */
+	_Atomic unsigned from; /* those from this number on wait; 0: none */
 	_Atomic uint64_t room; /* bytes that the disk has; 0: those of the real one */
 } * flushes;
 
@@ -38,7 +39,7 @@ static int counted_fsync(int fd)
 		flushes->on_loop++;
 	else
 		flushes->elsewhere++;
-	while (flushes->hold && gettid() != getpid())
+	while ((flushes->hold || (flushes->from && flushes->elsewhere >= flushes->from)) && gettid() != getpid())
 		usleep(1000);
 	return fsync(fd);
 }
@@ -144,6 +145,7 @@ static int set_up_with_too_much(void **state)
 static int tear_down(void **state)
 {
 	flushes->hold = false; /* where a test failed, the server would wait for ever */
+	flushes->from = 0;
 	munmap(flushes, sizeof *flushes);
 	return served_stop(state);
 }
@@ -320,6 +322,33 @@ static void the_loop_removes_few_files(void **state)
 	scripted_hang_up(client);
 }
 
+/* Whoever hangs up keeps no thread of the pool with the rest of thousands of files. */
+static void nobody_flushes_for_nobody(void **state)
+{
+	(void)state;
+	struct scripted *client = call_client();
+	submit_many(client);
+	assert_int_equal(peer_submit_answer(client)->n_missing, FILES);
+	flushes->hold = true;
+	send_files(client, 0, FILES / 2); /* all but a few are flushed together, once these are */
+	peer_say_empty(client, FARM__ENVELOPE__BODY_JOB_LIST);
+	assert_int_equal(scripted_hear(client)->body_case, FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
+	flushes->from = flushes->elsewhere + 20;
+	flushes->hold = false;
+	for (int i = 0; i < 6000 && flushes->elsewhere < flushes->from; i++)
+		usleep(10000);
+	assert_int_equal(flushes->elsewhere, flushes->from);
+	scripted_hang_up(client);
+	served_works_again();
+	unsigned before = flushes->elsewhere;
+	flushes->from = 0;
+	for (int i = 0; i < 6000 && leftovers(); i++)
+		usleep(10000);
+	assert_int_equal(leftovers(), 0);
+	assert_in_range(flushes->elsewhere - before, 0, FILES / 10);
+	served_still_works();
+}
+
 /* Each is sent once. */
 static void a_file_that_was_sent_is_not_taken_again(void **state)
 {
@@ -486,6 +515,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(a_smaller_limit_is_reached_in_pieces, set_up_with_too_much, tear_down),
 		cmocka_unit_test_setup_teardown(who_goes_midway_leaves_nothing, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(the_loop_removes_few_files, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(nobody_flushes_for_nobody, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(a_file_that_was_sent_is_not_taken_again, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(equal_files_need_room_once, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(half_a_file_is_not_open, set_up, tear_down),
