@@ -2,7 +2,8 @@
 /*
  * client_open connects and says hello. client_call sends a message and runs the loop until the answer with its number
  * arrives, a deadline passes, or the connection is lost. Fetching reads chunk by chunk into a temporary file that is
- * renamed when complete. A fetch that the coordinator drops on the way begins again, a few times.
+ * renamed when complete, and removed when a signal ends the program before. A fetch that the coordinator drops on the
+ * way begins again, a few times.
  *
  * Failures: -ECONNREFUSED, -ECONNRESET and -ETIMEDOUT may be retried (client_exit_code has the exit code of each); a
  * refusal carries the coordinator's sentence.
@@ -13,6 +14,7 @@
 #include "common/base/mem.h"
 #include "common/base/target.h"
 #include "common/base/text.h"
+#include "common/base/unfinished.h"
 #include "common/net/jitter.h"
 
 #include <assert.h>
@@ -490,9 +492,9 @@ static int fetch_file(struct client *cl, struct client_message *first, uint64_t 
 	int n = snprintf(temporary, sizeof temporary, "%s.XXXXXX", path);
 	if (n < 0 || (size_t)n >= sizeof temporary)
 		return error_set(e, ENAMETOOLONG, "%s: the name is too long", path);
-	int fd = mkstemp(temporary);
+	int fd = unfinished_begin(temporary, e);
 	if (fd < 0)
-		return error_set(e, EIO, "%s: cannot make a file there: %s", path, strerror(errno));
+		return error_prefix(e, -EIO, "%s: cannot make a file there", path);
 	mode_t mask = umask(0);
 	umask(mask);
 	int rc = fetch_whole(cl, first, job, what, fd, path, e);
@@ -504,6 +506,7 @@ static int fetch_file(struct client *cl, struct client_message *first, uint64_t 
 		rc = give_name(temporary, path, replace, e);
 	if (rc)
 		unlink(temporary);
+	unfinished_end();
 	return rc;
 }
 

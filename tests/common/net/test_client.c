@@ -20,12 +20,14 @@
 #include <fcntl.h>
 #include <netdb.h>
 #include <pthread.h>
+#include <signal.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 static char folder[64];
@@ -40,6 +42,7 @@ struct coordinator {
 	const char *host;      /* by which the client calls it; NULL: 127.0.0.1 */
 	const char *name;      /* answers one Fetch, and calls the result so */
 	uint64_t sizes[2];     /* or two, and says that the file is so long */
+	bool once;	       /* and then answers no more */
 	int drops;	       /* or drops the fetch so often */
 	size_t flood, payload; /* or says so many unasked things of so many bytes before it reads on */
 	atomic_bool hold;      /* but not yet */
@@ -169,7 +172,7 @@ static void *coordinate(void *user)
 			say_dropped(fd);
 		else
 			say_chunk(fd, "", 0, 3 * sizeof image); /* of another image than at last */
-	for (int i = 0; i < 2 && c->sizes[0] && recv(fd, bytes, sizeof bytes, 0) > 0; i++)
+	for (int i = 0; i < (c->once ? 1 : 2) && c->sizes[0] && recv(fd, bytes, sizeof bytes, 0) > 0; i++)
 		say_chunk(fd, "", (uint64_t)i * sizeof image, c->sizes[i]);
 	while (recv(fd, bytes, sizeof bytes, 0) > 0)
 		continue;
@@ -178,18 +181,23 @@ static void *coordinate(void *user)
 	return NULL;
 }
 
-static struct client *meet(struct coordinator *c)
+static void begin(struct coordinator *c)
 {
 	struct sockaddr_in a = {.sin_family = AF_INET, .sin_addr = {htonl(INADDR_LOOPBACK)}};
 	socklen_t size = sizeof a;
-	struct client *cl;
-	struct error e;
 	c->listener = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
 	assert_int_equal(bind(c->listener, (struct sockaddr *)&a, size), 0);
 	assert_int_equal(listen(c->listener, 1), 0);
 	assert_int_equal(getsockname(c->listener, (struct sockaddr *)&a, &size), 0);
 	snprintf(c->address, sizeof c->address, "%s:%u", c->host ? c->host : "127.0.0.1", ntohs(a.sin_port));
 	assert_int_equal(pthread_create(&c->thread, NULL, coordinate, c), 0);
+}
+
+static struct client *meet(struct coordinator *c)
+{
+	struct client *cl;
+	struct error e;
+	begin(c);
 	assert_int_equal(client_open(&cl, c->address, NULL, false, "test", &e), 0);
 	return cl;
 }
@@ -311,6 +319,47 @@ static void a_file_of_another_size_is_another_file(void **state)
 		assert_int_equal(rc == 0, i == 2);
 		assert_int_equal(access("two.exr", F_OK) == 0, i == 2);
 	}
+}
+
+/* The signal that ends a process in the midst of a fetch. */
+static int ended_by(int number, void (*handling)(int))
+{
+	struct coordinator c = {.sizes = {2 * sizeof image}, .once = true};
+	int status;
+	begin(&c);
+	pid_t p = fork();
+	assert_true(p >= 0);
+	if (p == 0) {
+		struct client *cl;
+		struct error e;
+		signal(number, handling);
+		if (!client_open(&cl, c.address, NULL, false, "test", &e))
+			client_fetch(cl, 1, FARM__WHAT__WHAT_RESULT, "cut.exr", &e);
+		_exit(1);
+	}
+	while (system("ls cut.exr.* >/dev/null 2>&1") != 0)
+		usleep(10000);
+	kill(p, number);
+	if (handling == SIG_IGN)
+		kill(p, SIGTERM);
+	assert_int_equal(waitpid(p, &status, 0), p);
+	pthread_join(c.thread, NULL);
+	close(c.listener);
+	assert_true(WIFSIGNALED(status));
+	return WTERMSIG(status);
+}
+
+static void a_signal_leaves_nothing_half_done(void **state)
+{
+	(void)state;
+	static const int numbers[] = {SIGINT, SIGTERM, SIGHUP};
+	unsigned before = files_here();
+	for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
+		assert_int_equal(ended_by(numbers[i], SIG_DFL), numbers[i]);
+		assert_int_equal(files_here(), before);
+	}
+	assert_int_equal(ended_by(SIGHUP, SIG_IGN), SIGTERM); /* nohup */
+	assert_int_equal(files_here(), before);
 }
 
 static void a_dropped_fetch_begins_again(void **state)
@@ -466,6 +515,7 @@ int main(void)
 		cmocka_unit_test(names_lead_nowhere),
 		cmocka_unit_test(who_names_a_file_gets_it),
 		cmocka_unit_test(a_file_of_another_size_is_another_file),
+		cmocka_unit_test(a_signal_leaves_nothing_half_done),
 		cmocka_unit_test(a_dropped_fetch_begins_again),
 		cmocka_unit_test(a_dropped_stream_begins_again),
 		cmocka_unit_test(own_files_are_own_faults),
