@@ -86,6 +86,12 @@ if [ "${1:-}" = --one ]; then # one test of the run in folder $2: its list, its 
 fi
 
 build=${1:?usage: tests/run.sh BUILD [PATTERN]}
+for number in HSLT_TEST_JOBS HSLT_TEST_CPU HSLT_TEST_IDLE; do
+	eval "given=\${$number:-1}"
+	case $given in
+	*[!0-9]* | 0*) echo "tests/run.sh: $number is a whole number above 0, not '$given'" >&2 && exit 2 ;;
+	esac
+done
 pattern=${2:-}
 kinds=${HSLT_TEST_KINDS:-unit script}
 # The long forms take hours.

@@ -48,6 +48,10 @@ run() {
 	sort | diff - "$DIR/last" || fail "the last lines are other ones: $(cat "$DIR/said")"
 }
 unset HSLT_TEST_ALL HSLT_TEST_KINDS
+for number in HSLT_TEST_JOBS=abc HSLT_TEST_JOBS=0 HSLT_TEST_CPU=-1 HSLT_TEST_IDLE=1.5; do
+	code 2 env "$number" sh "$DIR/tests/run.sh" "$DIR/build"
+	grep -qx "tests/run.sh: ${number%=*} is a whole number above 0, not '${number#*=}'" "$DIR/err.log" || fail "$number: $(cat "$DIR/err.log")"
+done
 run 5 <<'TEXT'
 skipped: e2e/bare.sh: no umbrella
 skipped: e2e/part.sh: the roof: it rains
