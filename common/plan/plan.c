@@ -425,6 +425,10 @@ int plan_make(const struct plan_request *r, struct plan *p, struct error *e)
 		rc = error_set(e, EINVAL, "no bound is given: --spp, --mutations, --time or --target-error");
 	if (rc == 0)
 		rc = r->kind == PLAN_CHAINS ? make_chains(r, p, total, e) : make_samples(r, p, total, e);
+	if (rc == 0 && p->groups == 1 && p->rounds == UINT64_MAX && !(p->seconds > 0))
+		rc = error_set(e, EINVAL,
+			       "a single group of samples gives no error, so a target error alone would never end it: "
+			       "give another bound as well, or render it with --groups 2 or more");
 	if (rc == 0)
 		rc = make_bootstrap(r, p, total, e);
 	return rc ? rc : plan_check(p, e);

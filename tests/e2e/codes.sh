@@ -85,6 +85,8 @@ for p in render submit; do
 		code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" -i path $wrong
 		code 2 "$BIN/hslt-$p" --estimate "$BOX" -i path $wrong
 	done
+	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" -i path --groups 1 --target-error 5% # would never end
+	grep -q 'a single group of samples gives no error' "$DIR/err.log" || fail "hslt-$p --groups 1: $(cat "$DIR/err.log")"
 	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --chains 2M
 	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" -i path --chains 10
 	grep -q -- '--chains 10: the integrator path has no chains' "$DIR/err.log" || fail "hslt-$p: $(cat "$DIR/err.log")"

@@ -147,6 +147,22 @@ static void after_a_cancelled_one(void **state)
 	assert_true(j.plan.rounds == UINT64_MAX && j.plan.seconds == 13 && j.plan.target_error == 0);
 }
 
+/* One sample per pixel is that of one group, and would go on for ever. */
+static void to_an_error_that_is_never_known(void **state)
+{
+	(void)state;
+	struct plan_request r = request(PLAN_SAMPLES);
+	struct job j;
+	r.spp = 1;
+	make_job(&j, &r, 0, true);
+	assert_int_equal(j.plan.groups, 1);
+	says(&j, (struct extension){.target_error = 0.1}, "a single group of samples gives no error");
+	make_job(&j, &r, 0, true);
+	assert_int_equal(extend(&j, (struct extension){.spp = 8, .target_error = 0.1}), 0);
+	make_job(&j, &r, 0, true);
+	assert_int_equal(extend(&j, (struct extension){.seconds = 8, .target_error = 0.1}), 0);
+}
+
 static void without_a_bound(void **state)
 {
 	(void)state;
@@ -177,9 +193,8 @@ static void without_a_bound(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(as_one_long_one),
-		cmocka_unit_test(bounds_that_are_met),
-		cmocka_unit_test(after_a_cancelled_one),
+		cmocka_unit_test(as_one_long_one),	 cmocka_unit_test(bounds_that_are_met),
+		cmocka_unit_test(after_a_cancelled_one), cmocka_unit_test(to_an_error_that_is_never_known),
 		cmocka_unit_test(without_a_bound),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
