@@ -291,7 +291,8 @@ static void note_failure(struct farm *f, struct peer *p, struct job *j, const st
 {
 	text_copy(p->text, sizeof p->text, ev->text ? ev->text : "");
 	text_print(f->text, sizeof f->text, "%s: %s", p->name, p->text);
-	text_copy(j->text, sizeof j->text, f->text);
+	if (!ev->lease.later) /* that is no failure, and true for a while only: status.c tells it from the worker */
+		text_copy(j->text, sizeof j->text, f->text);
 }
 
 void answer_failed(struct farm *f, const struct event *ev)

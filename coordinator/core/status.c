@@ -80,7 +80,8 @@ static uint32_t active_workers(const struct farm *f)
 static bool someone_avoids(const struct farm *f, const struct job *j)
 {
 	for (uint32_t i = 0; i < f->peer_count; i++)
-		if (job_takes(j, f->peers[i]->class) && peer_avoids_until(f->peers[i], j->id) > f->now)
+		if (job_takes(j, f->peers[i]->class) && peer_avoids_until(f->peers[i], j->id) > f->now &&
+		    !peer_waits_for_room(f->peers[i], j->id))
 			return true;
 	return false;
 }

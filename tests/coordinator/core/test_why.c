@@ -100,6 +100,22 @@ static const struct {
 	 "a third worker will decide whether the chain states of group 0 part 0 epoch 1 are wrong: a made them, b refused them"},
 };
 
+/* It is over once another scene has gone, and the job's last failure is another one. */
+static void a_lack_of_room_is_no_failure(void **state)
+{
+	(void)state;
+	struct job_status s;
+	struct farm *f = transcript_farm();
+	const char *lines[LINES] = {
+		"[0] submit groups=5 -> j1 submitted, j1 is queued", "[0] w1 joins A threads=1 -> -",
+		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot", "[1] w1 postpones j1 g0 p0 boot full -> -"};
+	transcript_play(f, lines);
+	assert_true(farm_job(f, 1, 2, &s));
+	assert_string_equal(s.waiting, "worker w1 has no room for its scene now: full");
+	assert_string_equal(s.text, "");
+	farm_free(f);
+}
+
 static void every_state(void **state)
 {
 	(void)state;
@@ -146,6 +162,8 @@ static void whose_results_may_come(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(every_state), cmocka_unit_test(whose_results_may_come)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(every_state),
+					   cmocka_unit_test(a_lack_of_room_is_no_failure),
+					   cmocka_unit_test(whose_results_may_come)};
 	return cmocka_run_group_tests_name("coordinator/core/test_why", tests, NULL, NULL);
 }
