@@ -379,13 +379,19 @@ static json_t *next_line(struct reading *r)
 	return o;
 }
 
+/* It may have hung up already: what it said before is still there to be read. */
+static bool say(const struct reading *r, const char *text)
+{
+	return send(fileno(r->f), text, strlen(text), MSG_NOSIGNAL) >= 0 || errno == EPIPE;
+}
+
 /* Sends a question, and reads on to its answer, of that type or an error. NULL: an error was printed. */
 static json_t *ask(struct reading *r, const char *type, json_t *question)
 {
 	char *text = json_dumps(question, JSON_COMPACT);
 	json_t *o = NULL;
 	json_decref(question);
-	if (!text || dprintf(fileno(r->f), "%s\n", text) < 0)
+	if (!text || !say(r, text) || !say(r, "\n"))
 		fprintf(stderr, "hslt-status: %s\n", strerror(errno));
 	else
 		while ((o = next_line(r)) && strcmp(text_of(o, "type"), type) != 0 &&
@@ -494,6 +500,10 @@ static int follow(const struct arguments *a, FILE *f)
 	struct reading r = {.f = f};
 	int code = 0;
 	bool first = true, more = true;
+	if (a->watch && !say(&r, "{\"subscribe\":[\"snapshot\"]}\n")) {
+		fprintf(stderr, "hslt-status: %s\n", strerror(errno));
+		return EXIT_UNREACHABLE;
+	}
 	while (more) {
 		json_t *o = next_line(&r);
 		bool snapshot = strcmp(text_of(o, "type"), "snapshot") == 0;
@@ -522,13 +532,6 @@ int main(int argc, char **argv)
 	FILE *f = reach(a.socket, &e);
 	if (!f) {
 		fprintf(stderr, "hslt-status: %s\n", e.text);
-		return EXIT_UNREACHABLE;
-	}
-	static const char subscribe[] = "{\"subscribe\":[\"snapshot\"]}\n";
-	/* It may have hung up already: what it said before is still there to be read. */
-	if (a.watch && send(fileno(f), subscribe, sizeof subscribe - 1, MSG_NOSIGNAL) < 0 && errno != EPIPE) {
-		fprintf(stderr, "hslt-status: %s\n", strerror(errno));
-		fclose(f);
 		return EXIT_UNREACHABLE;
 	}
 	int code = follow(&a, f);

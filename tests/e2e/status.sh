@@ -60,6 +60,22 @@ c.close()' "$DIR/half" &
 	until_true 10 test -S "$DIR/half" || fail "no socket"
 	code 75 "$BIN/hslt-status" --socket "$DIR/half"
 	grep -q "the coordinator closed the connection" "$DIR/err.log" || fail "half a line: $(cat "$DIR/err.log")"
+	# It ends between what it says and what it is asked.
+	"${PYTHON:-python3}" -c '
+import socket, sys
+s = socket.socket(socket.AF_UNIX)
+s.bind(sys.argv[1])
+s.listen(1)
+for i in range(2):
+	c = s.accept()[0]
+	c.sendall(b"{\"schema\":1,\"type\":\"snapshot\",\"time\":1.0,\"jobs\":[],\"workers\":[],\"leases\":[]}\n")
+	c.close()' "$DIR/short" &
+	PIDS="$PIDS $!"
+	until_true 10 test -S "$DIR/short" || fail "no socket"
+	for asks in j1 --all; do
+		code 75 "$BIN/hslt-status" --socket "$DIR/short" $asks
+		grep -q "the coordinator is gone" "$DIR/err.log" || fail "$asks: $(cat "$DIR/err.log")"
+	done
 fi
 if command -v socat >/dev/null; then
 	cat >"$DIR/ask" <<-'TEXT'

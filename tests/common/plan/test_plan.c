@@ -552,30 +552,6 @@ static void the_least_bound_counts_in_whole_rounds(void **state)
 	assert_int_equal(p.rounds, 7);
 }
 
-/* Its error is never known. */
-static void a_single_group_needs_another_bound(void **state)
-{
-	(void)state;
-	struct error e;
-	for (int kind = 0; kind < 2; kind++) {
-		struct plan_request r = request(kind ? PLAN_CHAINS : PLAN_SAMPLES, "");
-		struct plan p;
-		r.spp = r.mutations = 0;
-		r.groups = 1;
-		r.target_error = 0.1;
-		assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
-		assert_non_null(strstr(e.text, "a single group of samples gives no error"));
-		r.seconds = 5;
-		assert_int_equal(plan_make(&r, &p, &e), 0);
-		r.seconds = 0;
-		r.spp = 5;
-		assert_int_equal(plan_make(&r, &p, &e), 0);
-		r.spp = 0;
-		r.groups = 2;
-		assert_int_equal(plan_make(&r, &p, &e), 0);
-	}
-}
-
 static void limits_are_held(void **state)
 {
 	(void)state;
@@ -635,7 +611,6 @@ int main(void)
 		cmocka_unit_test(a_bandwidth_makes_epochs_longer),
 		cmocka_unit_test(seeds_stand_at_even_marks),
 		cmocka_unit_test(the_least_bound_counts_in_whole_rounds),
-		cmocka_unit_test(a_single_group_needs_another_bound),
 		cmocka_unit_test(limits_are_held),
 		cmocka_unit_test(unseen_light_of_a_plan),
 	};
