@@ -82,7 +82,7 @@ int ended_jobs_open(struct jobs *jobs, struct error *e)
 {
 	uint64_t ids[ENDED_MAX]; /* the latest first */
 	size_t count;
-	int rc = ledger_ended(jobs->ledger, LEDGER_BELOW, UINT64_MAX, ids, ENDED_MAX, &count, e);
+	int rc = ledger_ended(jobs->ledger, LEDGER_LAST, UINT64_MAX, ids, ENDED_MAX, &count, e);
 	if (rc)
 		return rc;
 	jobs->ended = mem_alloc(ENDED_MAX, sizeof *jobs->ended);

@@ -13,6 +13,7 @@
  */
 #include "coordinator/store/ledger.h"
 
+#include "common/base/clock.h"
 #include "common/base/list.h"
 #include "common/base/log.h"
 #include "common/base/mem.h"
@@ -23,7 +24,6 @@
 
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 enum { PATH_MOST = 4200, SQL_MOST = 400, SIDES = 2 };
 
@@ -411,12 +411,12 @@ int ledger_drop(struct ledger *l, uint64_t *ids, size_t count, struct error *e)
 int ledger_end(struct ledger *l, const struct job_record *r, bool extendable, struct error *e)
 {
 	struct ledger_job j;
-	time_t now = time(NULL);
+	double now = clock_wall_seconds();
 	int rc = get_whole(l, r->id, &j, e);
 	if (rc <= 0 || j.extended != r->extended)
 		return rc < 0 ? rc : 0;
 	bool ended = j.ended > 0;
-	j.ended = now > 0 ? (double)now : 1;
+	j.ended = now > 0 ? now : 1;
 	j.state = r->state;
 	j.held = "";
 	if (!extendable)
@@ -503,8 +503,9 @@ int ledger_ended(struct ledger *l, enum ledger_from from, uint64_t id, uint64_t 
 {
 	static const char *const sql[] = {
 		[LEDGER_ABOVE] = "SELECT id FROM main.jobs WHERE id > ? AND ended IS NOT NULL ORDER BY id LIMIT ?",
-		[LEDGER_BELOW] =
-			"SELECT id FROM main.jobs WHERE id < ? AND ended IS NOT NULL ORDER BY id DESC LIMIT ?"};
+		[LEDGER_BELOW] = "SELECT id FROM main.jobs WHERE id < ? AND ended IS NOT NULL ORDER BY id DESC LIMIT ?",
+		[LEDGER_LAST] =
+			"SELECT id FROM main.jobs WHERE id < ? AND ended IS NOT NULL ORDER BY ended DESC, id DESC LIMIT ?"};
 	sqlite3_stmt *s = NULL;
 	int rc = sqlite3_prepare_v2(l->db, sql[from], -1, &s, NULL) == SQLITE_OK ? 0 : ledger_file_error(l->db, e),
 	    step = SQLITE_DONE;

@@ -57,8 +57,9 @@ int ledger_drop_submission(struct ledger *l, uint64_t id, struct error *e);
 enum ledger_which { LEDGER_ALL, LEDGER_LIVE };
 /* Their ids, ascending; mem_alloc'd, NULL: none. It reads the whole table, which takes long where it is large. */
 int ledger_ids(struct ledger *l, enum ledger_which which, uint64_t **ids, size_t *count, struct error *e);
-enum ledger_from { LEDGER_ABOVE, LEDGER_BELOW };
-/* The ids of ended jobs that are nearest above that id, ascending, or below it, descending: at most `most`. */
+enum ledger_from { LEDGER_ABOVE, LEDGER_BELOW, LEDGER_LAST };
+/* The ids of ended jobs that are nearest above that id, ascending, or below it, descending: at most `most`.
+ * LEDGER_LAST: those below it that ended last, the latest first; it reads the whole table. */
 int ledger_ended(struct ledger *l, enum ledger_from from, uint64_t id, uint64_t *ids, size_t most, size_t *count,
 		 struct error *e);
 uint64_t ledger_ended_count(struct ledger *l); /* read once, then counted; 0 also if it cannot be read */

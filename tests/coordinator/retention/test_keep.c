@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Films of finished jobs: those that ended first go when there are too many, all go for a running job; results stay. */
+#include "common/base/mem.h"
 #include "coordinator/retention/keep.h"
 #include "tests/support/folder.h"
 
@@ -101,10 +102,52 @@ static void the_first_go_first(void **state)
 	spool_close(jobs.spool);
 }
 
+static void end_at(uint64_t id, double seconds)
+{
+	struct error e;
+	struct ledger_job j;
+	add(id);
+	assert_int_equal(ledger_get(jobs.ledger, id, &j, &e), 1);
+	char *record = mem_strdup(j.record);
+	j.owner = j.name = j.version = j.held = "";
+	j.state = "done";
+	j.record = record;
+	j.submission_size = j.plan_size = 0;
+	j.ended = seconds;
+	assert_int_equal(ledger_put(jobs.ledger, &j, &e), 0);
+	mem_free(record);
+}
+
+/* A start knows the jobs that ended last, as the earlier life did: however old they are, a long one among them. The
+ * films of others nobody would count. */
+static void the_last_are_known_after_a_start(void **state)
+{
+	(void)state;
+	struct error e;
+	char path[128];
+	jobs = (struct jobs){0};
+	snprintf(path, sizeof path, "%s/later", folder);
+	assert_int_equal(spool_open(&jobs.spool, path, &e), 0);
+	assert_int_equal(ledger_open(&jobs.ledger, path, &e), 0);
+	for (uint64_t id = 2; id <= ENDED_MAX + 1; id++)
+		end_at(id, 100.0 + (double)id);
+	end_at(1, 1000);
+	jobs.config.spool = path;
+	assert_int_equal(ended_jobs_open(&jobs, &e), 0);
+	assert_int_equal(jobs.ended_count, ENDED_MAX);
+	assert_int_equal(jobs.ended[ENDED_MAX - 1].id, 1);
+	for (size_t i = 0; i < ENDED_MAX - 1; i++)
+		assert_int_equal(jobs.ended[i].id, i + 3);
+	mem_free(jobs.ended);
+	ledger_close(jobs.ledger);
+	spool_close(jobs.spool);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(the_first_go_first, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(the_last_are_known_after_a_start, folder_set_up, folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
