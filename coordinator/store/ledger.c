@@ -22,6 +22,7 @@
 #include "coordinator/store/ledger_side.h"
 #include "coordinator/store/note.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -38,6 +39,7 @@ struct ledger {
 	bool behind;  /* the copy lacks changes */
 	bool counted; /* ended_count is right */
 	uint64_t ended_count;
+	double last_end; /* of all rows; 0: not read yet */
 };
 
 /* Ends a transaction: what it did counts if rc is 0. */
@@ -408,20 +410,34 @@ int ledger_drop(struct ledger *l, uint64_t *ids, size_t count, struct error *e)
 	return rc;
 }
 
+/* Ends are in order, also where a wrong clock was set back. */
+static double time_of_end(struct ledger *l)
+{
+	static const char sql[] = "SELECT max(ended) FROM main.jobs";
+	sqlite3_stmt *s = NULL;
+	double now = clock_wall_seconds();
+	if (l->last_end == 0 && sqlite3_prepare_v2(l->db, sql, -1, &s, NULL) == SQLITE_OK &&
+	    sqlite3_step(s) == SQLITE_ROW)
+		l->last_end = sqlite3_column_double(s, 0);
+	sqlite3_finalize(s);
+	return fmax(now, fmax(1, nextafter(l->last_end, INFINITY)));
+}
+
 int ledger_end(struct ledger *l, const struct job_record *r, bool extendable, struct error *e)
 {
 	struct ledger_job j;
-	double now = clock_wall_seconds();
 	int rc = get_whole(l, r->id, &j, e);
 	if (rc <= 0 || j.extended != r->extended)
 		return rc < 0 ? rc : 0;
 	bool ended = j.ended > 0;
-	j.ended = now > 0 ? now : 1;
+	j.ended = time_of_end(l);
 	j.state = r->state;
 	j.held = "";
 	if (!extendable)
 		forget_submission(&j);
+	double end = j.ended;
 	rc = change_record(l, &j, r, e);
+	l->last_end = rc ? l->last_end : end;
 	l->ended_count += !rc && !ended;
 	return rc;
 }

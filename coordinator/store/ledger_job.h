@@ -20,7 +20,7 @@ struct ledger_job {
 	size_t submission_size, plan_size;
 	/* Ignored by ledger_add and ledger_extend. */
 	const char *state;
-	double ended;	   /* s since 1970; 0: it has not ended */
+	double ended;	   /* s since 1970, later than all earlier ends; 0: it has not ended */
 	uint64_t revision; /* incremented with every change of the row */
 	bool damaged;	   /* when read: the checksum does not match, and nothing of it can be trusted */
 };

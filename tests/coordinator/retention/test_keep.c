@@ -139,6 +139,19 @@ static void the_last_are_known_after_a_start(void **state)
 	for (size_t i = 0; i < ENDED_MAX - 1; i++)
 		assert_int_equal(jobs.ended[i].id, i + 3);
 	mem_free(jobs.ended);
+	/* Those that ended while the clock was wrong are no later than what follows. */
+	end_at(ENDED_MAX + 4, 4e9);
+	ledger_close(jobs.ledger);
+	assert_int_equal(ledger_open(&jobs.ledger, path, &e), 0);
+	add(ENDED_MAX + 3);
+	add(ENDED_MAX + 2);
+	jobs.ended_count = 0;
+	add(ENDED_MAX + 5);
+	assert_int_equal(ended_jobs_open(&jobs, &e), 0);
+	static const uint64_t last[] = {ENDED_MAX + 4, ENDED_MAX + 3, ENDED_MAX + 2, ENDED_MAX + 5};
+	for (size_t i = 0; i < 4; i++)
+		assert_int_equal(jobs.ended[ENDED_MAX - 4 + i].id, last[i]);
+	mem_free(jobs.ended);
 	ledger_close(jobs.ledger);
 	spool_close(jobs.spool);
 }
