@@ -6,8 +6,8 @@
 static int by_end(const void *a, const void *b)
 {
 	const struct age_job *x = a, *y = b;
-	if (x->ended != y->ended)
-		return x->ended < y->ended ? -1 : 1;
+	if (x->order != y->order)
+		return x->order < y->order ? -1 : 1;
 	return (x->id > y->id) - (x->id < y->id);
 }
 

@@ -12,6 +12,7 @@
 
 struct age_job {
 	uint64_t id;
+	double order;			     /* later for each that ended later, whatever became of the observed time */
 	double ended;			     /* s of observed time at that moment (seen.h) */
 	uint64_t films, result;		     /* bytes: of what only serves extensions; of result, preview and log */
 	bool busy;			     /* somebody fetches its result: it is kept this time */
@@ -24,7 +25,7 @@ struct age_limits {
 };
 enum { AGE_RECORD = 10 };
 
-/* Sorts the jobs by end, the oldest first. now: observed time in s. */
+/* Sorts the jobs by their order, the oldest first. now: observed time in s. */
 void age_choose(struct age_job *jobs, size_t count, const struct age_limits *l, double now);
 
 #endif

@@ -62,7 +62,8 @@ static uint64_t result_bytes(const struct jobs *jobs, uint64_t job)
 
 static void clear_if_unneeded(const struct jobs *jobs, struct clearing *c, uint64_t id)
 {
-	if (is_needed(jobs, id) || ledger_read_record(jobs->ledger, id, &c->record, NULL) ||
+	double order;
+	if (is_needed(jobs, id) || ledger_read_end(jobs->ledger, id, &c->record, &order, NULL) ||
 	    !record_is_ended(&c->record))
 		return;
 	double now = ages_now(jobs);
@@ -77,6 +78,7 @@ static void clear_if_unneeded(const struct jobs *jobs, struct clearing *c, uint6
 	if (!j) /* the next round may have memory for it */
 		return;
 	*j = (struct age_job){.id = id,
+			      .order = order,
 			      .ended = c->record.ended_seen,
 			      .films = spool_film_bytes(jobs->spool, id, 1),
 			      .result = result_bytes(jobs, id),

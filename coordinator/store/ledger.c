@@ -566,12 +566,19 @@ int ledger_write_record(struct ledger *l, const struct job_record *r, struct err
 
 int ledger_read_record(struct ledger *l, uint64_t id, struct job_record *r, struct error *e)
 {
+	double ended;
+	return ledger_read_end(l, id, r, &ended, e);
+}
+
+int ledger_read_end(struct ledger *l, uint64_t id, struct job_record *r, double *ended, struct error *e)
+{
 	struct ledger_job j;
 	int rc = get_whole(l, id, &j, e);
 	if (rc < 0)
 		return rc;
 	if (!rc || !*j.record)
 		return error_set(e, ENOENT, "there is no job j%llu", (unsigned long long)id);
+	*ended = j.ended;
 	rc = record_from_json(j.record, strlen(j.record), r, e);
 	if (!rc && r->id != id)
 		rc = error_set(e, EBADMSG, "the record of another job");

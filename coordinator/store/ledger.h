@@ -69,6 +69,8 @@ int ledger_get(struct ledger *l, uint64_t id, struct ledger_job *j, struct error
 int ledger_write_record(struct ledger *l, const struct job_record *r, struct error *e); /* -ENOENT */
 /* -ENOENT: no such job, or it has no record; -EBADMSG: damaged; -EPROTO: of another version. */
 int ledger_read_record(struct ledger *l, uint64_t id, struct job_record *r, struct error *e);
+/* The same, with the row's time of the end (ledger_job.h). */
+int ledger_read_end(struct ledger *l, uint64_t id, struct job_record *r, double *ended, struct error *e);
 
 /* ---- notes */
 

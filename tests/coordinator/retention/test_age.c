@@ -15,7 +15,8 @@ static void fill(struct age_job jobs[5])
 {
 	static const double days[] = {5, 1, 3, 4, 2};
 	for (int i = 0; i < 5; i++)
-		jobs[i] = (struct age_job){.id = 10 + (uint64_t)i, .ended = days[i] * DAY, .films = 100, .result = 100};
+		jobs[i] = (struct age_job){
+			.id = 10 + (uint64_t)i, .order = days[i], .ended = days[i] * DAY, .films = 100, .result = 100};
 }
 
 /* A letter a job, the first to end first: . nothing goes, f its films, r its result, x its record, too. */
