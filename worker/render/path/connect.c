@@ -18,6 +18,10 @@
 #include "worker/render/path/media.h"
 #include "worker/render/path/visible.h"
 
+/* What every joint runs is compiled twice: with `plain` for worlds without an effect that joints ask about
+ * (effects.joints), and for the others. It is short enough for the questions to cost several per cent. */
+#define IN_BOTH static inline __attribute__((always_inline))
+
 /* Beyond this a weight is zero in double anyway; infinities would breed NaN. */
 #define RATIO_LIMIT 1e200
 
@@ -46,9 +50,9 @@ static bool lens_joins(const struct path_context *c, const struct path_vertex *e
 }
 
 /* The first vertex from x_i on that is not passed: what x_i-1 is joined to. */
-static unsigned behind_passed(const struct path_context *c, const struct joined_path *p, unsigned i)
+IN_BOTH unsigned behind_passed(const struct path_context *c, const struct joined_path *p, unsigned i, const bool plain)
 {
-	while (path_sees_through(c) && path_joint_passes(p, i))
+	while (!plain && path_sees_through(c) && path_joint_passes(p, i))
 		i++;
 	return i;
 }
@@ -56,23 +60,23 @@ static unsigned behind_passed(const struct path_context *c, const struct joined_
 /* For j > 0 and a vertex x_j that is specular: light that goes straight through it may be joined nonetheless. */
 static bool joins_through(const struct path_context *c, const struct joined_path *p, unsigned j)
 {
-	unsigned end = behind_passed(c, p, j);
+	unsigned end = behind_passed(c, p, j, false);
 	if (end - j > PATH_PASSED_MOST)
 		return false;
 	return j == 1 && end == p->edges ? lens_joins(c, p->v[end], p->v[0]) : !is_delta(p, end);
 }
 
-static inline bool technique_exists(const struct path_context *c, const struct joined_path *p, unsigned j)
+IN_BOTH bool technique_exists(const struct path_context *c, const struct joined_path *p, unsigned j, const bool plain)
 {
 	if (j == 0)
 		return true;
-	if (p->other_medium && j > p->other_medium)
+	if (!plain && p->other_medium && j > p->other_medium)
 		return false;
 	if (p->edges == 1)
 		return j == 1 && lens_joins(c, p->v[1], p->v[0]);
 	if (j > p->edges || is_delta(p, j - 1))
 		return false;
-	return !is_delta(p, j) || (path_sees_through(c) && joins_through(c, p, j));
+	return !is_delta(p, j) || (!plain && path_sees_through(c) && joins_through(c, p, j));
 }
 
 /* Edge i, and its media at x_i-1 and at x_i. Where media scatter. */
@@ -89,48 +93,50 @@ static struct joined_edge edge_of(const struct joined_path *p, unsigned i)
 }
 
 /* What edge i contributes to the density of x_i (or, if back, of x_i-1) as generated from its other end. */
-static double edge_pdf(const struct path_context *c, const struct joined_path *p, unsigned i, bool back)
+IN_BOTH double edge_pdf(const struct path_context *c, const struct joined_path *p, unsigned i, bool back,
+			const bool plain)
 {
-	if (!EFFECT_IS_ON(c->w, scattering))
+	if (plain || !EFFECT_IS_ON(c->w, scattering))
 		return 1;
 	struct joined_edge e = edge_of(p, i);
 	return path_edge_pdf(c, e.edge, back ? e.light : e.camera, p->v[back ? i - 1 : i]);
 }
 
 /* Density of x_i as generated from the light, for i >= s. */
-static inline double light_pdf(const struct path_context *c, const struct joined_path *p, unsigned i)
+IN_BOTH double light_pdf(const struct path_context *c, const struct joined_path *p, unsigned i, const bool plain)
 {
-	unsigned s = p->s;
+	unsigned s = p->s, passed = plain ? 0 : p->passed;
 	if (i == 0)
 		return path_pdf_emitter(c, p->v[0]);
-	if (i >= s + p->passed + 2)
+	if (i >= s + passed + 2)
 		return p->v[i]->pdf_rev;
-	if (i > s && i <= s + p->passed)
+	if (i > s && i <= s + passed)
 		return is_refracted(p) ? path_pdf_refracted(c, p->v[i - 2], p->v[i - 1], p->v[i], TRANSPORT_IMPORTANCE)
 				       : path_pdf_passed(c, p->v[i - 1], p->v[i], TRANSPORT_IMPORTANCE);
 	const struct path_vertex *prev = i >= 2 ? p->v[i - 2] : NULL;
-	return path_pdf(c, prev, p->v[i - 1], p->v[i], TRANSPORT_IMPORTANCE) * edge_pdf(c, p, i, false);
+	return path_pdf(c, prev, p->v[i - 1], p->v[i], TRANSPORT_IMPORTANCE) * edge_pdf(c, p, i, false, plain);
 }
 
 /* Density of x_i as generated from the camera, for i < s. */
-static double camera_pdf(const struct path_context *c, const struct joined_path *p, unsigned i)
+IN_BOTH double camera_pdf(const struct path_context *c, const struct joined_path *p, unsigned i, const bool plain)
 {
 	unsigned s = p->s, k = p->edges;
 	if (i + 3 <= s)
 		return p->v[i]->pdf_rev;
-	if (i + 1 == s && p->passed)
+	if (!plain && i + 1 == s && p->passed)
 		return is_refracted(p) ? path_pdf_refracted(c, p->v[s + 1], p->v[s], p->v[i], TRANSPORT_RADIANCE)
 				       : path_pdf_passed(c, p->v[s], p->v[i], TRANSPORT_RADIANCE);
 	const struct path_vertex *prev = i + 2 <= k ? p->v[i + 2] : NULL;
-	return path_pdf(c, prev, p->v[i + 1], p->v[i], TRANSPORT_RADIANCE) * edge_pdf(c, p, i + 1, true);
+	return path_pdf(c, prev, p->v[i + 1], p->v[i], TRANSPORT_RADIANCE) * edge_pdf(c, p, i + 1, true, plain);
 }
 
 /* The density of joining x_first-1 to x_end, which passes x_first..x_end-1, over that of drawing those as their
  * sub-path did; 1 if there are none. */
-static double over_drawn(const struct path_context *c, const struct joined_path *p, unsigned first, unsigned end)
+IN_BOTH double over_drawn(const struct path_context *c, const struct joined_path *p, unsigned first, unsigned end,
+			  const bool plain)
 {
 	double pdf[PATH_PASSED_MOST];
-	if (!path_sees_through(c) || first == end)
+	if (plain || !path_sees_through(c) || first == end)
 		return 1;
 	for (unsigned i = first; i < end; i++)
 		pdf[i - first] = p->v[i]->pdf;
@@ -139,13 +145,14 @@ static double over_drawn(const struct path_context *c, const struct joined_path 
 
 /* For the technique that made the path: the density of drawing what its joint passes, from the light's side or the
  * camera's, over that of joining; 1 if it passes nothing. */
-static double drawn_instead(const struct path_context *c, const struct joined_path *p, bool from_light)
+IN_BOTH double drawn_instead(const struct path_context *c, const struct joined_path *p, bool from_light,
+			     const bool plain)
 {
 	double pdf[PATH_PASSED_MOST];
-	if (!p->passed)
+	if (plain || !p->passed)
 		return 1;
 	for (unsigned i = 0; i < p->passed; i++)
-		pdf[i] = from_light ? light_pdf(c, p, p->s + i) : p->v[p->s + i]->pdf;
+		pdf[i] = from_light ? light_pdf(c, p, p->s + i, false) : p->v[p->s + i]->pdf;
 	return 1 / (is_refracted(p) ? path_refracted_ratio(p->v, p->passed, p->log_transfer, pdf)
 				    : path_passed_ratio(p->v, p->s, p->s + p->passed - 1, pdf));
 }
@@ -156,9 +163,11 @@ struct refracted_joint {
 	double ratio; /* its density over that of drawing x_1 .. x_end-1 as their sub-path did */
 };
 
-static struct refracted_joint refracted_joint_of(struct path_context *c, const struct joined_path *p)
+IN_BOTH struct refracted_joint refracted_joint_of(struct path_context *c, const struct joined_path *p, const bool plain)
 {
 	struct refracted_joint r = {0, 0};
+	if (plain)
+		return r;
 	if (path_refracts(c) && is_refracted(p))
 		r.end = p->passed + 1;
 	else if (path_refracts(c))
@@ -169,36 +178,39 @@ static struct refracted_joint refracted_joint_of(struct path_context *c, const s
 /* r is the density of technique j over that of technique s, computed as if j drew every vertex. In fact joints pass
  * vertices without drawing them. drawn_instead corrects r for the joint of s, once towards either side; over_drawn
  * corrects the ratio that is stored for the joint of j. */
-void path_technique_ratios(struct path_context *c, const struct joined_path *p, unsigned max_s, double *ratio)
+IN_BOTH void technique_ratios(struct path_context *c, const struct joined_path *p, unsigned max_s, double *ratio,
+			      const bool plain)
 {
-	const bool sees_through = path_sees_through(c);
-	unsigned s = p->s, k = p->edges, last = max_s < k ? max_s : k, joint_end = s + p->passed;
+	const bool sees_through = !plain && path_sees_through(c);
+	unsigned s = p->s, k = p->edges, last = max_s < k ? max_s : k, joint_end = plain ? s : s + p->passed;
 	for (unsigned j = 0; j <= k; j++)
 		ratio[j] = 0;
 	/* Technique 1 draws x_0 as seen from what it is joined to, the longer ones as light sub-paths do. */
 	double toward = 1, point = 1;
-	const struct refracted_joint refracted = refracted_joint_of(c, p);
-	const bool first_exists = refracted.end || technique_exists(c, p, 1);
+	const struct refracted_joint refracted = refracted_joint_of(c, p, plain);
+	const bool first_exists = refracted.end || technique_exists(c, p, 1, plain);
 	if ((k >= 2 && s <= 1) || first_exists) {
-		toward = path_pdf_toward(c, p->v[0], p->v[refracted.end ? refracted.end : behind_passed(c, p, 1)]->x.p);
+		toward = path_pdf_toward(c, p->v[0],
+					 p->v[refracted.end ? refracted.end : behind_passed(c, p, 1, plain)]->x.p);
 		point = s >= 1 ? p->v[0]->pdf : path_pdf_emitter(c, p->v[0]);
 	}
 	double first = s == 1 ? point / toward : 1;
-	double r = joint_end < last ? first * drawn_instead(c, p, true) : first;
+	double r = joint_end < last ? first * drawn_instead(c, p, true, plain) : first;
 	for (unsigned j = joint_end; j < last && r > 0 && r < RATIO_LIMIT; j++) {
 		if (j == 0 && first_exists)
 			ratio[1] = r * toward / p->v[0]->pdf *
-				   (refracted.end ? refracted.ratio : over_drawn(c, p, 1, behind_passed(c, p, 1)));
-		r *= (j == 0 ? point : light_pdf(c, p, j)) / p->v[j]->pdf;
-		if (j > 0 && technique_exists(c, p, j + 1))
-			ratio[j + 1] = r * over_drawn(c, p, j + 1, behind_passed(c, p, j + 1));
+				   (refracted.end ? refracted.ratio
+						  : over_drawn(c, p, 1, behind_passed(c, p, 1, plain), plain));
+		r *= (j == 0 ? point : light_pdf(c, p, j, plain)) / p->v[j]->pdf;
+		if (j > 0 && technique_exists(c, p, j + 1, plain))
+			ratio[j + 1] = r * over_drawn(c, p, j + 1, behind_passed(c, p, j + 1, plain), plain);
 	}
 	bool beyond = r >= RATIO_LIMIT;
-	r = first * drawn_instead(c, p, false);
+	r = first * drawn_instead(c, p, false, plain);
 	double r_end = r; /* r at x_end, the nearest vertex behind x_j that is not passed */
 	double r_refracted = 0;
 	for (unsigned j = s, end = s; j > 0 && r_end > 0 && r < RATIO_LIMIT; j--) {
-		r *= camera_pdf(c, p, j - 1) / p->v[j - 1]->pdf;
+		r *= camera_pdf(c, p, j - 1, plain) / p->v[j - 1]->pdf;
 		bool passed = sees_through && path_joint_passes(p, j - 1);
 		if (!passed) {
 			r_end = r;
@@ -208,8 +220,8 @@ void path_technique_ratios(struct path_context *c, const struct joined_path *p, 
 			r_refracted = r;
 		if (j - 1 == 1 && refracted.end) {
 			ratio[1] = r_refracted * refracted.ratio * toward / point;
-		} else if (technique_exists(c, p, j - 1)) {
-			double here = passed ? r_end * over_drawn(c, p, j - 1, end) : r;
+		} else if (technique_exists(c, p, j - 1, plain)) {
+			double here = passed ? r_end * over_drawn(c, p, j - 1, end, plain) : r;
 			ratio[j - 1] = j - 1 == 1 ? here * toward / point : here;
 		}
 	}
@@ -218,15 +230,42 @@ void path_technique_ratios(struct path_context *c, const struct joined_path *p, 
 		ratio[s == 0 ? k : 0] = RATIO_LIMIT;
 }
 
-double path_balance_weight(struct path_context *c, const struct joined_path *p, unsigned max_s)
+static void plain_ratios(struct path_context *c, const struct joined_path *p, unsigned max_s, double *ratio)
+{
+	technique_ratios(c, p, max_s, ratio, true);
+}
+
+static __attribute__((noinline)) void ratios_with_effects(struct path_context *c, const struct joined_path *p,
+							  unsigned max_s, double *ratio)
+{
+	technique_ratios(c, p, max_s, ratio, false);
+}
+
+void path_technique_ratios(struct path_context *c, const struct joined_path *p, unsigned max_s, double *ratio)
+{
+	if (EFFECT_IS_ON(c->w, joints))
+		ratios_with_effects(c, p, max_s, ratio);
+	else
+		plain_ratios(c, p, max_s, ratio);
+}
+
+IN_BOTH double balance_weight(struct path_context *c, const struct joined_path *p, unsigned max_s, const bool plain)
 {
 	double ratio[PATH_MAX_EDGES + 2], sum = 0;
 	/* The first technique that only samples with a light sub-path have. */
-	unsigned with_light = behind_passed(c, p, 1) == p->edges ? 1 : 2;
-	path_technique_ratios(c, p, max_s, ratio);
+	unsigned with_light = behind_passed(c, p, 1, plain) == p->edges ? 1 : 2;
+	if (plain)
+		plain_ratios(c, p, max_s, ratio);
+	else
+		ratios_with_effects(c, p, max_s, ratio);
 	for (unsigned j = 0; j <= p->edges; j++)
 		sum += j >= with_light && c->light_every > 1 ? ratio[j] / c->light_every : ratio[j];
 	return 1 / sum;
+}
+
+double path_balance_weight(struct path_context *c, const struct joined_path *p, unsigned max_s)
+{
+	return balance_weight(c, p, max_s, !EFFECT_IS_ON(c->w, joints));
 }
 
 static void join(const struct path_context *c, const struct path_vertex *light, unsigned s, unsigned t,
@@ -296,6 +335,17 @@ unsigned path_other_medium(const struct path_context *c, const struct joined_pat
 	return 0;
 }
 
+static __attribute__((noinline)) spectrum weighted_with_effects(struct path_context *c, struct joined_path *p,
+								unsigned max_s, spectrum l)
+{
+	if (EFFECT_IS_ON(c->w, scattering)) {
+		p->other_medium = path_other_medium(c, p);
+		if (!technique_exists(c, p, p->s, false) || !camera_agrees(c, p))
+			return spectrum_of(0);
+	}
+	return path_collapse(spectrum_scale(balance_weight(c, p, max_s, false), l), disperses(c, p));
+}
+
 /* The end of every contribution. joint: of edge s, where media scatter and s > 0. */
 static spectrum weighted(struct path_context *c, const struct path_vertex *light, unsigned s, unsigned t,
 			 unsigned max_s, const struct path_edge *joint, spectrum l)
@@ -304,12 +354,9 @@ static spectrum weighted(struct path_context *c, const struct path_vertex *light
 	join(c, light, s, t, &p);
 	p.joint = joint;
 	p.other_medium = 0;
-	if (EFFECT_IS_ON(c->w, scattering)) {
-		p.other_medium = path_other_medium(c, &p);
-		if (!technique_exists(c, &p, s) || !camera_agrees(c, &p))
-			return spectrum_of(0);
-	}
-	return path_collapse(spectrum_scale(path_balance_weight(c, &p, max_s), l), disperses(c, &p));
+	if (EFFECT_IS_ON(c->w, joints))
+		return weighted_with_effects(c, &p, max_s, l);
+	return spectrum_scale(balance_weight(c, &p, max_s, true), l);
 }
 
 static spectrum hit_emitter(struct path_context *c, unsigned t, unsigned max_s)
@@ -365,10 +412,9 @@ static bool is_seen(struct path_context *c, const struct path_vertex *z, const s
 	return !spectrum_is_zero(*l);
 }
 
-/* What is left of l on its way from y, vertex s - 1 of the light's sub-path, to the camera's vertex t - 1, directly or
- * through surfaces; zero: they do not see each other. direct: l after what media absorb of it if nothing is passed. */
-static spectrum seen(struct path_context *c, const struct path_vertex *y, unsigned s, unsigned t, vec3 to_light,
-		     spectrum l, spectrum direct, struct path_edge *joint)
+static __attribute__((noinline)) spectrum seen_with_effects(struct path_context *c, const struct path_vertex *y,
+							    unsigned s, unsigned t, vec3 to_light, spectrum l,
+							    spectrum direct, struct path_edge *joint)
 {
 	const struct path_vertex *z = &c->camera[t - 1];
 	spectrum left;
@@ -385,6 +431,17 @@ static spectrum seen(struct path_context *c, const struct path_vertex *y, unsign
 	}
 	l = spectrum_mul(l, left);
 	return after_absorption(c, &c->passed[c->passed_count - 1], to_light, y, s, l);
+}
+
+/* What is left of l on its way from y, vertex s - 1 of the light's sub-path, to the camera's vertex t - 1, directly or
+ * through surfaces; zero: they do not see each other. direct: l after what media absorb of it if nothing is passed. */
+static inline spectrum seen(struct path_context *c, const struct path_vertex *y, unsigned s, unsigned t, vec3 to_light,
+			    spectrum l, spectrum direct, struct path_edge *joint)
+{
+	if (EFFECT_IS_ON(c->w, joints))
+		return seen_with_effects(c, y, s, t, to_light, l, direct, joint);
+	bool is_open = s + t > c->min_depth && !spectrum_is_zero(l) && path_visible(c, &c->camera[t - 1], y);
+	return is_open ? l : spectrum_of(0);
 }
 
 /* The contribution of the refracted path from y, drawn with this density, to the camera's vertex t - 1; zero: none was

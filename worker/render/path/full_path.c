@@ -41,10 +41,8 @@ void product_mul(struct product *p, spectrum f)
 }
 
 /* Some vertex disperses: the path carries its hero wavelength alone. */
-static bool full_path_is_dispersed(const struct path_context *c, const struct full_path *x)
+static bool full_path_is_dispersed(const struct full_path *x)
 {
-	if (!EFFECT_IS_ON(c->w, dispersion))
-		return false;
 	for (unsigned j = 1; j < x->edges; j++)
 		if (path_disperses(&x->v[j]))
 			return true;
@@ -53,7 +51,8 @@ static bool full_path_is_dispersed(const struct path_context *c, const struct fu
 
 static void to_xyz(const struct path_context *c, const struct full_path *x, spectrum l, double xyz[3])
 {
-	l = path_collapse(l, full_path_is_dispersed(c, x));
+	if (EFFECT_IS_ON(c->w, dispersion))
+		l = path_collapse(l, full_path_is_dispersed(x));
 	if (!EFFECT_IS_ON(c->w, colour))
 		for (int i = 0; i < 3; i++)
 			xyz[i] = l.v[0] * c->w->grey_xyz[i];
@@ -290,9 +289,9 @@ static void take_emitter(struct full_path *x, const struct path_vertex *from)
 
 unsigned full_path_most_light(const struct path_context *c, const struct full_path *x)
 {
-	struct joined_path p = {.edges = x->edges};
 	if (!EFFECT_IS_ON(c->w, scattering))
 		return x->edges;
+	struct joined_path p = {.edges = x->edges};
 	for (unsigned i = 0; i <= x->edges; i++)
 		p.v[i] = &x->v[i];
 	unsigned other = path_other_medium(c, &p);
@@ -415,15 +414,13 @@ bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned passed
 	return full_path_finish(c, x) && (s == 0 || EFFECT_IS_ON(c->w, scattering) || joint_is_open(c, x, s, passed));
 }
 
-void full_path_attenuate(const struct world *w, const struct full_path *x, struct product *p)
+void full_path_attenuate_by_media(const struct world *w, const struct full_path *x, struct product *p)
 {
 	if (EFFECT_IS_ON(w, scattering)) {
 		for (unsigned e = 0; e < x->edges; e++)
 			product_mul(p, x->edge[e].left);
 		return;
 	}
-	if (!EFFECT_IS_ON(w, absorption))
-		return;
 	uint32_t medium = w->camera_medium;
 	for (unsigned e = x->edges; e > 0; e--) {
 		medium = path_medium_after(w, &x->v[e], medium, vec3_neg(x->edge[e - 1].w));

@@ -133,7 +133,12 @@ bool full_path_finish(struct path_context *c, struct full_path *x);
 bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned passed, unsigned edges, struct full_path *x);
 
 /* Multiplies p by what the media along the path let through, if there are any. */
-void full_path_attenuate(const struct world *w, const struct full_path *x, struct product *p);
+void full_path_attenuate_by_media(const struct world *w, const struct full_path *x, struct product *p);
+static inline void full_path_attenuate(const struct world *w, const struct full_path *x, struct product *p)
+{
+	if (EFFECT_IS_ON(w, media))
+		full_path_attenuate_by_media(w, x, p);
+}
 
 /* CIE XYZ of the path's colour, scaled so that X + Y + Z = 1. */
 void full_path_colour(const struct path_context *c, struct full_path *x, double xyz[3]);

@@ -240,6 +240,31 @@ static bool survives(const struct path_context *c, unsigned scatterings, double 
 	return true;
 }
 
+/* From vertex n - 1 of a sub-path to the next one, where there are media. *left: what those that scatter let through.
+ */
+static __attribute__((noinline)) bool go_on_in_media(struct path_context *c, struct sampler *s, enum sampler_side side,
+						     unsigned n, const struct departure *out, double u, spectrum *left)
+{
+	struct path_vertex *v = side == SIDE_CAMERA ? c->camera : c->light;
+	*left = spectrum_of(1);
+	return EFFECT_IS_ON(c->w, medium_light) && side == SIDE_CAMERA
+		       ? go_on_shining(c, s, n, out->beta, out->wi, 0, INFINITY, u, left)
+		       : go_on(c, &v[n - 1], out->wi, 0, INFINITY, u, &v[n], left);
+}
+
+/* What they make of the throughput and the densities there. */
+static __attribute__((noinline)) void heed_media(struct path_context *c, enum sampler_side side, unsigned n, vec3 wi,
+						 spectrum left)
+{
+	struct path_vertex *v = side == SIDE_CAMERA ? c->camera : c->light, *at = &v[n - 1], *to = &v[n];
+	if (EFFECT_IS_ON(c->w, scattering)) {
+		path_travel(c, to, left);
+		v[n - 2].pdf_rev *= path_edge_pdf(c, &at->edge, at->edge.before, &v[n - 2]);
+	} else if (EFFECT_IS_ON(c->w, absorption) && side == SIDE_CAMERA) {
+		path_absorb(c, at, wi, to);
+	}
+}
+
 /* Extends v[0..n) up to `max` vertices by scattering; v[n-1] is not at infinity. start: beta to which roulette
  * compares. */
 static unsigned scatter_on(struct path_context *c, struct sampler *s, enum sampler_side side, struct path_vertex *v,
@@ -256,10 +281,9 @@ static unsigned scatter_on(struct path_context *c, struct sampler *s, enum sampl
 			return n;
 		if (!survives(c, n - 1, start, u[DIM_ROULETTE], &out.beta) || spectrum_is_zero(out.beta))
 			return n;
-		spectrum left = spectrum_of(1);
-		bool met = EFFECT_IS_ON(c->w, medium_light) && side == SIDE_CAMERA
-				   ? go_on_shining(c, s, n, out.beta, out.wi, 0, INFINITY, u[DIM_DISTANCE], &left)
-				   : go_on(c, at, out.wi, 0, INFINITY, u[DIM_DISTANCE], to, &left);
+		spectrum left;
+		bool met = EFFECT_IS_ON(c->w, media) ? go_on_in_media(c, s, side, n, &out, u[DIM_DISTANCE], &left)
+						     : path_extend(c, at, out.wi, 0, INFINITY, to);
 		if (!met || (to->kind == VERTEX_INFINITE && side == SIDE_LIGHT))
 			return n;
 		double ahead = 1, back = 1;
@@ -273,12 +297,8 @@ static unsigned scatter_on(struct path_context *c, struct sampler *s, enum sampl
 		to->pdf = reach_pdf(c, at, to, out.pdf, ahead);
 		if (!c->one_way)
 			v[n - 2].pdf_rev = reach_pdf(c, at, &v[n - 2], out.pdf_rev, back);
-		if (EFFECT_IS_ON(c->w, scattering)) {
-			path_travel(c, to, left);
-			v[n - 2].pdf_rev *= path_edge_pdf(c, &at->edge, at->edge.before, &v[n - 2]);
-		} else if (EFFECT_IS_ON(c->w, absorption) && side == SIDE_CAMERA) {
-			path_absorb(c, at, out.wi, to);
-		}
+		if (EFFECT_IS_ON(c->w, media))
+			heed_media(c, side, n, out.wi, left);
 		if (!(to->pdf > 0))
 			return n;
 		n++;

@@ -294,14 +294,12 @@ static inline spectrum eval_lanes(const struct color *c, const struct wavelength
 	return s;
 }
 
-spectrum color_eval(const struct color *c, const struct wavelengths *w)
+spectrum color_eval_coloured(const struct color *c, const struct wavelengths *w)
 {
-	if (!WAVELENGTHS_GREY(w) && w->rgb)
+	if (w->rgb)
 		return c->tinted ? spectrum_scale(c->scale, spectrum_of_rgb(c->rgb)) : spectrum_of(c->scale);
-	if (WAVELENGTHS_GREY(w) || c->shape == COLOR_SHAPE_CONSTANT) {
-		assert(c->shape != COLOR_SHAPE_OTHER);
+	if (c->shape == COLOR_SHAPE_CONSTANT)
 		return spectrum_of(c->scale);
-	}
 	if (w->few)
 		return spectrum_repeat(eval_lanes(c, w, (int)w->few), (int)w->few);
 	return eval_lanes(c, w, SPECTRUM_LANES);

@@ -11,6 +11,8 @@
 #include "worker/render/math/spectrum.h"
 #include "worker/render/scene/scene.h"
 
+#include <assert.h>
+
 /* The last two are for textures only, plain numbers of either sign rather than spectra: displacement heights, whose
  * images are used as stored, and relief, whose images are decoded like colours. */
 enum color_role { COLOR_REFLECTANCE, COLOR_ILLUMINANT, COLOR_UNBOUNDED, COLOR_HEIGHT, COLOR_RELIEF };
@@ -46,7 +48,15 @@ int color_from_rgb(const double rgb[3], enum color_role role, struct color *out)
  * colours are rgb it is that of light with these values, times D65's if under_d65. */
 struct color color_of_table(uint32_t n, const double *nm, const double *value, bool zero_outside, bool under_d65);
 struct color color_constant(double x);
-spectrum color_eval(const struct color *c, const struct wavelengths *w);
+spectrum color_eval_coloured(const struct color *c, const struct wavelengths *w); /* color_eval, if not grey */
+static inline spectrum color_eval(const struct color *c, const struct wavelengths *w)
+{
+	if (WAVELENGTHS_GREY(w)) {
+		assert(c->shape != COLOR_SHAPE_OTHER);
+		return spectrum_of(c->scale);
+	}
+	return color_eval_coloured(c, w);
+}
 /* color_eval of both; one search where their tables have the same wavelengths, such as those of a metal's n and k. */
 void color_eval_both(const struct color *a, const struct color *b, const struct wavelengths *w, spectrum out[2]);
 double color_max(const struct color *c);  /* upper bound over wavelengths */

@@ -74,6 +74,9 @@ struct effects {
 	bool medium_light;	     /* some medium shines */
 	bool transparent_shadows;    /* connections look through what lets light straight through */
 	bool refracted_shadows;	     /* connections to emitters are refracted by what refracts exactly */
+	bool media;		     /* absorption or scattering */
+	bool joints;		     /* any that joining sub-paths asks about: media, dispersion, transparent and
+					refracted shadows */
 	bool motion;		     /* paths have a time */
 	enum color_shape illuminant; /* of all emitters, if colour is off */
 	uint32_t max_depth;	     /* edges of the longest path that can carry light, at most the scene's */

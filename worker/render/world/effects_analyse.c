@@ -485,5 +485,7 @@ void effects_analyse(struct world *w, const struct effects_source *src, const st
 	fx->refracted_shadows = shadows(&r, EFFECT_REFRACTED_SHADOWS, &c.refracting,
 					"where media scatter or shine, connections are not refracted",
 					"refracts light exactly", "refract light exactly");
+	fx->media = fx->absorption || fx->scattering;
+	fx->joints = fx->media || fx->dispersion || fx->transparent_shadows || fx->refracted_shadows;
 	depth(&r, w, src, shape);
 }
