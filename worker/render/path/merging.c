@@ -15,8 +15,11 @@
  * are summed up when the photon is stored.
  *
  * Photons behind an edge or on another surface are told by their normals and their distance from z's plane. A surface
- * that bends within r blurs, and so does a shadow's edge: of a sum over all samples little is lost. What media absorb
- * of a photon's light is not counted: only the path that it will belong to says which media it was in.
+ * that bends within r blurs, and so does a shadow's edge: of a sum over all samples little is lost.
+ *
+ * Where media scatter, events are vertices of the light's sub-path like others, and the densities of the edges are
+ * those of path/media.h; that both sub-paths agree about the media is assumed. Where they only absorb, what they do to
+ * a photon's light is not counted: only the path that it will belong to says which media it was in.
  */
 #include "worker/render/path/merging.h"
 
@@ -25,6 +28,7 @@
 #include "common/film/path_class.h"
 #include "worker/render/path/connect.h"
 #include "worker/render/path/measure.h"
+#include "worker/render/path/media.h"
 
 #include <errno.h>
 
@@ -73,6 +77,13 @@ static double intensity_of(struct path_context *c, spectrum l)
 	one.intensity = 0;
 	path_splat(c, &one, 0, 0, l);
 	return one.intensity;
+}
+
+/* What an edge that a sub-path drew contributes to the density of `before`, its beginning, as generated from its end.
+ */
+static double edge_rev(const struct path_context *c, const struct path_edge *e, const struct path_vertex *before)
+{
+	return EFFECT_IS_ON(c->w, scattering) ? path_edge_pdf(c, e, e->before, before) : 1;
 }
 
 /* ---- photons */
@@ -140,6 +151,7 @@ struct photon photon_of(struct path_context *c, unsigned s)
 {
 	const struct path_vertex *at = &c->light[s], *prev = at - 1;
 	struct photon p = {.p = at->x.p, .ng = at->x.ng, .beta = at->beta, .pdf = at->pdf, .s = s};
+	p.edge_rev = edge_rev(c, &at->edge, prev);
 	p.prev.kind = prev->kind;
 	p.prev.emitter = prev->emitter;
 	p.prev.p = prev->x.p;
@@ -233,7 +245,9 @@ static double sum_more(const struct path_context *c, const struct path_vertex *y
 			end--;
 		if (!(i < t && v[i].delta) && !(end > 0 && v[end].delta) && i - 1 - end <= PATH_PASSED_MOST)
 			sum += q * over_drawn(v, end + 1, i);
-		q *= (i == t ? path_pdf(c, y, z, next, TRANSPORT_IMPORTANCE) : next->pdf_rev) / next->pdf;
+		q *= (i == t ? path_pdf(c, y, z, next, TRANSPORT_IMPORTANCE) * edge_rev(c, &z->edge, next)
+			     : next->pdf_rev) /
+		     next->pdf;
 	}
 	return sum;
 }
@@ -251,7 +265,7 @@ bool merged_of(struct path_context *c, const struct photon *p, unsigned t, struc
 	spectrum l = spectrum_mul(spectrum_mul(z->beta, p->beta), path_scatter(c, z, z->to_prev, to_light));
 	out->brings = intensity_of(c, l);
 	/* q_{s-1}, be there such a technique or not */
-	double q = path_pdf(c, z - 1, z, &y, TRANSPORT_RADIANCE) / (p->pdf * p->prev.pdf),
+	double q = path_pdf(c, z - 1, z, &y, TRANSPORT_RADIANCE) * p->edge_rev / (p->pdf * p->prev.pdf),
 	       joined = (p->prev.delta ? 0 : 1) + p->fewer_through;
 	out->bdpt = out->brings / (q * p->fewer + joined / p->pdf + sum_more(c, &y, t));
 	out->path = out->brings / (q * p->path + p->path_through / p->pdf);

@@ -17,6 +17,7 @@ struct photon {
 	spectrum beta;
 	double pdf; /* per area, of landing here */
 	unsigned s;
+	double edge_rev; /* what media on the way contribute to the density of prev as generated from here */
 	struct {
 		enum vertex_kind kind;
 		int32_t emitter;
@@ -54,7 +55,8 @@ struct merged {
 /* Traces that many light sub-paths, with numbers of RNG_CHOICE. Ticks. -ENOMEM; merging_fini frees either way. */
 int merging_photons(struct merging *m, struct path_context *c, uint64_t seed, uint64_t step, uint64_t paths);
 void merging_fini(struct merging *m);
-/* A sample of the camera, one of as many as there are sub-paths of light. false: it meets no rough surface. */
+/* A sample of the camera, one of as many as there are sub-paths of light. false: it meets no rough surface, or an event
+ * in a medium before it. */
 bool merging_walk(const struct merging *m, struct path_context *c, uint64_t seed, uint64_t step, uint64_t index,
 		  struct merging_place *out);
 /* Each path that this sample makes with the photons around its place. */

@@ -9,6 +9,7 @@
 #include "worker/render/path/full_path_density.h"
 #include "worker/render/path/integrate_path.h"
 #include "worker/render/path/measure.h"
+#include "worker/render/path/media.h"
 #include "worker/render/path/merging.h"
 
 #include <setjmp.h>
@@ -34,6 +35,13 @@
 #define PANE(y)                                                                                                                 \
 	"<shape type='rectangle'>" AT("<scale value='1.9'/><rotate x='1' angle='80'/><translate y='" y "'/>")                    \
 	"<bsdf type='thindielectric'/></shape>"
+/* The room, its corners left out, is full of fog; beside it a ball of denser fog. */
+#define FOG(side, sigma_t)                                                                                                      \
+	"<medium type='homogeneous' name='" side "'><rgb name='sigma_t' value='" sigma_t "'/>"                                   \
+	"<rgb name='albedo' value='0.9,0.8,0.6'/><phase type='hg'><float name='g' value='0.4'/></phase></medium>"
+#define FOGGY                                                                                                                   \
+	"<shape type='cube'>" AT("<scale x='1.4' y='1.3' z='1'/><translate y='-0.6'/>") "<bsdf type='null'/>"                    \
+	FOG("interior", "0.3,0.5,0.8") "</shape>"
 /* clang-format on */
 
 enum { EDGES = 8 };
@@ -72,6 +80,14 @@ static bool meet(struct path_context *c, unsigned s, unsigned t)
 	at->delta = false;
 	if (t >= 2)
 		at[-1].pdf_rev = path_pdf(c, y, at, at - 1, TRANSPORT_IMPORTANCE);
+	if (pdf > 0 && EFFECT_IS_ON(c->w, scattering)) {
+		spectrum left;
+		if (!path_see_in_media(c, at, z, &z->edge, &left))
+			return false;
+		path_travel(c, z, left);
+		if (t >= 2)
+			at[-1].pdf_rev *= path_edge_pdf(c, &at->edge, at->edge.before, &at[-1]);
+	}
 	return pdf > 0;
 }
 
@@ -144,6 +160,14 @@ static void test_densities(void **state)
 						  ""),
 				    1000) > 1000);
 	/* Techniques that pass the panes count, too, and some of them end at the photon. */
+	/* Events are vertices, and faces of `null` none. */
+	assert_true(check_densities("fog and a lamp in it",
+				    world_of_text(32, 32,
+						  ROOM LAMP FOGGY "<emitter type='point'><point name='position' "
+								  "value='0.9,-0.4,0.3'/><rgb name='intensity' "
+								  "value='1,1,1'/></emitter>%s",
+						  ""),
+				    2000) > 1000);
 	assert_true(check_densities(
 			    "behind panes",
 			    world_of_text(
