@@ -161,15 +161,26 @@ static void doubt_short_chains(struct making *m)
 	state_no_interval(m->img, ERROR_SHORT);
 }
 
+/* Samples per pixel that may have found light before anything else could: of chains, the independent proposals and the
+ * bootstrap. */
+static double finding_samples(const struct making *m)
+{
+	const struct plan *p = &m->c->plan;
+	double independent = 0;
+	for (uint32_t g = 0; g < p->groups; g++)
+		independent += (double)m->all->group[g].independent;
+	return p->kind == PLAN_CHAINS ? independent / ((double)p->crop_width * p->crop_height)
+				      : (double)p->groups * (double)p->epoch * (double)m->c->rounds;
+}
+
 /* If what no sample has found were in the image, its error would leave the interval. Once samples find such light, it
  * is in the spread between groups. */
 static void doubt_unseen_light(struct making *m)
 {
-	const struct plan *p = &m->c->plan;
 	struct canvas_image *img = m->img;
-	if (p->kind == PLAN_CHAINS || !(img->rel_mse > 0))
+	if (!(img->rel_mse > 0))
 		return;
-	img->rel_mse_unseen = plan_unseen_after(p, (double)p->groups * (double)p->epoch * (double)m->c->rounds);
+	img->rel_mse_unseen = plan_unseen_after(&m->c->plan, finding_samples(m));
 	if (img->rel_mse_doubt || img->rel_mse + IMAGE_UNSEEN_FACTOR * img->rel_mse_unseen <= img->rel_mse_95[1])
 		return;
 	state_no_interval(img, ERROR_UNSEEN);

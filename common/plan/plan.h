@@ -44,7 +44,8 @@ enum {
 /*
  * Light that few samples hardly ever find, such as reflections inside the glass around a lamp for `path`, as a pilot
  * estimates it (worker/render/unseen_light.h): at[i] is the mean over the film of the square of its share in a place's
- * light, for 4^i samples per pixel. All 0: there is none, or no pilot has asked.
+ * light, for 4^i samples per pixel; of chains, samples of the bootstrap and independent proposals. All 0: there is
+ * none, or no pilot has asked.
  */
 enum { PLAN_UNSEEN = 12 };
 struct plan_unseen {

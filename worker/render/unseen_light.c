@@ -158,7 +158,7 @@ int render_unseen_light(const struct world *w, struct plan_request *r, struct er
 	struct plan film;
 	r->unseen = (struct plan_unseen){0};
 	world_summary(w, &summary);
-	if (r->kind != PLAN_SAMPLES || !of || !pilot_scene_has(&summary, "half-vectors"))
+	if (!of || !pilot_scene_has(&summary, "half-vectors"))
 		return 0;
 	int rc = pilot_film(r, &film, e);
 	struct pilot *p = rc ? NULL : mem_alloc(1, sizeof *p);

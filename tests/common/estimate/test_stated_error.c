@@ -350,6 +350,23 @@ static void unseen_light_is_doubtful(void **state)
 	}
 }
 
+/* Chains find light by their 16 independent samples, not by their mutations: by four a pixel, one, or fewer. */
+static void chains_find_by_independent_samples(void **state)
+{
+	(void)state;
+	const uint32_t sizes[] = {2, 4, 64};
+	const double found[] = {2e-3, 3e-3, 3e-3};
+	for (size_t i = 0; i < 3; i++) {
+		struct plan p = group_image_plan(PLAN_CHAINS, sizes[i], sizes[i]);
+		struct dice d = dice_of("chains");
+		struct canvas_image img;
+		p.unseen = (struct plan_unseen){{3e-3, 2e-3, 1e-3}};
+		group_image(&p, less_unequal, &d, &img);
+		assert_true(fabs(img.rel_mse_unseen - found[i]) < 1e-12);
+		canvas_image_fini(&img);
+	}
+}
+
 /* One group in sixteen is five times as bright, another one in each pixel: a firefly that is small enough for the pixel
  * to be believed. The upper bound divides it by 1, what the others found, not by the 1.25 that it makes of it. */
 static double small_fireflies(void *user, uint32_t group, uint32_t pixel)
@@ -488,6 +505,7 @@ int main(void)
 		cmocka_unit_test(unknown_brightness_is_doubtful),
 		cmocka_unit_test(infinite_variance_is_doubtful),
 		cmocka_unit_test(unseen_light_is_doubtful),
+		cmocka_unit_test(chains_find_by_independent_samples),
 		cmocka_unit_test(fireflies_are_divided_by_what_others_found),
 		cmocka_unit_test(words),
 		cmocka_unit_test(black_is_divided_by_the_floor),

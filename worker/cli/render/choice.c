@@ -33,8 +33,6 @@ int choice_make(struct render_arguments *a, const char *folder, const char *name
 	struct scene scene;
 	struct world *w;
 	*out = (struct choice){.made = false};
-	if (!integrator_is_open(&a->plan) && a->plan.kind == PLAN_CHAINS && !plan_wants_rays(&a->plan))
-		return 0;
 	struct asset_folders folders = option_folders(a, folder);
 	struct asset_source assets = asset_search(&folders);
 	int rc = option_scene_read(&scene, &assets, name, a, e);

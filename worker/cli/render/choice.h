@@ -19,7 +19,7 @@ struct choice {
 	char text[512]; /* one line for the user */
 };
 
-/* a: complete except for what is chosen and counted. If nothing is, no world is built. */
+/* a: complete except for what is chosen and counted. */
 int choice_make(struct render_arguments *a, const char *folder, const char *name, struct choice *out, struct error *e);
 /* The same in an existing world. */
 int choice_in_world(const struct world *w, struct render_arguments *a, struct choice *out, struct error *e);
