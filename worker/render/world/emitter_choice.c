@@ -180,8 +180,9 @@ static void choose_for_light(struct world *w, const struct maker *m)
 		w->emitter_pdf[emitter_of_part(w, (uint32_t)(i % n))] += (double)p->share[i] / 2 / p->count;
 	edges(w->emitter_pdf, w->emitter_count, w->emitter_cdf);
 	for (uint32_t i = 0; i < n; i++)
-		m->light[i] =
-			emitter_is_part(w, i) ? w->emitter_pdf[emitter_of_part(w, i)] / emitter_part_denser(w, i) : 0;
+		m->light[i] = emitter_part_shines(w, i)
+				      ? w->emitter_pdf[emitter_of_part(w, i)] / emitter_part_denser(w, i)
+				      : 0;
 }
 
 static int make(struct world *w, struct arena *scratch, uint32_t parts, uint32_t most)
@@ -213,7 +214,7 @@ int emitter_choice_make(struct world *w)
 {
 	uint32_t shining = 0, parts = emitter_part_count(w);
 	for (uint32_t i = 0; i < parts; i++)
-		shining += emitter_is_part(w, i) && w->emitters[emitter_of_part(w, i)].power > 0;
+		shining += emitter_part_shines(w, i);
 	if (shining < 2 || w->emitter_count > EMITTER_CHOICE_MOST || w->accuracy.emitter_choice != SETTING_BY_PLACE)
 		return 0;
 	uint32_t most = VALUES / parts;

@@ -25,15 +25,17 @@ static inline uint32_t emitter_part_count(const struct world *w)
 	return w->emitter_count + (divided ? ENVIRONMENT_PARTS : 0);
 }
 
-/* Divided emitters are no part themselves. */
-static inline bool emitter_is_part(const struct world *w, uint32_t part)
-{
-	return part >= w->emitter_count || !emitter_is_divided(w, (int32_t)part);
-}
-
 static inline int32_t emitter_of_part(const struct world *w, uint32_t part)
 {
 	return part < w->emitter_count ? (int32_t)part : w->environment;
+}
+
+/* Divided emitters are no part themselves; those of power 0 may have been switched off (effects_apply.h), and nothing
+ * else says so. */
+static inline bool emitter_part_shines(const struct world *w, uint32_t part)
+{
+	return w->emitters[emitter_of_part(w, part)].power > 0 &&
+	       (part >= w->emitter_count || !emitter_is_divided(w, (int32_t)part));
 }
 
 /* How many times denser points of a part lie, if the part is drawn, than those of its emitter. */

@@ -117,7 +117,7 @@ static double offer(const struct world *w, uint32_t part, const struct point *x,
 	const struct emitter *em = world_emitter(w, emitter_of_part(w, part), x->prim.time, &room);
 	struct emitter_point y;
 	double pdf, sum = 0;
-	if (!emitter_is_part(w, part) || !draw_point(w, part, em, x, u, &y, to, &pdf))
+	if (!emitter_part_shines(w, part) || !draw_point(w, part, em, x, u, &y, to, &pdf))
 		return 0;
 	double cosine = vec3_dot(x->ng, to->d);
 	if (x->opaque && !(cosine > 0))

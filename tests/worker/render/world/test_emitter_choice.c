@@ -149,6 +149,28 @@ static void test_without(void **state)
 	world_free(w);
 }
 
+/* Emitters that were switched off are there still, and are never chosen. */
+static void test_switched_off(void **state)
+{
+	(void)state;
+	static const char *const off[] = {"-area-light", "-delta-light", "-environment"};
+	const char *lights = FLOOR LAMP("2", "1", "0", "0.2", "9") POINT_LIGHT("0", "3", "-2", "1") SKY;
+	for (int32_t which = 0; which < 3; which++) {
+		worlds_effects = off[which];
+		struct world *w = world_by(NULL, lights);
+		worlds_effects = NULL;
+		assert_non_null(w->emitter_choice);
+		assert_true(w->emitter_pdf[which] == 0);
+		for (int i = 0; i < 1000; i++) {
+			const double u[3] = {0.5, 0.5, (i + 0.5) / 1000};
+			struct emitter_pick pick;
+			assert_true(emitter_choice_pick(w, in_world(w, 1, 0, 0.3), u, &pick));
+			assert_int_not_equal(pick.emitter, which);
+		}
+		world_free(w);
+	}
+}
+
 /* At places within the scene and far from it: emitters are drawn as often as densities say. For an emitter that is not
  * divided `denser` is its chance; for the environment its mean over evenly drawn points is. 100,000 draws find a chance
  * that is off by 2 %. */
@@ -235,6 +257,7 @@ int main(void)
 		cmocka_unit_test(test_obstacles),
 		cmocka_unit_test(test_rooms),
 		cmocka_unit_test(test_without),
+		cmocka_unit_test(test_switched_off),
 		cmocka_unit_test(test_densities),
 		cmocka_unit_test(test_the_same_twice),
 		cmocka_unit_test(test_the_same_image),
