@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Points at which paths from the camera scatter (emitter_points.h) are sorted into cells by halving them across the
- * longest axis of their box, again and again. Each cell has its chances.
+ * longest axis of their box that can, again and again. Each cell has its chances.
  *
  * If emitter e is chosen with probability p_e, the second moment of the light that a point gets is sum c_e^2 / p_e, c_e
  * being what e brings. Relative to all light there, and averaged over the points of a cell, it is sum a_e / p_e, a_e
@@ -10,8 +10,8 @@
  * their emitter by power and by the shares of the whole scene, one half each; in DEFENSIVE of all cases cells do so,
  * too, so that light which no point has met is chosen as well, and weights stay bounded.
  *
- * Failures: without memory. Where too few points get direct light (all lamps are in frosted glass), or emitters are too
- * many, power alone decides.
+ * Failures: without memory. Where too few points get light by a straight line (all lamps shine at mirrors), or emitters
+ * are too many, power alone decides.
  */
 #include "worker/render/world/emitter_choice.h"
 
@@ -90,13 +90,41 @@ double emitter_choice_denser(const struct world *w, vec3 p, int32_t emitter, con
 
 /* ---- making it ---- */
 
-static unsigned longest_axis(const struct point_tree_node *nodes, size_t count)
+/* The axes by the lengths of the nodes' box, the longest first. */
+static void sort_axes(const struct point_tree_node *nodes, size_t count, unsigned axis[3])
 {
 	struct box box = box_empty();
 	for (size_t i = 0; i < count; i++)
 		box_grow(&box, nodes[i].p);
 	vec3 side = vec3_sub(box.high, box.low);
-	return side.x >= side.y && side.x >= side.z ? 0 : side.y >= side.z ? 1 : 2;
+	for (unsigned k = 0; k < 3; k++) {
+		unsigned at = k;
+		for (; at > 0 && point_along(side, axis[at - 1]) < point_along(side, k); at--)
+			axis[at] = axis[at - 1];
+		axis[at] = k;
+	}
+}
+
+static bool is_divided(const struct point_tree_node *nodes, size_t middle, unsigned axis)
+{
+	for (size_t i = 0; i < middle; i++)
+		if (point_along(nodes[i].p, axis) >= point_along(nodes[middle].p, axis))
+			return false;
+	return true;
+}
+
+/* Sorts what is below nodes[middle] before it. Returns the axis, the longest that can: a floor has one height, and its
+ * points would all be above, where those before `middle` are not looked for. */
+static unsigned divide(struct point_tree_node *nodes, size_t count, size_t middle)
+{
+	unsigned axis[3];
+	sort_axes(nodes, count, axis);
+	for (int k = 0; k < 3; k++) {
+		point_tree_partition(nodes, count, middle, axis[k]);
+		if (is_divided(nodes, middle, axis[k]))
+			return axis[k];
+	}
+	return axis[2];
 }
 
 static double *sums_of(const struct maker *m, uint32_t node)
@@ -118,8 +146,7 @@ static void halve(const struct maker *m, uint32_t node, struct point_tree_node *
 		return;
 	}
 	size_t middle = count / 2;
-	unsigned axis = longest_axis(nodes, count);
-	point_tree_partition(nodes, count, middle, axis);
+	unsigned axis = divide(nodes, count, middle);
 	m->to->cuts[node] = (struct cut){axis, point_along(nodes[middle].p, axis)};
 	halve(m, 2 * node, nodes, middle);
 	halve(m, 2 * node + 1, &nodes[middle], count - middle);

@@ -1,10 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Walks leave the camera, and scatter evenly around the normal wherever they meet a surface that scatters, or straight
- * on and by reflection where it is specular: what materials would do more exactly does not matter for which lamps are
- * near. At each point x, emitter e offers what one point of it would bring if nothing were between. The greatest offers
- * are tested by shadow rays, until what is left is faint; so the work grows with the emitters that matter at x, not
- * with all.
+ * Walks leave the camera. A surface that scatters sends them on diffusely, a specular one straight through or by
+ * reflection: what materials would do more exactly does not matter for which lamps are near. At each point x, emitter e
+ * offers what one point of it would bring if nothing were between. The greatest offers are tested by shadow rays, until
+ * what is left is faint; so the work grows with the emitters that matter at x, not with all.
  *
  * Failures: without memory. There may be fewer points than wanted, or none, where walks leave the scene.
  */

@@ -12,14 +12,19 @@
 #include "worker/render/world/emitter_part.h"
 #include "worker/render/world/emitter_points.h"
 
+#include <fenv.h>
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdlib.h>
 
 #include <cmocka.h>
 
 /* clang-format off */
 #define FLOOR                                                                                                         \
 	"<shape type='rectangle'><transform name='to_world'><scale value='9'/><rotate x='1' angle='-90'/></transform>"    \
+	"<bsdf type='diffuse'/></shape>"
+#define WALL                                                                                                          \
+	"<shape type='rectangle'><transform name='to_world'><scale value='9'/><translate z='-2'/></transform>"            \
 	"<bsdf type='diffuse'/></shape>"
 #define POINT_LIGHT(x, y, z, i)                                                                                       \
 	"<emitter type='point'><point name='position' x='" x "' y='" y "' z='" z "'/>"                                    \
@@ -149,6 +154,35 @@ static void test_without(void **state)
 	world_free(w);
 }
 
+static int by_value(const void *a, const void *b)
+{
+	double x = *(const double *)a, y = *(const double *)b;
+	return (x > y) - (x < y);
+}
+
+/* Each cell has points: a floor's are not all at one side of a cut through its height. Nothing is in shadow, so no two
+ * cells have the same chances. */
+static void test_cells(void **state)
+{
+	(void)state;
+	enum { MOST = 64 * 64, CELLS = MOST / 16 };
+	struct world *w = world_by(NULL, FLOOR WALL POINT_LIGHT("1", "4", "0", "1") POINT_LIGHT("-2", "3", "1", "3"));
+	struct arena arena = {0};
+	struct emitter_points points;
+	static double chance[MOST];
+	unsigned cells = 1;
+	find(w, MOST, &arena, &points);
+	assert_int_equal(points.count, MOST);
+	for (uint32_t i = 0; i < MOST; i++)
+		chance[i] = emitter_choice_denser(w, points.nodes[i].p, 0, &w->emitters[0], NULL);
+	qsort(chance, MOST, sizeof *chance, by_value);
+	for (uint32_t i = 1; i < MOST; i++)
+		cells += chance[i] > chance[i - 1];
+	assert_int_equal(cells, CELLS);
+	arena_fini(&arena);
+	world_free(w);
+}
+
 /* Emitters that were switched off are there still, and are never chosen. */
 static void test_switched_off(void **state)
 {
@@ -213,6 +247,51 @@ static void test_densities(void **state)
 	world_free(w);
 }
 
+/* Lights of extreme power, size and place: no invalid operation, and all densities are finite. */
+static void test_extremes(void **state)
+{
+	(void)state;
+#define FOG                                                                                                   \
+	BALL("0", "0", "0", "20",                                                                             \
+	     "<bsdf type='null'/><medium type='homogeneous' name='interior'><rgb name='albedo' value='0.5'/>" \
+	     "<float name='sigma_t' value='0.1'/></medium>")
+	static const char *const scenes[] = {
+		FLOOR POINT_LIGHT("0", "2", "0", "1e25") POINT_LIGHT("0", "1", "0", "1e-25") SKY,
+		FLOOR LAMP("0", "1", "0", "1e-6", "1e20") LAMP("1", "1", "0", "1e-3", "1") SKY,
+		/* in, on and far from the floor, whose middle is near the world's */
+		FLOOR POINT_LIGHT("0", "0", "0", "1") POINT_LIGHT("0", "1e-18", "0", "1")
+			POINT_LIGHT("0", "1e6", "0", "1"),
+		/* half sunk, around the camera, and around everything */
+		FLOOR LAMP("0", "0", "0", "1", "1") LAMP("0", "5", "6", "0.2", "1") LAMP("0", "0", "0", "99", "1"),
+		FOG FLOOR POINT_LIGHT("0", "0", "0", "1") LAMP("1", "1", "0", "0.1", "1e12") SKY,
+	};
+	struct dice dice = dice_of("extreme lights");
+	for (size_t k = 0; k < sizeof scenes / sizeof *scenes; k++) {
+		struct arena arena = {0};
+		struct emitter_points points;
+		feclearexcept(FE_INVALID);
+		struct world *w = world_by("media=shown", scenes[k]);
+		find(w, 600, &arena, &points);
+		for (uint32_t i = 0; i < points.count; i++) {
+			double sum = 0;
+			for (uint32_t e = 0; e < emitter_part_count(w); e++)
+				sum += (double)points.share[(size_t)i * emitter_part_count(w) + e];
+			assert_true(fabs(sum - 1) < 1e-5);
+		}
+		for (int i = 0; i < 2000; i++) {
+			const double u[3] = {dice_throw(&dice), dice_throw(&dice), dice_throw(&dice)};
+			struct emitter_pick pick;
+			vec3 p = points.count ? points.nodes[(uint32_t)i % points.count].p : (vec3){0, 0, 0};
+			assert_true(emitter_choice_pick(w, p, u, &pick));
+			assert_true(pick.denser > 0 && isfinite(pick.denser));
+			assert_true(pick.u[0] >= 0 && pick.u[0] < 1 && pick.u[1] >= 0 && pick.u[1] < 1);
+		}
+		assert_false(fetestexcept(FE_INVALID));
+		arena_fini(&arena);
+		world_free(w);
+	}
+}
+
 static void test_the_same_twice(void **state)
 {
 	(void)state;
@@ -257,8 +336,10 @@ int main(void)
 		cmocka_unit_test(test_obstacles),
 		cmocka_unit_test(test_rooms),
 		cmocka_unit_test(test_without),
+		cmocka_unit_test(test_cells),
 		cmocka_unit_test(test_switched_off),
 		cmocka_unit_test(test_densities),
+		cmocka_unit_test(test_extremes),
 		cmocka_unit_test(test_the_same_twice),
 		cmocka_unit_test(test_the_same_image),
 	};
