@@ -206,6 +206,8 @@ static void choose_for_light(struct world *w, const struct maker *m)
 	for (size_t i = 0; i < (size_t)p->count * n; i++)
 		w->emitter_pdf[emitter_of_part(w, (uint32_t)(i % n))] += (double)p->share[i] / 2 / p->count;
 	edges(w->emitter_pdf, w->emitter_count, w->emitter_cdf);
+	for (uint32_t e = 0; e < w->emitter_count; e++)
+		w->emitter_pdf[e] = chance_of(w->emitter_cdf, e);
 	for (uint32_t i = 0; i < n; i++)
 		m->light[i] = emitter_part_shines(w, i)
 				      ? w->emitter_pdf[emitter_of_part(w, i)] / emitter_part_denser(w, i)
