@@ -42,7 +42,7 @@ int pilot_film(const struct plan_request *r, struct plan *p, struct error *e)
 	of.kind = PLAN_SAMPLES;
 	of.chains = 0;
 	of.groups = of.parts = 1;
-	of.target_error = 0; /* a bound of renders, with groups */
+	of.target_error = 0;		   /* a bound of renders, with groups */
 	if (!plan_request_is_bounded(&of)) /* estimates what errors will cost */
 		of.spp = 1;
 	int rc = plan_make(&of, p, e);
