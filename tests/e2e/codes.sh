@@ -129,6 +129,7 @@ wait $waiter || got=$?
 [ $got -eq 3 ] || fail "waiting for a cancelled job ended with $got"
 [ "$(cat "$DIR/id")" = j2 ] || fail "stdout is not the id alone"
 
+code 0 "$BIN/hslt-render" "$BOX" -o "$DIR/only.exr" --size 16x16 --target-error 100% # the pilot chooses, too
 code 4 "$BIN/hslt-submit" "$BOX" -o "$DIR/bound.exr" --integrator path --spp 16 --target-error 0.01% --wait
 code 0 "$BIN/hslt-submit" "$BOX" -o "$DIR/reached.exr" --integrator path --spp 64 --target-error 500% --wait --json
 grep -q '"id":"j4".*"state":"done"' "$DIR/out" || fail "--json: $(cat "$DIR/out")"
