@@ -35,6 +35,7 @@ enum { NOBODY = 0 /* peers are numbered from 1 */ };
 struct ending {
 	struct ending *next;
 	struct job_record record;
+	bool kept; /* its films stay (keep.h), and it may go on meanwhile */
 };
 
 struct durable_ack {
@@ -117,7 +118,7 @@ static int ledger_end_at_last(struct jobs *jobs, const struct job_record *r, boo
 static int write_end(struct jobs *jobs, const struct job_record *r, bool kept, struct error *e)
 {
 	int rc = ledger_end(jobs->ledger, r, kept, e);
-	if (rc && !r->has_result) /* its merged data is useless now, and may be what fills the disk */
+	if (rc && !r->has_result && !kept) /* its merged data is useless now, and may be what fills the disk */
 		keep_drop(jobs, r->id);
 	if (disk_is_full(rc))
 		keep_drop_all(jobs);
@@ -128,12 +129,12 @@ static int write_end(struct jobs *jobs, const struct job_record *r, bool kept, s
 	return rc;
 }
 
-static void end_later(struct jobs *jobs, const struct job_record *r)
+static void end_later(struct jobs *jobs, const struct job_record *r, bool kept)
 {
 	struct ending *n = mem_alloc(1, sizeof *n);
 	if (!n)
 		return;
-	*n = (struct ending){jobs->endings, *r};
+	*n = (struct ending){jobs->endings, *r, kept};
 	jobs->endings = n;
 	jobs->endings_again = jobs_now(jobs) + jobs->config.retry_seconds;
 }
@@ -145,7 +146,7 @@ void durable_end_again(struct jobs *jobs, const struct job_record *r)
 		return;
 	log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s action=\"it is tried again\"", (unsigned long long)r->id,
 		  log_quote(e.text).text);
-	end_later(jobs, r);
+	end_later(jobs, r, true);
 }
 
 int durable_end(struct jobs *jobs, struct live_job *job)
@@ -166,7 +167,7 @@ int durable_end(struct jobs *jobs, struct live_job *job)
 	job->journal = NULL;
 	/* The journal that write_end deleted took up its room until now. */
 	if (rc && write_end(jobs, &job->record, false, &e))
-		end_later(jobs, &job->record);
+		end_later(jobs, &job->record, false);
 	return 0;
 }
 
@@ -190,7 +191,7 @@ static void end_again(struct jobs *jobs)
 		return;
 	jobs->endings_again = jobs_now(jobs) + jobs->config.retry_seconds;
 	for (struct ending *n; (n = jobs->endings);) {
-		if (write_end(jobs, &n->record, false, &e))
+		if (write_end(jobs, &n->record, n->kept, &e))
 			return;
 		jobs->endings = n->next;
 		mem_free(n);

@@ -4,6 +4,7 @@
  * its job is cancelled, or a lease fails. An end that cannot be written is written later. A job ends and is
  * extended while a flush of its journal goes on.
  */
+#include "coordinator/jobs/durable.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/server/server.h"
 #include "tests/support/folder.h"
@@ -332,6 +333,68 @@ static void a_row_ends_later(void **state)
 	server_close(s);
 }
 
+/* An extension was refused, and so was the end that was to be written for it: the films stay for the next one. With
+ * `extended`, that came before the end could be written. */
+static void an_end_with_films_comes_later(bool extended)
+{
+	struct job_record r;
+	struct ledger_job j;
+	struct error e;
+	staged.keep_bytes = 1 << 30;
+	sent = staged.acknowledged = open_count = 0;
+	staged_start();
+	uint64_t job = staged_submit();
+	work_until(leases_of_the_job(), 0);
+	staged_await_state(job, "done");
+	staged_end(SIGTERM, true);
+	sqlite3_auto_extension((void (*)(void))staged_hook_commits);
+	struct server *s = staged_open_here();
+	sqlite3_reset_auto_extension();
+	assert_non_null(s);
+	struct ledger *l = s->jobs.ledger;
+	assert_int_equal(ledger_read_record(l, job, &r, &e), 0);
+	uint64_t films = spool_film_bytes(s->jobs.spool, job, 1);
+	assert_true(films > 0);
+	staged_disk->fail_ledger = true;
+	durable_end_again(&s->jobs, &r);
+	assert_non_null(s->jobs.endings);
+	staged_disk->fail_ledger = false;
+	assert_int_equal(ledger_get(l, job, &j, &e), 1);
+	size_t size = j.submission_size;
+	assert_true(size > 0);
+	if (extended) {
+		void *submission = copy_of(j.submission, size), *plan = copy_of(j.plan, j.plan_size);
+		struct ledger_job longer = {.id = job,
+					    .extended = r.extended + 1,
+					    .submission = submission,
+					    .submission_size = size,
+					    .plan = plan,
+					    .plan_size = j.plan_size};
+		assert_int_equal(ledger_extend(l, &longer, &e), 0);
+		free(submission);
+		free(plan);
+	}
+	while (s->jobs.endings)
+		uv_run(&s->loop, UV_RUN_ONCE);
+	assert_int_equal(spool_film_bytes(s->jobs.spool, job, 1), films);
+	assert_int_equal(ledger_get(l, job, &j, &e), 1);
+	assert_int_equal(j.submission_size, size);
+	assert_int_equal(j.ended > 0, !extended);
+	server_close(s);
+}
+
+static void a_refused_extension_ends_later(void **state)
+{
+	(void)state;
+	an_end_with_films_comes_later(false);
+}
+
+static void extended_again_before_that(void **state)
+{
+	(void)state;
+	an_end_with_films_comes_later(true);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -346,6 +409,8 @@ int main(void)
 		cmocka_unit_test_setup_teardown(extended_when_memory_has_room, staged_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(extended_when_the_disk_has_room, staged_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_row_ends_later, staged_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(a_refused_extension_ends_later, staged_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(extended_again_before_that, staged_set_up, folder_tear_down),
 	};
 	log_set_level(LOG_LEVEL_ERROR);
 	return staged_open() ? 1 : cmocka_run_group_tests(tests, NULL, NULL);
