@@ -256,6 +256,14 @@ bool merge_error_due(const struct plan *p, uint64_t rounds)
 	return p->target_error > 0 && rounds > 0 && merge_error_next(p, rounds - 1) == rounds;
 }
 
+bool merge_ends_black(const struct plan *p, uint64_t rounds, bool black)
+{
+	static const double samples = 1e6;
+	bool bounded = p->rounds != UINT64_MAX || p->seconds > 0;
+	return black && !bounded && p->kind == PLAN_SAMPLES &&
+	       (double)rounds * (double)plan_round_mutations(p) >= samples;
+}
+
 enum merge_end merge_end_of(const struct plan *p, uint64_t rounds, double seconds, const struct canvas_image *img)
 {
 	if (img && p->target_error > 0 && stated_error_meets(img, p->target_error))
@@ -264,6 +272,8 @@ enum merge_end merge_end_of(const struct plan *p, uint64_t rounds, double second
 		return MERGE_ROUNDS;
 	if (p->seconds > 0 && rounds > 0 && seconds >= p->seconds)
 		return MERGE_TIME;
+	if (img && merge_ends_black(p, rounds, img->black))
+		return MERGE_BLACK;
 	return MERGE_GOES_ON;
 }
 
@@ -272,7 +282,8 @@ const char *merge_end_name(enum merge_end end, bool black)
 	static const char *const names[] = {[MERGE_GOES_ON] = "interrupted",
 					    [MERGE_ROUNDS] = "mutations",
 					    [MERGE_TIME] = "time",
-					    [MERGE_ERROR] = "target-error"};
+					    [MERGE_ERROR] = "target-error",
+					    [MERGE_BLACK] = "black"};
 	return black ? "black" : names[end];
 }
 

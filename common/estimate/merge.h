@@ -42,7 +42,7 @@ void bootstrap_seeds(const struct bootstrap *s, uint32_t group, uint64_t *index)
 void bootstrap_to_canvas(struct bootstrap *s, struct canvas *c);
 
 /* The bound that ended the job. Time and error are checked after complete rounds only. */
-enum merge_end { MERGE_GOES_ON, MERGE_ROUNDS, MERGE_TIME, MERGE_ERROR };
+enum merge_end { MERGE_GOES_ON, MERGE_ROUNDS, MERGE_TIME, MERGE_ERROR, MERGE_BLACK };
 const char *merge_end_name(enum merge_end end, bool black); /* as in the header: "target-error" */
 
 /*
@@ -55,6 +55,12 @@ const char *merge_end_name(enum merge_end end, bool black); /* as in the header:
 bool merge_error_due(const struct plan *p, uint64_t rounds);
 /* The first round after this one at which the error is estimated. */
 uint64_t merge_error_next(const struct plan *p, uint64_t rounds);
+/*
+ * Whether a render ends because its image is black after these rounds: a black image has no error, so a target error
+ * would never end it, and there is no other bound. Samples only, once they are as many as a bootstrap of chains has by
+ * default to find light.
+ */
+bool merge_ends_black(const struct plan *p, uint64_t rounds, bool black);
 /* img: the image of the complete rounds, or NULL if the error is not due. */
 enum merge_end merge_end_of(const struct plan *p, uint64_t rounds, double seconds, const struct canvas_image *img);
 /* Seconds until the plan's time ends the job, at the first complete round after it: after `seconds`, with this many

@@ -134,6 +134,7 @@ struct event {
 			bool doubtful;	  /* its interval is not known: the job does not end by it */
 			double rel_mse, degrees; /* the estimate and its degrees of freedom; 0: not known */
 			double cpu_seconds;	 /* of all merged render leases */
+			bool black;		 /* the image: it has no error */
 		} error_known;
 		struct {
 			uint64_t job;

@@ -272,4 +272,6 @@ void rounds_error_known(struct farm *f, const struct event *ev)
 		rounds_end(f, j, END_ERROR, "");
 	else if (j->ending != END_NONE)
 		rounds_end(f, j, j->ending, "");
+	else if (counts && merge_ends_black(&j->plan, j->rounds, ev->error_known.black))
+		rounds_end(f, j, END_BLACK, "no sample carried light");
 }

@@ -27,7 +27,7 @@ enum job_end {
 	END_MUTATIONS, /* all rounds of the plan */
 	END_TIME,
 	END_ERROR, /* the target error was reached */
-	END_BLACK, /* no bootstrap sample carried light: the image is black */
+	END_BLACK, /* no sample (of chains, of the bootstrap) carried light: the image is black */
 	END_CANCELLED,
 	END_FAILED,
 };

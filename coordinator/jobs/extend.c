@@ -314,7 +314,7 @@ static int extend_ended(struct jobs *jobs, const struct extension_request *q, co
 		return error_set(e, EINVAL, "it has %s, and nothing of it was kept: %s",
 				 strcmp(r->state, "failed") == 0 ? "failed" : "been cancelled", again);
 	if (strcmp(r->reason, job_end_name(END_BLACK)) == 0)
-		return error_set(e, EINVAL, "it is black: chains have nowhere to start");
+		return error_set(e, EINVAL, "it is black: no sample carried light");
 	return start_reading(jobs, q, r, e);
 }
 

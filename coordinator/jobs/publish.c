@@ -109,7 +109,8 @@ static void tell_error(const struct publishing *w)
 					   .rel_mse = w->rc ? NAN : w->image.rel_mse,
 					   .degrees = w->rc ? NAN : w->image.rel_mse_degrees,
 					   .doubtful = !w->rc && doubtful,
-					   .cpu_seconds = w->job->cpu_seconds - w->job->record.bootstrap_cpu_seconds}};
+					   .cpu_seconds = w->job->cpu_seconds - w->job->record.bootstrap_cpu_seconds,
+					   .black = !w->rc && w->image.black}};
 	jobs_step(jobs, &ev);
 	durable_look(jobs, ev.job);
 }

@@ -11,7 +11,8 @@
 
 bool keep_films(const struct jobs *jobs, const struct live_job *job, const struct job_record *r)
 {
-	return jobs->config.keep_bytes && job->canvas && !job->lit.black && canvas_rounds(job->canvas) > 0 &&
+	return jobs->config.keep_bytes && job->canvas && strcmp(r->reason, job_end_name(END_BLACK)) != 0 &&
+	       !job->lit.black && canvas_rounds(job->canvas) > 0 &&
 	       (strcmp(r->state, job_state_name(JOB_DONE)) == 0 || job->overflowed);
 }
 

@@ -196,6 +196,8 @@ static void take_submit(const char **at, struct event *ev, struct plan *p, char 
 			ev->submit.priority = (int)take_number(at);
 		else if (skip_word(at, "mixed"))
 			ev->submit.mixed = true;
+		else if (skip_word(at, "samples"))
+			p->kind = PLAN_SAMPLES;
 		else if (skip_word(at, "owner="))
 			ev->submit.owner = take_word(at, owner);
 		else if (skip_word(at, "verify="))
@@ -212,12 +214,14 @@ static void take_submit(const char **at, struct event *ev, struct plan *p, char 
 			p->seconds = take_number(at);
 		else if (skip_word(at, "target="))
 			p->target_error = take_number(at);
+		else if (skip_word(at, "epoch="))
+			p->epoch = take_count(at);
 		else if (skip_word(at, "boot="))
 			p->bootstrap = take_count(at);
 		else
 			fail_msg("not an option of submit: %s", *at);
 	}
-	p->chains = p->groups * p->parts * 4;
+	p->chains = p->kind == PLAN_CHAINS ? p->groups * p->parts * 4 : 0;
 }
 
 /* [certificate=C] [name=N] [home=H] [start=K], texts of a letter. */
@@ -346,7 +350,8 @@ static void take_job(const char **at, struct event *ev)
 		ev->kind = EVENT_ERROR_KNOWN;
 		ev->error_known.job = take_id(at, "j");
 		ev->error_known.rounds = take_count(at);
-		ev->error_known.rel_error = take_number(at);
+		ev->error_known.black = skip_word(at, "black");
+		ev->error_known.rel_error = ev->error_known.black ? NAN : take_number(at);
 	} else if (skip_word(at, "image")) {
 		ev->kind = EVENT_IMAGE_KNOWN;
 		ev->image_known.job = take_id(at, "j");

@@ -45,6 +45,32 @@ static void looks_are_geometric(void **state)
 	assert_false(merge_error_due(&p, 1));
 }
 
+/* A black image, of at least a million samples, where nothing but an error bounds them. */
+static void black_ends(void **state)
+{
+	(void)state;
+	struct plan p = plan_of(30, 20, 4), q; /* 38,400 samples a round, of a film without a border */
+	struct canvas_image img = {.black = true, .rel_mse = NAN, .rel_mse_upper = NAN};
+	p.rounds = UINT64_MAX;
+	p.border = 0;
+	assert_int_equal(merge_end_of(&p, 26, 0, &img), MERGE_GOES_ON);
+	assert_int_equal(merge_end_of(&p, 27, 0, NULL), MERGE_GOES_ON);
+	assert_int_equal(merge_end_of(&p, 27, 0, &img), MERGE_BLACK);
+	assert_string_equal(merge_end_name(MERGE_BLACK, false), "black");
+	q = p;
+	q.seconds = 10;
+	assert_int_equal(merge_end_of(&q, 27, 5, &img), MERGE_GOES_ON);
+	q = p;
+	q.rounds = 100;
+	assert_int_equal(merge_end_of(&q, 27, 0, &img), MERGE_GOES_ON);
+	q = p;
+	q.kind = PLAN_CHAINS;
+	q.chains = 100;
+	assert_int_equal(merge_end_of(&q, 1000000, 0, &img), MERGE_GOES_ON);
+	img.black = false;
+	assert_int_equal(merge_end_of(&p, 27, 0, &img), MERGE_GOES_ON);
+}
+
 /* At least 0.9 mutations a pixel and group between looks, whatever the plan's rounds are; and steps of a quarter or
  * less, once there are four. */
 static void looks_are_worth_their_cost(void **state)
@@ -213,9 +239,8 @@ static void time_ends_with_a_round(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(looks_are_geometric),
-		cmocka_unit_test(looks_are_worth_their_cost),
-		cmocka_unit_test(stops_are_not_lucky_dips),
+		cmocka_unit_test(looks_are_geometric),	      cmocka_unit_test(black_ends),
+		cmocka_unit_test(looks_are_worth_their_cost), cmocka_unit_test(stops_are_not_lucky_dips),
 		cmocka_unit_test(time_ends_with_a_round),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -163,6 +163,34 @@ static void black(void **state)
 	expect_end(f, JOB_DONE, END_BLACK, 0);
 }
 
+/* 8 x 8 pixels of 8,000 samples a round: the second one makes a million. With another bound it goes on to that. */
+static void black_samples(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(
+		f, (const char *const[]){
+			   START("samples rounds=inf target=0.1 epoch=8000"),
+			   "[12] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+			   "[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, j1 evaluate 1, w1 gets j1 g0 p0 e1",
+			   "[13] error j1 1 black -> -",
+			   "[14] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, j1 evaluate 2, w1 gets j1 g0 p0 e2",
+			   "[14] error j1 2 black -> w1 loses j1 g0 p0 e2, j1 publish 2, "
+			   "j1 is done (black: no sample carried light)",
+			   NULL,
+		   });
+	expect_end(f, JOB_DONE, END_BLACK, 0);
+	f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+				   START("samples rounds=1 target=0.1 epoch=80000"),
+				   "[12] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+				   "[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, j1 evaluate 1",
+				   "[13] error j1 1 black -> j1 publish 1, j1 is done (mutations)",
+				   NULL,
+			   });
+	expect_end(f, JOB_DONE, END_MUTATIONS, 4);
+}
+
 static void cannot_be_prepared(void **state)
 {
 	(void)state;
@@ -392,6 +420,7 @@ int main(void)
 		cmocka_unit_test(chains_disagree),
 		cmocka_unit_test(error_with_the_last_round),
 		cmocka_unit_test(black),
+		cmocka_unit_test(black_samples),
 		cmocka_unit_test(cannot_be_prepared),
 		cmocka_unit_test(broken),
 		cmocka_unit_test(progress_and_rate),

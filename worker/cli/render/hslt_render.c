@@ -488,6 +488,7 @@ int main(int argc, char **argv)
 	}
 	if (s.convergence.verdict == CHAINS_DISAGREE)
 		return 5;
-	bool missed = s.plan.target_error > 0 && s.run.end != MERGE_ERROR && !s.run.lit.black;
+	bool missed =
+		s.plan.target_error > 0 && s.run.end != MERGE_ERROR && s.run.end != MERGE_BLACK && !s.run.lit.black;
 	return missed ? 4 : 0;
 }
