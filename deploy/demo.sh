@@ -16,6 +16,6 @@ case "${1:-}" in
 	;;
 esac
 sh deploy/setup.sh
-echo "building ..."
+echo "building, a minute or two ..."
 make -s -j"$(nproc 2>/dev/null || echo 2)" programs
 exec make -s demo
