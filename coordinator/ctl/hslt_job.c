@@ -60,6 +60,8 @@ static void print_row(const Farm__JobStatus *s, bool owners)
 	printf("%s", s->name);
 	if (*remark)
 		printf("  # %s", remark);
+	else if (s->ended && strcmp(s->reason, "error") == 0) /* "ended by error" reads like a failure */
+		printf("  # target error reached");
 	else if (s->ended && s->target_error > 0 && strcmp(s->reason, s->state) != 0)
 		printf("  # ended by %s", s->reason);
 	printf("\n");
