@@ -32,7 +32,7 @@ ln -s "$(cd "$BIN" && pwd)" "$DIR/home/build/bin"
 	# make has nothing left to do here, but it must agree. By hand there is time between two lines; here it is waited for.
 	awk '/^```sh$/ { on = 1; next } /^```$/ { on = 0 } on' "$ROOT/README.md" "$ROOT"/docs/*.md |
 		sed -e "s/7700/$port/g" -e "s|^make -s\$|make -s -C '$ROOT' programs|" -e 's/ &$/ \& RUNNING="$RUNNING $!"/' \
-			-e "/name two &/a answers --coordinator 127.0.0.1:$port" \
+			-e "/name two /a answers --coordinator 127.0.0.1:$port" \
 			-e "/node1 --threads 1 &/a answers --coordinator 127.0.0.1:$safe --tls farm-ca/ann" -e "s/7701/$safe/g"
 } >"$DIR/commands"
 [ "$(wc -l <"$DIR/commands")" -gt 12 ] || fail "the README has lost its commands"
