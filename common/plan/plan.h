@@ -36,7 +36,7 @@ enum {
 	PLAN_MAX_DEPTH = 128,	  /* edges */
 	PLAN_MUTATIONS_MAX = 160, /* bytes of the mixture's text, with the final 0 */
 	PLAN_MAX_STRATEGIES = 8,  /* entries of the mixture */
-	PLAN_ACCURACY_MAX = 256,  /* bytes of the text, with the final 0 */
+	PLAN_ACCURACY_MAX = 320,  /* bytes of the text, with the final 0 */
 	PLAN_EFFECTS_MAX = 320,
 	PLAN_SPEED_MOST = 20000000, /* mutations or samples a second of one thread: nothing is faster */
 };

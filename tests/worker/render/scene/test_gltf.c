@@ -40,6 +40,8 @@ static void test_twin(void **state)
 	struct asset texture;
 	struct error e;
 	assert_int_equal(folder.open(folder.user, "rgb.hdr", &texture, &e), 0);
+	/* By place, chances would follow the last bits of the cameras, which differ. */
+	worlds_accuracy = "emitter-choice=power";
 	struct picture want = render(world_of_own_scene("gltf", "twin.xml", SIDE, SIDE));
 	gltf_files_make(&f);
 	for (int form = 0; form < GLTF_FORMS; form++) {
@@ -57,6 +59,7 @@ static void test_twin(void **state)
 		assert_true(bright > 0.01 * SIDE * SIDE);
 		picture_fini(&got);
 	}
+	worlds_accuracy = NULL;
 	picture_fini(&want);
 	folder.close(folder.user, &texture);
 }
