@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Which emitter a point of the scene is joined to. Where there are several, the chance of each depends on the place: it
- * is higher for those whose light has been seen to arrive nearby. Elsewhere, and for light sub-paths, it is the same
- * everywhere. After Shirley, Wang and Zimmerman 1996 (sec. 3.3, importances by cell), with cells that follow the points
- * at which camera paths scatter.
+ * is higher for those whose light has been seen to arrive nearby. Light sub-paths choose theirs without regard to a
+ * place. After Shirley, Wang and Zimmerman 1996 (Monte Carlo Techniques for Direct Lighting Calculations), who store
+ * which luminaires matter in cells of space; here the cells follow the points at which camera paths scatter.
  */
 #ifndef WORKER_RENDER_WORLD_EMITTER_CHOICE_H
 #define WORKER_RENDER_WORLD_EMITTER_CHOICE_H
