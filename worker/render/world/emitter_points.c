@@ -33,6 +33,13 @@ struct point {
 	bool opaque;
 };
 
+/* Where a shadow ray ends. */
+struct target {
+	struct ray_end end; /* not at infinity */
+	bool infinite;
+	vec3 d; /* unit */
+};
+
 struct finder {
 	const struct world *w;
 	bool opens; /* some surface lets light through */
@@ -42,7 +49,8 @@ struct finder {
 	struct offer {
 		double light;
 		bool tested;
-	} * offers; /* one for each part */
+	} * offers;		/* one for each part, */
+	struct target *targets; /* and where it comes from */
 };
 
 /* ---- what emitters bring ---- */
@@ -52,13 +60,6 @@ static bool lets_light_through(const struct world *w, uint32_t shape)
 	const struct world_shape *part = &w->parts[shape];
 	return part->passable || (w->bsdfs[part->bsdf].modes & BSDF_TRANSMIT);
 }
-
-/* Where a shadow ray ends. */
-struct target {
-	struct ray_end end; /* not at infinity */
-	bool infinite;
-	vec3 d; /* unit */
-};
 
 /* Whether light arrives along a straight line, not bent by what it passes. */
 static bool arrives(const struct finder *f, const struct point *x, const struct target *y)
@@ -147,20 +148,18 @@ static void numbers(uint64_t walk, uint64_t step, uint64_t use, double u[4])
 static void add(struct finder *f, const struct point *x, uint64_t walk, uint64_t step)
 {
 	const struct world *w = f->w;
-	struct target to;
 	double u[4], arrived = 0, sum = 0;
 	numbers(walk, step, 1, u);
 	const struct wavelengths wl = world_wavelengths(w, u[2]);
 	for (uint32_t i = 0; i < f->parts; i++)
-		f->offers[i] = (struct offer){offer(w, i, x, u, &wl, &to), false};
+		f->offers[i] = (struct offer){offer(w, i, x, u, &wl, &f->targets[i]), false};
 	for (int n = 0; n < TESTS; n++) {
 		uint32_t i = greatest_untested(f->offers, f->parts);
 		if (i == UINT32_MAX || f->offers[i].light < FAINT * arrived)
 			break;
-		offer(w, i, x, u, &wl, &to);
 		f->offers[i].tested = true;
 		f->rays++;
-		if (arrives(f, x, &to))
+		if (arrives(f, x, &f->targets[i]))
 			arrived += f->offers[i].light;
 		else
 			f->offers[i].light = 0;
@@ -268,7 +267,8 @@ int emitter_points_find(const struct world *w, uint32_t most, struct arena *aren
 	out->nodes = arena_alloc(arena, most, sizeof *out->nodes);
 	out->share = arena_alloc(arena, (size_t)most * f.parts, sizeof *out->share);
 	f.offers = arena_alloc(arena, f.parts, sizeof *f.offers);
-	if (!out->nodes || !out->share || !f.offers)
+	f.targets = arena_alloc(arena, f.parts, sizeof *f.targets);
+	if (!out->nodes || !out->share || !f.offers || !f.targets)
 		return -ENOMEM;
 	for (uint32_t i = 0; i < w->shape_count; i++)
 		f.opens |= lets_light_through(w, i);
