@@ -266,6 +266,18 @@ static void extended_after_its_end_was_written_late(void **state)
 	staged_end(SIGKILL, false);
 }
 
+/* Done, with its films. */
+static uint64_t done_and_kept(void)
+{
+	staged.keep_bytes = 1 << 30;
+	sent = staged.acknowledged = open_count = 0;
+	staged_start();
+	uint64_t job = staged_submit();
+	work_until(leases_of_the_job(), 0);
+	staged_await_state(job, "done");
+	return job;
+}
+
 /* What was kept of a job has chain states, for which another one leaves no room in memory. */
 static void extended_when_memory_has_room(void **state)
 {
@@ -294,17 +306,22 @@ static void extended_when_memory_has_room(void **state)
 static void extended_when_the_disk_has_room(void **state)
 {
 	(void)state;
-	staged.keep_bytes = 1 << 30;
-	sent = staged.acknowledged = open_count = 0;
-	staged_start();
-	uint64_t job = staged_submit();
-	work_until(leases_of_the_job(), 0);
-	staged_await_state(job, "done");
+	uint64_t job = done_and_kept();
 	staged_disk->no_room = true;
 	extend(job, 6400, "it cannot continue: extend it when the disk has room: ");
 	staged_disk->no_room = false;
 	extend(job, 6400, NULL);
 	staged_end(SIGKILL, false);
+}
+
+/* The server, in this process, with a ledger that can be made to fail. */
+static struct server *open_here(void)
+{
+	sqlite3_auto_extension((void (*)(void))staged_hook_commits);
+	struct server *s = staged_open_here();
+	sqlite3_reset_auto_extension();
+	assert_non_null(s);
+	return s;
 }
 
 /* Without a result its end waits in a list. */
@@ -316,10 +333,7 @@ static void a_row_ends_later(void **state)
 	staged_start();
 	uint64_t job = staged_submit();
 	staged_end(SIGKILL, false);
-	sqlite3_auto_extension((void (*)(void))staged_hook_commits);
-	struct server *s = staged_open_here();
-	sqlite3_reset_auto_extension();
-	assert_non_null(s);
+	struct server *s = open_here();
 	staged_disk->fail_ledger = true;
 	jobs_step(&s->jobs, &(struct event){.kind = EVENT_CANCEL, .job = job});
 	assert_true(s->jobs.endings && !s->jobs.live);
@@ -340,17 +354,9 @@ static void an_end_with_films_comes_later(bool extended)
 	struct job_record r;
 	struct ledger_job j;
 	struct error e;
-	staged.keep_bytes = 1 << 30;
-	sent = staged.acknowledged = open_count = 0;
-	staged_start();
-	uint64_t job = staged_submit();
-	work_until(leases_of_the_job(), 0);
-	staged_await_state(job, "done");
+	uint64_t job = done_and_kept();
 	staged_end(SIGTERM, true);
-	sqlite3_auto_extension((void (*)(void))staged_hook_commits);
-	struct server *s = staged_open_here();
-	sqlite3_reset_auto_extension();
-	assert_non_null(s);
+	struct server *s = open_here();
 	struct ledger *l = s->jobs.ledger;
 	assert_int_equal(ledger_read_record(l, job, &r, &e), 0);
 	uint64_t films = spool_film_bytes(s->jobs.spool, job, 1);

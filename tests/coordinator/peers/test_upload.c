@@ -295,10 +295,10 @@ static void who_goes_midway_leaves_nothing(void **state)
 	scripted_hang_up(client);
 }
 
-/* While the first file is flushed, all others of half a scene have arrived. */
-static void the_loop_removes_few_files(void **state)
+/* A client that has sent half a scene, of which the first file is being flushed: all but a few of the others will be
+ * flushed together. */
+static struct scripted *sends_half(void)
 {
-	(void)state;
 	struct scripted *client = call_client();
 	submit_many(client);
 	assert_int_equal(peer_submit_answer(client)->n_missing, FILES);
@@ -306,6 +306,14 @@ static void the_loop_removes_few_files(void **state)
 	send_files(client, 0, FILES / 2);
 	peer_say_empty(client, FARM__ENVELOPE__BODY_JOB_LIST);
 	assert_int_equal(scripted_hear(client)->body_case, FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
+	return client;
+}
+
+/* While the first file is flushed, all others of half a scene have arrived. */
+static void the_loop_removes_few_files(void **state)
+{
+	(void)state;
+	struct scripted *client = sends_half();
 	scripted_hang_up(client);
 	served_works_again();
 	assert_in_range(leftovers(), FILES / 2, FILES);
@@ -326,13 +334,7 @@ static void the_loop_removes_few_files(void **state)
 static void nobody_flushes_for_nobody(void **state)
 {
 	(void)state;
-	struct scripted *client = call_client();
-	submit_many(client);
-	assert_int_equal(peer_submit_answer(client)->n_missing, FILES);
-	flushes->hold = true;
-	send_files(client, 0, FILES / 2); /* all but a few are flushed together, once these are */
-	peer_say_empty(client, FARM__ENVELOPE__BODY_JOB_LIST);
-	assert_int_equal(scripted_hear(client)->body_case, FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
+	struct scripted *client = sends_half();
 	flushes->from = flushes->elsewhere + 20;
 	flushes->hold = false;
 	for (int i = 0; i < 6000 && flushes->elsewhere < flushes->from; i++)

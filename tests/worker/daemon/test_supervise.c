@@ -71,29 +71,29 @@ static int supervised(void (*hang_up)(int))
 	return WEXITSTATUS(status);
 }
 
+/* Whatever the process of that number ends with is the program's exit code, and no other process follows. */
+static void is_the_last(int process, const int *codes, size_t count)
+{
+	for (size_t i = 0; i < count; i++) {
+		plan->ends[process] = codes[i];
+		assert_int_equal(supervised(SIG_DFL), codes[i]);
+		assert_int_equal(plan->lives, process + 1);
+	}
+}
+
 static void first_ends(void **state)
 {
 	(void)state;
-	static const int codes[] = {0, 1, 2, 6, 75};
-	for (size_t i = 0; i < sizeof codes / sizeof *codes; i++) {
-		plan->ends[0] = codes[i];
-		assert_int_equal(supervised(SIG_DFL), codes[i]);
-		assert_int_equal(plan->lives, 1);
-	}
+	is_the_last(0, (const int[]){0, 1, 2, 6, 75}, 5);
 }
 
 static void later_ones_cannot_start(void **state)
 {
 	(void)state;
-	static const int codes[] = {0, 6, 75};
 	plan->ends[0] = BY_SIGNAL + SIGKILL;
 	plan->ends[1] = 1;
 	plan->ends[2] = 2;
-	for (size_t i = 0; i < sizeof codes / sizeof *codes; i++) {
-		plan->ends[3] = codes[i];
-		assert_int_equal(supervised(SIG_DFL), codes[i]);
-		assert_int_equal(plan->lives, 4);
-	}
+	is_the_last(3, (const int[]){0, 6, 75}, 3);
 }
 
 static void no_process_for_a_while(void **state)
