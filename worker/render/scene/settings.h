@@ -46,6 +46,17 @@ struct scene_settings {
 	bool unplaced; /* the scene has no sensor: scene_settings_place says where the camera is */
 };
 
+/* The size of what is rendered: the crop window, or the film. */
+static inline uint32_t scene_settings_width(const struct scene_settings *s)
+{
+	return s->crop_width ? s->crop_width : s->width;
+}
+
+static inline uint32_t scene_settings_height(const struct scene_settings *s)
+{
+	return s->crop_width ? s->crop_height : s->height;
+}
+
 /* width, height: override the film's size (0: keep) and its crop window. sensor: which of several, from 1 on. */
 int scene_settings_read(const struct scene *s, uint32_t width, uint32_t height, uint32_t sensor,
 			struct scene_settings *out, struct error *e);

@@ -193,9 +193,7 @@ static bool leave_camera(const struct world *w, uint64_t walk, struct step *s)
 	numbers(walk, 0, 0, u);
 	numbers(walk, 0, 2, v);
 	const struct camera *c = camera_at(&w->camera, u[2], &room);
-	double width = set->crop_width ? set->crop_width : set->width,
-	       height = set->crop_width ? set->crop_height : set->height;
-	double x = set->crop_x + u[0] * width, y = set->crop_y + u[1] * height;
+	double x = set->crop_x + u[0] * scene_settings_width(set), y = set->crop_y + u[1] * scene_settings_height(set);
 	if (!camera_has(c, x, y))
 		return false;
 	s->from = (struct ray_end){.p = camera_point(c, v), .prim = prim_none_at(u[2])};

@@ -19,8 +19,8 @@ static struct view view_of(const struct world *w)
 {
 	const struct camera *c = &w->camera;
 	const struct scene_settings *s = &w->settings;
-	double x = s->crop_x, y = s->crop_y, width = s->crop_width ? s->crop_width : s->width,
-	       height = s->crop_width ? s->crop_height : s->height, more = 1.0 + s->border;
+	double x = s->crop_x, y = s->crop_y, width = scene_settings_width(s), height = scene_settings_height(s),
+	       more = 1.0 + s->border;
 	return (struct view){.slope = {[LEFT] = (x - more - c->center_x) / c->scale,
 				       [RIGHT] = (x + width + more - c->center_x) / c->scale,
 				       [TOP] = (y - more - c->center_y) / c->scale,
@@ -121,7 +121,7 @@ void backs_note(struct world *w)
 	const struct camera *c = &w->camera;
 	const struct scene_settings *s = &w->settings;
 	const struct ray_end from = {.p = camera_point(c, middle), .prim = PRIM_NONE};
-	double width = s->crop_width ? s->crop_width : s->width, height = s->crop_width ? s->crop_height : s->height;
+	double width = scene_settings_width(s), height = scene_settings_height(s);
 	unsigned hits = 0, backs = 0;
 	for (int i = 0; i < SIDE * SIDE; i++) {
 		vec3 d = camera_direction(c, from.p, s->crop_x + (i % SIDE + 0.5) / SIDE * width,
