@@ -33,6 +33,8 @@ if [ "${1:-}" = --one ]; then # one test of the run in folder $2: its list, its 
 	rm "$log.limit"
 	took=$(($(date +%s) - begin))
 	echo "$took $file" >"$log.took"
+	times >"$log.times"
+	used=$(awk 'NR == 2 { gsub("s", ""); split($1, u, "m"); split($2, s, "m"); print int(60 * (u[1] + s[1]) + u[2] + s[2] + 0.5) }' "$log.times")
 
 	count() { # of cmocka's closing lines: "[  PASSED  ] 3 test(s).", of later versions "[  SKIPPED ] tests: 1 test(s), listed below:"
 		sed -n "s/^\[ *$1 *\] \([^ ]*: \)*\([0-9][0-9]*\) test(s).*/\2/p" "$log" | tail -n 1
@@ -60,7 +62,7 @@ if [ "${1:-}" = --one ]; then # one test of the run in folder $2: its list, its 
 			echo "FAILED $name (exit $code)"
 			cat "$log"
 		else
-			echo "ok $name: ${ok:-0} passed, $took s"
+			echo "ok $name: ${ok:-0} passed, $took s, $used s of CPU time"
 		fi
 	} >"$log.shown"
 	# What a test says of itself (figures, reasons for skipping) is kept, and shown when asked for.
