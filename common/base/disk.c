@@ -64,6 +64,7 @@ const struct disk disk_system = {
 	.touch = system_touch,
 	.flock = flock,
 	.opendir = opendir,
+	.readdir = readdir,
 	.capacity = system_capacity,
 	.available = system_available,
 };
@@ -156,4 +157,30 @@ int disk_make_folder(const char *path, struct error *e)
 		*slash = 0;
 	int rc = disk_sync_folder(slash ? parent : ".", e);
 	return there && rc == -EACCES ? 0 : rc; /* exists, but we may not look inside */
+}
+
+void disk_list_begin(struct disk_list *l, const char *path)
+{
+	*l = (struct disk_list){.path = path, .d = disk_opendir(path)};
+	l->fault = l->d ? 0 : errno;
+}
+
+const char *disk_list_next(struct disk_list *l)
+{
+	const struct dirent *f = NULL;
+	do {
+		errno = 0;
+		f = l->d && !l->fault ? disk_readdir(l->d) : NULL;
+		if (!f && errno)
+			l->fault = errno;
+	} while (f && (strcmp(f->d_name, ".") == 0 || strcmp(f->d_name, "..") == 0));
+	return f ? f->d_name : NULL;
+}
+
+int disk_list_end(struct disk_list *l, struct error *e)
+{
+	if (l->d)
+		closedir(l->d);
+	l->d = NULL;
+	return l->fault ? error_file(e, l->fault, l->path) : 0;
 }

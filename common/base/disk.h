@@ -23,29 +23,30 @@
 #include <sys/uio.h>
 
 /* X(result, NAME, parameters, arguments): disk_NAME calls the table's function. */
-#define DISK_CALLS(X)                                                                                               \
-	X(int, open, (const char *path, int flags, mode_t mode), (path, flags, mode))                               \
-	X(int, close, (int fd), (fd))                                                                               \
-	X(ssize_t, read, (int fd, void *bytes, size_t size), (fd, bytes, size))                                     \
-	X(ssize_t, pread, (int fd, void *bytes, size_t size, off_t at), (fd, bytes, size, at))                      \
-	X(ssize_t, write, (int fd, const void *bytes, size_t size), (fd, bytes, size))                              \
-	X(ssize_t, pwritev, (int fd, const struct iovec *parts, int count, off_t at), (fd, parts, count, at))       \
-	X(int, ftruncate, (int fd, off_t size), (fd, size))                                                         \
-	X(int, fallocate, (int fd, int mode, off_t at, off_t size), (fd, mode, at, size))                           \
-	X(int, posix_fallocate, (int fd, off_t at, off_t size), (fd, at, size)) /* returns the error code */        \
-	X(int, fsync, (int fd), (fd))                                                                               \
-	X(int, fdatasync, (int fd), (fd))                                                                           \
-	X(int, rename, (const char *from, const char *to), (from, to))                                              \
-	X(int, unlink, (const char *path), (path))                                                                  \
-	X(int, mkdir, (const char *path, mode_t mode), (path, mode))                                                \
-	X(int, rmdir, (const char *path), (path))                                                                   \
-	X(int, stat, (const char *path, struct stat *st), (path, st)) /* of the link itself */                      \
-	X(int, fstat, (int fd, struct stat *st), (fd, st))                                                          \
-	X(int, touch, (const char *path), (path))                                                                   \
-	X(int, flock, (int fd, int what), (fd, what))                                                               \
-	X(DIR *, opendir, (const char *path), (path))                                                               \
-	X(uint64_t, capacity, (const char *path), (path)) /* bytes of its file system, used or not; 0: not known */ \
-	X(uint64_t, available, (const char *path),                                                                  \
+#define DISK_CALLS(X)                                                                                                \
+	X(int, open, (const char *path, int flags, mode_t mode), (path, flags, mode))                                \
+	X(int, close, (int fd), (fd))                                                                                \
+	X(ssize_t, read, (int fd, void *bytes, size_t size), (fd, bytes, size))                                      \
+	X(ssize_t, pread, (int fd, void *bytes, size_t size, off_t at), (fd, bytes, size, at))                       \
+	X(ssize_t, write, (int fd, const void *bytes, size_t size), (fd, bytes, size))                               \
+	X(ssize_t, pwritev, (int fd, const struct iovec *parts, int count, off_t at), (fd, parts, count, at))        \
+	X(int, ftruncate, (int fd, off_t size), (fd, size))                                                          \
+	X(int, fallocate, (int fd, int mode, off_t at, off_t size), (fd, mode, at, size))                            \
+	X(int, posix_fallocate, (int fd, off_t at, off_t size), (fd, at, size)) /* returns the error code */         \
+	X(int, fsync, (int fd), (fd))                                                                                \
+	X(int, fdatasync, (int fd), (fd))                                                                            \
+	X(int, rename, (const char *from, const char *to), (from, to))                                               \
+	X(int, unlink, (const char *path), (path))                                                                   \
+	X(int, mkdir, (const char *path, mode_t mode), (path, mode))                                                 \
+	X(int, rmdir, (const char *path), (path))                                                                    \
+	X(int, stat, (const char *path, struct stat *st), (path, st)) /* of the link itself */                       \
+	X(int, fstat, (int fd, struct stat *st), (fd, st))                                                           \
+	X(int, touch, (const char *path), (path))                                                                    \
+	X(int, flock, (int fd, int what), (fd, what))                                                                \
+	X(DIR *, opendir, (const char *path), (path))                                                                \
+	X(struct dirent *, readdir, (DIR * d), (d)) /* NULL: the end, or with errno, which was 0 before, an error */ \
+	X(uint64_t, capacity, (const char *path), (path)) /* bytes of its file system, used or not; 0: not known */  \
+	X(uint64_t, available, (const char *path),                                                                   \
 	  (path)) /* bytes of it that may still be written; UINT64_MAX: not known */
 
 #define DISK_MEMBER(result, name, parameters, arguments) result(*name) parameters;
@@ -95,5 +96,17 @@ int disk_replace(const char *path, const void *bytes, size_t size, mode_t mode, 
 int disk_sync_folder(const char *path, struct error *e);
 /* Makes a folder, durably; it may exist already. */
 int disk_make_folder(const char *path, struct error *e);
+
+/* The names in a folder, except . and .., in no order. A folder may fail midway (EIO; ESTALE on NFS), and what was not
+ * listed then is not missing: so every list ends with disk_list_end, which tells. Names may be removed meanwhile. */
+struct disk_list {
+	const char *path; /* not copied */
+	DIR *d;
+	int fault; /* errno; 0: none */
+};
+void disk_list_begin(struct disk_list *l, const char *path);
+const char *disk_list_next(struct disk_list *l); /* valid until the next call; NULL: the end, or an error */
+/* 0: each name was seen, or the caller stopped before; -errno of the first error. */
+int disk_list_end(struct disk_list *l, struct error *e);
 
 #endif

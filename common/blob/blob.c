@@ -128,17 +128,16 @@ static int read_folder(struct blob_store *s, struct error *e)
 	struct found *all = NULL;
 	size_t count = 0;
 	int rc = 0;
-	DIR *d = disk_opendir(s->folder);
-	if (!d)
-		return error_file(e, errno, s->folder);
-	for (struct dirent *f; !rc && (f = readdir(d));) {
+	struct disk_list l;
+	disk_list_begin(&l, s->folder);
+	for (const char *name; !rc && (name = disk_list_next(&l));) {
 		struct stat st;
 		struct blob_hash h;
 		char path[BLOB_PATH_MOST];
-		path_of(s, f->d_name, path);
-		if (strncmp(f->d_name, "tmp.", 4) == 0)
+		path_of(s, name, path);
+		if (strncmp(name, "tmp.", 4) == 0)
 			disk_unlink(path);
-		if (!blob_from_hex(f->d_name, &h))
+		if (!blob_from_hex(name, &h))
 			continue;
 		if (disk_stat(path, &st)) { /* if it cannot be read it is kept */
 			rc = error_file(e, errno, path);
@@ -154,7 +153,8 @@ static int read_folder(struct blob_store *s, struct error *e)
 		all = grown;
 		all[count++] = (struct found){h, (uint64_t)st.st_size, st.st_mtim};
 	}
-	closedir(d);
+	int listed = disk_list_end(&l, rc ? NULL : e);
+	rc = rc ? rc : listed;
 	if (count)
 		qsort(all, count, sizeof *all, by_age);
 	if (!rc)

@@ -470,29 +470,29 @@ static int for_each_issued(const char *folder,
 			   int (*each)(void *user, X509 *cert, const struct tls_peer *who, struct error *e), void *user,
 			   struct error *damage, struct error *e)
 {
-	char path[PATH_SIZE];
-	int rc = path_in(path, e, folder, "", "issued");
-	DIR *d = rc ? NULL : disk_opendir(path);
+	char issued[PATH_SIZE], path[PATH_SIZE];
+	struct disk_list l;
+	int rc = path_in(issued, e, folder, "", "issued");
 	damage->text[0] = 0;
-	if (!rc && !d)
-		return error_file(e, errno, path);
-	for (struct dirent *x; !rc && (x = readdir(d));) {
+	if (rc)
+		return rc;
+	disk_list_begin(&l, issued);
+	for (const char *name; !rc && (name = disk_list_next(&l));) {
 		X509 *cert = NULL;
 		struct tls_peer who;
 		struct error wrong;
-		size_t length = strlen(x->d_name);
-		if (length < 5 || strcmp(x->d_name + length - 4, ".pem") != 0)
+		size_t length = strlen(name);
+		if (length < 5 || strcmp(name + length - 4, ".pem") != 0)
 			continue;
-		rc = path_in(path, e, folder, "issued", x->d_name);
+		rc = path_in(path, e, folder, "issued", name);
 		if (!rc && !read_cert(path, &cert, &wrong) && !tls_read_peer(cert, &who, &wrong))
 			rc = each(user, cert, &who, e);
 		else if (!rc && !*damage->text)
 			*damage = wrong;
 		X509_free(cert);
 	}
-	if (d)
-		closedir(d);
-	return rc;
+	int listed = disk_list_end(&l, rc ? NULL : e);
+	return rc ? rc : listed;
 }
 
 struct revocation {

@@ -46,7 +46,7 @@ static int store_submission(struct jobs *jobs, uint64_t id, const struct submiss
 		live_job_free(*job);
 	}
 	if (rc)
-		spool_drop_job(jobs->spool, id);
+		spool_drop_job(jobs->spool, id, NULL); /* what is left has no row, and goes at the next start */
 	return rc;
 }
 

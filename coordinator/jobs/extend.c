@@ -139,11 +139,12 @@ static int extend_live(struct jobs *jobs, const struct requester *by, struct liv
 static int read_row(const struct jobs *jobs, uint64_t job, struct ledger_job *j, struct error *e)
 {
 	int rc = ledger_get(jobs->ledger, job, j, e);
+	uint64_t bytes = 0;
+	if (rc > 0 && j->submission_size)
+		rc = spool_film_bytes(jobs->spool, job, 1, &bytes, e);
 	if (rc < 0)
 		return error_prefix(e, rc, "what was kept of it");
-	return rc && j->submission_size && spool_film_bytes(jobs->spool, job, 1)
-		       ? 0
-		       : error_set(e, ENOENT, "its films have been deleted: %s", again);
+	return bytes ? 0 : error_set(e, ENOENT, "its films have been deleted: %s", again);
 }
 
 /* The journal's numbers are from shortly before the end: the record of the end is more accurate. */

@@ -88,23 +88,24 @@ static int has_results(const struct spool *spool, uint64_t id, bool started, str
 	struct stat st;
 	int any = 0;
 	spool_job_path(spool, id, NULL, folder);
-	DIR *d = disk_opendir(folder);
-	if (!d)
-		return errno == ENOTDIR ? 0 : error_file(e, errno, folder);
-	for (struct dirent *f; !any && (errno = 0, f = readdir(d));) {
-		bool journal = strncmp(f->d_name, "journal.", 8) == 0;
-		if (!journal && strcmp(f->d_name, "checkpoint") != 0 && strcmp(f->d_name, "result.exr") != 0)
+	struct disk_list l;
+	disk_list_begin(&l, folder);
+	for (const char *name; !any && (name = disk_list_next(&l));) {
+		bool journal = strncmp(name, "journal.", 8) == 0;
+		if (!journal && strcmp(name, "checkpoint") != 0 && strcmp(name, "result.exr") != 0)
 			continue;
-		spool_job_path(spool, id, f->d_name, path);
+		spool_job_path(spool, id, name, path);
 		if (disk_stat(path, &st))
 			any = error_file(e, errno, path);
 		else
 			any = !journal || started || st.st_size > (off_t)JOURNAL_HEAD;
 	}
-	if (!any && errno)
-		any = error_file(e, errno, folder);
-	closedir(d);
-	return any;
+	struct error fault;
+	int rc = disk_list_end(&l, &fault);
+	if (any || !rc || rc == -ENOTDIR)
+		return any;
+	*e = fault;
+	return rc;
 }
 
 static int look_at(struct looking *l, uint64_t id, struct error *e)
@@ -120,7 +121,9 @@ static int look_at(struct looking *l, uint64_t id, struct error *e)
 		return rc;
 	if (rc)
 		return is_lost(l, id, "jobs.db and jobs-copy.db have no row for it, and its folder has results", e);
-	spool_drop_job(l->jobs->spool, id);
+	struct error left;
+	if (spool_drop_job(l->jobs->spool, id, &left)) /* of no use to anybody, and in nobody's way */
+		log_fault(id, left.text);
 	return 0;
 }
 

@@ -87,18 +87,22 @@ size_t recovery_views(const struct jobs *jobs, struct job_view *v)
 /* ---- jobs that cannot be read ---- */
 
 /* The stored data is damaged: the job's batches can be computed again, with the same bits. Nothing is deleted, since
- * somebody may want to look at it. */
-static void put_aside(struct jobs *jobs, struct live_job *job)
+ * somebody may want to look at it. -errno: some of it is where it was, and would be read again. */
+static int put_aside(struct jobs *jobs, struct live_job *job, struct error *e)
 {
 	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX], aside[SPOOL_PATH_MAX];
 	spool_job_path(jobs->spool, job->id, NULL, folder);
 	spool_job_path(jobs->spool, job->id, "checkpoint", path);
 	spool_job_path(jobs->spool, job->id, "checkpoint.damaged", aside);
+	if (disk_rename(path, aside) && errno != ENOENT)
+		return error_file(e, errno, path);
+	int rc = journal_put_aside(folder, e);
+	if (rc)
+		return rc;
 	live_job_log(job, LOG_SPOOL_FAULT,
 		     "text=\"the job begins anew; what was merged of it stays in %s, as *.damaged\"", folder);
 	live_job_log(job, LOG_JOB_STATE, "state=anew");
-	disk_rename(path, aside);
-	journal_put_aside(folder);
+	return 0;
 }
 
 /* An error of the stored data rather than of the machine: it recurs at every start. ENOENT: its folder is missing. */
@@ -234,8 +238,8 @@ static int take_failure(struct jobs *jobs, struct error *e)
 	*e = r->error;
 	live_job_log(f->job, LOG_SPOOL_FAULT, "text=%s", log_quote(e->text).text);
 	bool anew = rc == -EBADMSG && !f->anew;
-	if (anew)
-		put_aside(jobs, f->job);
+	if (anew && (rc = put_aside(jobs, f->job, e)))
+		anew = false;
 	restore_drop(jobs, f->job);
 	f->job = NULL;
 	if (anew) {
@@ -291,7 +295,8 @@ static int add_found(struct jobs *jobs, const struct ledger_job *j, struct error
 		return give_up(jobs, id, extended, rc, e);
 	}
 	f->record = f->job->record;
-	f->bytes = spool_film_bytes(jobs->spool, id, 2);
+	struct error unread; /* which its reader will meet and tell; here it is only about the share of what is read */
+	spool_film_bytes(jobs->spool, id, 2, &f->bytes, &unread);
 	r->bytes += f->bytes;
 	*r->last = f;
 	r->last = &f->next;

@@ -30,18 +30,23 @@ static uint64_t available(const struct jobs *jobs)
 	return disk_available(path);
 }
 
-/* What ended and running jobs have on the disk besides their images and files. */
-static uint64_t job_bytes(const struct jobs *jobs)
+/* What ended and running jobs have on the disk besides their images and files. false: not all of it could be read. */
+static bool job_bytes(const struct jobs *jobs, uint64_t *sum)
 {
-	uint64_t sum = 0;
-	for (size_t i = 0; i < jobs->ended_count; i++)
-		sum += spool_film_bytes(jobs->spool, jobs->ended[i].id, 1);
-	for (const struct live_job *job = jobs->live; job; job = job->next) {
-		sum += spool_film_bytes(jobs->spool, job->id, 1);
-		if (job->canvas && canvas_is_mapped(job->canvas))
-			sum += canvas_bytes(&job->plan) - canvas_unreserved(job->canvas);
+	uint64_t bytes;
+	bool whole = true;
+	*sum = 0;
+	for (size_t i = 0; i < jobs->ended_count; i++) {
+		whole = spool_film_bytes(jobs->spool, jobs->ended[i].id, 1, &bytes, NULL) == 0 && whole;
+		*sum += bytes;
 	}
-	return sum;
+	for (const struct live_job *job = jobs->live; job; job = job->next) {
+		whole = spool_film_bytes(jobs->spool, job->id, 1, &bytes, NULL) == 0 && whole;
+		*sum += bytes;
+		if (job->canvas && canvas_is_mapped(job->canvas))
+			*sum += canvas_bytes(&job->plan) - canvas_unreserved(job->canvas);
+	}
+	return whole;
 }
 
 int room_could_hold(const struct jobs *jobs, uint64_t bytes, struct error *e)
@@ -49,8 +54,9 @@ int room_could_hold(const struct jobs *jobs, uint64_t bytes, struct error *e)
 	uint64_t left = available(jobs), freed;
 	if (bytes <= left || jobs->found || jobs->reading)
 		return 0;
-	freed = blob_store_bytes(jobs->blobs) + job_bytes(jobs);
-	if (bytes - left <= freed)
+	bool known = job_bytes(jobs, &freed);
+	freed += blob_store_bytes(jobs->blobs);
+	if (!known || bytes - left <= freed)
 		return 0;
 	return error_set(
 		e, ENOSPC,

@@ -10,7 +10,7 @@
 bool room_make(const struct jobs *jobs);
 /* Whether a job can ever be stored that needs so many bytes: given what is free, and what will be once the files of
  * scenes, the films of finished jobs and other running jobs are gone. -ENOSPC; 0 also where it cannot be known yet,
- * while jobs are read. */
+ * while jobs are read, or a folder of the spool cannot be. */
 int room_could_hold(const struct jobs *jobs, uint64_t bytes, struct error *e);
 /* Whether the journals of all running jobs can grow to their limits, and a checkpoint be written then. */
 bool room_is_ample(const struct jobs *jobs);

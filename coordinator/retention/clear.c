@@ -74,13 +74,14 @@ static void clear_if_unneeded(const struct jobs *jobs, struct clearing *c, uint6
 	}
 	bool busy = jobs->peers.uses_result(jobs->peers.user, id);
 	c->again |= busy && now - c->record.ended_seen < fresh_seconds;
-	struct age_job *j = list_push(&c->jobs);
-	if (!j) /* the next round may have memory for it */
+	uint64_t films;
+	struct age_job *j = keep_bytes(jobs, id, &films) ? list_push(&c->jobs) : NULL;
+	if (!j) /* the next round may have memory for it, or be able to read it */
 		return;
 	*j = (struct age_job){.id = id,
 			      .order = order,
 			      .ended = c->record.ended_seen,
-			      .films = spool_film_bytes(jobs->spool, id, 1),
+			      .films = films,
 			      .result = result_bytes(jobs, id),
 			      .busy = busy};
 }
@@ -138,11 +139,19 @@ static void drop_result(struct jobs *jobs, const struct age_job *j, struct job_r
 		  (unsigned long long)j->result, r->ended);
 }
 
-static void drop_record(struct jobs *jobs, const struct age_job *j)
+/* false: some of its folder is left. Without its row that would be taken for the rest of a job that was lost, and the
+ * next start would be refused (reconcile.c), so the record stays until the folder is gone. */
+static bool drop_record(struct jobs *jobs, const struct age_job *j)
 {
-	spool_drop_job(jobs->spool, j->id);
+	struct error e;
+	if (spool_drop_job(jobs->spool, j->id, &e)) {
+		log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s action=\"its record is kept\"", (unsigned long long)j->id,
+			  log_quote(e.text).text);
+		return false;
+	}
 	ended_jobs_remove(jobs, j->id);
 	log_event(LOG_JOB_CLEARED, "job=j%llu what=record", (unsigned long long)j->id);
+	return true;
 }
 
 /* Clears a chosen job, unless it has changed since. */
@@ -160,8 +169,7 @@ static void clear_job(struct jobs *jobs, struct clearing *c, const struct age_jo
 	}
 	if (j->no_result && j->result)
 		drop_result(jobs, j, &c->record, c->now);
-	if (j->no_record) {
-		drop_record(jobs, j);
+	if (j->no_record && drop_record(jobs, j)) {
 		c->ids[c->records++] = j->id;
 		if (c->records == PIECE)
 			drop_rows(jobs, c);

@@ -16,6 +16,16 @@ bool keep_films(const struct jobs *jobs, const struct live_job *job, const struc
 	       (strcmp(r->state, job_state_name(JOB_DONE)) == 0 || job->overflowed);
 }
 
+bool keep_bytes(const struct jobs *jobs, uint64_t job, uint64_t *bytes)
+{
+	struct error e;
+	if (spool_film_bytes(jobs->spool, job, 1, bytes, &e) == 0)
+		return true;
+	log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s action=\"its films stay for now\"", (unsigned long long)job,
+		  log_quote(e.text).text);
+	return false;
+}
+
 void keep_drop(const struct jobs *jobs, uint64_t job)
 {
 	char path[SPOOL_PATH_MAX];
@@ -30,14 +40,17 @@ void keep_drop(const struct jobs *jobs, uint64_t job)
 		log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)job, log_quote(e.text).text);
 }
 
+/* Those that are being read for an extension stay, and so do those that the disk does not delete: they make no room. */
 bool keep_drop_all(const struct jobs *jobs)
 {
 	bool any = false;
-	for (size_t i = 0; i < jobs->ended_count; i++)
-		if (spool_film_bytes(jobs->spool, jobs->ended[i].id, 1)) {
-			keep_drop(jobs, jobs->ended[i].id);
-			any = true;
-		}
+	for (size_t i = 0; i < jobs->ended_count; i++) {
+		uint64_t id = jobs->ended[i].id, before, after;
+		if (!keep_bytes(jobs, id, &before) || !before)
+			continue;
+		keep_drop(jobs, id);
+		any = any || (keep_bytes(jobs, id, &after) && after < before);
+	}
 	return any;
 }
 
@@ -45,7 +58,9 @@ void keep_trim(const struct jobs *jobs)
 {
 	uint64_t left = jobs->config.keep_bytes;
 	for (size_t i = jobs->ended_count; i-- > 0;) { /* starting with the most recent */
-		uint64_t bytes = spool_film_bytes(jobs->spool, jobs->ended[i].id, 1);
+		uint64_t bytes;
+		if (!keep_bytes(jobs, jobs->ended[i].id, &bytes))
+			continue;
 		if (bytes > left)
 			keep_drop(jobs, jobs->ended[i].id);
 		else

@@ -12,7 +12,9 @@
 /* For a job that has just ended. false: it cannot be extended, and nothing need be kept. */
 bool keep_films(const struct jobs *jobs, const struct live_job *job, const struct job_record *r);
 void keep_drop(const struct jobs *jobs, uint64_t job);
-bool keep_drop_all(const struct jobs *jobs); /* deletes the films of listed jobs; true: there were some */
+/* Bytes of a job's films. false: its folder could not be read, which is logged. */
+bool keep_bytes(const struct jobs *jobs, uint64_t job, uint64_t *bytes);
+bool keep_drop_all(const struct jobs *jobs); /* deletes the films of listed jobs; true: some were deleted */
 void keep_trim(const struct jobs *jobs);     /* call after jobs have ended, and at the start */
 
 /* The records of the last ENDED_MAX jobs that ended, oldest first. Reads those of earlier runs; one that cannot be read

@@ -15,6 +15,7 @@
 #include "common/base/crc.h"
 #include "common/base/disk.h"
 #include "common/base/list.h"
+#include "common/base/log.h"
 #include "common/base/mem.h"
 #include "coordinator/store/spool.h"
 
@@ -293,33 +294,38 @@ static bool is_journal(const char *name, uint64_t *generation)
 	return strncmp(again, name, (size_t)length) == 0 && (!name[length] || strcmp(name + length, ".new") == 0);
 }
 
+/* What is left costs room, and is tried again by whoever clears next. A folder that is gone has none. */
 void journal_clear(const char *folder, uint64_t keep)
 {
 	char path[PATH_MOST];
 	uint64_t generation;
-	DIR *d = disk_opendir(folder);
-	for (struct dirent *f; d && (f = readdir(d));) {
-		if (!is_journal(f->d_name, &generation) || generation == keep)
+	struct disk_list l;
+	struct error e;
+	disk_list_begin(&l, folder);
+	for (const char *name; (name = disk_list_next(&l));) {
+		if (!is_journal(name, &generation) || generation == keep)
 			continue;
-		snprintf(path, sizeof path, "%s/%s", folder, f->d_name);
+		snprintf(path, sizeof path, "%s/%s", folder, name);
 		disk_unlink(path);
 	}
-	if (d)
-		closedir(d);
+	int rc = disk_list_end(&l, &e);
+	if (rc && rc != -ENOENT)
+		log_event(LOG_SPOOL_FAULT, "text=%s action=\"journals of no more use may be left there\"",
+			  log_quote(e.text).text);
 }
 
-void journal_put_aside(const char *folder)
+int journal_put_aside(const char *folder, struct error *e)
 {
 	char from[PATH_MOST], to[PATH_MOST + 16];
 	uint64_t generation;
-	DIR *d = disk_opendir(folder);
-	for (struct dirent *f; d && (f = readdir(d));) {
-		if (!is_journal(f->d_name, &generation))
+	struct disk_list l;
+	disk_list_begin(&l, folder);
+	for (const char *name; (name = disk_list_next(&l));) {
+		if (!is_journal(name, &generation))
 			continue;
-		snprintf(from, sizeof from, "%s/%s", folder, f->d_name);
+		snprintf(from, sizeof from, "%s/%s", folder, name);
 		snprintf(to, sizeof to, "%s.damaged", from);
 		disk_rename(from, to);
 	}
-	if (d)
-		closedir(d);
+	return disk_list_end(&l, e);
 }

@@ -113,8 +113,10 @@ void journal_gaps_count(const struct journal_gaps *g, uint64_t stored, uint64_t 
 /* Reads all of it; -ENODATA: the file ends before that. Other errors are those of the disk. */
 int journal_read_at(int fd, void *bytes, size_t size, uint64_t at);
 
-/* Deletes the journal.G's of the folder, except for that of `keep`; UINT64_MAX: all. */
+/* Deletes the journal.G's of the folder, except for that of `keep`; UINT64_MAX: all. If the folder cannot be listed to
+ * its end, some may be left, and that is logged. */
 void journal_clear(const char *folder, uint64_t keep);
-void journal_put_aside(const char *folder); /* renames all of them to journal.G.damaged */
+/* Renames all of them to journal.G.damaged. -errno: the folder could not be listed to its end. */
+int journal_put_aside(const char *folder, struct error *e);
 
 #endif

@@ -77,12 +77,11 @@ int spool_jobs(const struct spool *s, uint64_t **ids, size_t *count, struct erro
 	*ids = NULL;
 	*count = 0;
 	spool_path(s, "jobs", path);
-	DIR *d = disk_opendir(path);
-	if (!d)
-		return error_file(e, errno, path);
+	struct disk_list l;
 	int rc = 0;
-	for (struct dirent *f; !rc && (f = readdir(d));) {
-		if (!is_job_folder(f->d_name, &id))
+	disk_list_begin(&l, path);
+	for (const char *name; !rc && (name = disk_list_next(&l));) {
+		if (!is_job_folder(name, &id))
 			continue;
 		uint64_t *more = list_room(*ids, *count, sizeof *more);
 		if (more)
@@ -90,7 +89,8 @@ int spool_jobs(const struct spool *s, uint64_t **ids, size_t *count, struct erro
 		else
 			rc = error_set(e, ENOMEM, "%s: no memory for its list", path);
 	}
-	closedir(d);
+	int listed = disk_list_end(&l, rc ? NULL : e);
+	rc = rc ? rc : listed;
 	if (rc) {
 		mem_free(*ids);
 		*ids = NULL;
@@ -231,39 +231,41 @@ int spool_check_version(const char got[8], const char known[8], const char *path
 			 got + NAME, known + NAME);
 }
 
-uint64_t spool_film_bytes(const struct spool *s, uint64_t id, unsigned checkpoints)
+int spool_film_bytes(const struct spool *s, uint64_t id, unsigned checkpoints, uint64_t *bytes, struct error *e)
 {
-	char path[SPOOL_PATH_MAX];
-	uint64_t sum = 0;
+	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX];
+	struct disk_list l;
 	struct stat st;
-	spool_job_path(s, id, NULL, path);
-	DIR *d = disk_opendir(path);
-	for (struct dirent *f; d && (f = readdir(d));) {
-		bool checkpoint = strcmp(f->d_name, "checkpoint") == 0;
-		if (!checkpoint && strncmp(f->d_name, "journal.", 8) != 0)
+	int rc = 0;
+	*bytes = 0;
+	spool_job_path(s, id, NULL, folder);
+	disk_list_begin(&l, folder);
+	for (const char *name; (name = disk_list_next(&l));) {
+		bool checkpoint = strcmp(name, "checkpoint") == 0;
+		if (!checkpoint && strncmp(name, "journal.", 8) != 0)
 			continue;
-		spool_job_path(s, id, f->d_name, path);
+		spool_job_path(s, id, name, path);
 		if (disk_stat(path, &st) == 0)
-			sum += (uint64_t)st.st_size * (checkpoint ? checkpoints : 1);
+			*bytes += (uint64_t)st.st_size * (checkpoint ? checkpoints : 1);
+		else if (errno != ENOENT) /* which was deleted meanwhile */
+			rc = error_file(e, errno, path);
 	}
-	if (d)
-		closedir(d);
-	return sum;
+	int listed = disk_list_end(&l, rc ? NULL : e);
+	return rc || listed == -ENOENT ? rc : listed;
 }
 
-void spool_drop_job(const struct spool *s, uint64_t id)
+int spool_drop_job(const struct spool *s, uint64_t id, struct error *e)
 {
-	char path[SPOOL_PATH_MAX];
-	spool_job_path(s, id, NULL, path);
-	DIR *d = disk_opendir(path);
-	for (struct dirent *f; d && (f = readdir(d));) {
-		if (strcmp(f->d_name, ".") == 0 || strcmp(f->d_name, "..") == 0)
-			continue;
-		spool_job_path(s, id, f->d_name, path);
+	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX];
+	struct disk_list l;
+	spool_job_path(s, id, NULL, folder);
+	disk_list_begin(&l, folder);
+	for (const char *name; (name = disk_list_next(&l));) {
+		spool_job_path(s, id, name, path);
 		disk_unlink(path);
 	}
-	if (d)
-		closedir(d);
-	spool_job_path(s, id, NULL, path);
-	disk_rmdir(path);
+	int rc = disk_list_end(&l, e);
+	if (!rc && disk_rmdir(folder))
+		rc = error_file(e, errno, folder);
+	return rc == -ENOENT ? 0 : rc;
 }

@@ -44,9 +44,10 @@ int spool_write(const struct spool *s, uint64_t id, const char *file, const void
 int spool_check_version(const char got[8], const char known[8], const char *path, struct error *e);
 /* All ids that have a folder, ascending; mem_alloc'd, NULL: none. */
 int spool_jobs(const struct spool *s, uint64_t **ids, size_t *count, struct error *e);
-/* Bytes of a job's merged results: its journals, and `checkpoints` times its checkpoint. Any thread. */
-uint64_t spool_film_bytes(const struct spool *s, uint64_t id, unsigned checkpoints);
-/* Deletes the job's folder with its contents. */
-void spool_drop_job(const struct spool *s, uint64_t id);
+/* Bytes of a job's merged results: its journals, and `checkpoints` times its checkpoint; 0 without a folder. After an
+ * error those of the files that could be looked at. Any thread. */
+int spool_film_bytes(const struct spool *s, uint64_t id, unsigned checkpoints, uint64_t *bytes, struct error *e);
+/* Deletes the job's folder with its contents; it may be gone already. -errno: some of it is left. */
+int spool_drop_job(const struct spool *s, uint64_t id, struct error *e);
 
 #endif

@@ -6,6 +6,7 @@ calls='open|openat|creat|opendir|fdopendir|mkdir|mkdirat|rmdir|unlink|unlinkat|r
 calls="$calls|syncfs|read|pread|readv|preadv|write|pwrite|writev|pwritev|fallocate|posix_fallocate|ftruncate|truncate|stat|fstat|lstat"
 calls="$calls|fstatat|utimensat|futimens|flock|lockf|close|fopen|fdopen|freopen|tmpfile|fread|fwrite|fputs|fputc|fprintf|fclose|fflush"
 calls="$calls|mkstemp|mkostemp|mkdtemp|access|chmod|fchmod|nftw|scandir|statvfs|fstatvfs|sendfile|copy_file_range"
+calls="$calls|readdir|closedir|disk_opendir|disk_readdir"
 wrong=$(grep -nE "(^|[^A-Za-z0-9_>.])($calls)\(" $(ls coordinator/*/*.c | grep -v "^coordinator/ctl/") common/blob/*.c \
 	common/base/checked_file.c common/net/authority.c common/film/canvas*.c common/estimate/*.c | grep -v '^coordinator/status/status\.c:')
 if [ -n "$wrong" ]; then

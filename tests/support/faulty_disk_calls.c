@@ -193,6 +193,15 @@ static DIR *do_opendir(const char *path)
 	return d;
 }
 
+static struct dirent *do_readdir(DIR *d)
+{
+	if (is_refused(FAULTY_DISK_READS))
+		return NULL;
+	struct dirent *f = readdir(d);
+	faulty_disk_leave();
+	return f;
+}
+
 static uint64_t do_capacity(const char *path)
 {
 	(void)path;
@@ -206,9 +215,9 @@ static uint64_t do_available(const char *path)
 }
 
 const struct disk faulty_disk_calls = {
-	do_open,     do_close,	   do_read,	 do_pread,	     do_write,
-	do_pwritev,  do_ftruncate, do_fallocate, do_posix_fallocate, do_fsync,
-	do_fsync,    do_rename,	   do_unlink,	 do_mkdir,	     do_rmdir,
-	do_stat,     do_fstat,	   do_touch,	 do_flock,	     do_opendir,
-	do_capacity, do_available,
+	do_open,    do_close,	  do_read,	do_pread,	    do_write,
+	do_pwritev, do_ftruncate, do_fallocate, do_posix_fallocate, do_fsync,
+	do_fsync,   do_rename,	  do_unlink,	do_mkdir,	    do_rmdir,
+	do_stat,    do_fstat,	  do_touch,	do_flock,	    do_opendir,
+	do_readdir, do_capacity,  do_available,
 };

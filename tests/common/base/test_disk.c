@@ -2,6 +2,7 @@
 /* A file that cannot be replaced stays as it was, whichever call fails, and the error is that call's. What has the name
  * of its temporary file already is neither written to nor gives it its mode. */
 #include "common/base/disk.h"
+#include "tests/support/failing_list.h"
 #include "tests/support/folder.h"
 
 #include <setjmp.h>
@@ -116,11 +117,43 @@ static void another_file_in_its_way(void **state)
 	assert_true(stat(other, &st) == 0 && st.st_size == 0);
 }
 
+/* A list that fails after any number of names is not one that ended there; those before are seen. */
+static void a_list_that_fails_midway(void **state)
+{
+	(void)state;
+	enum { FILES = 4 };
+	struct disk_list l;
+	char inside[200];
+	for (int i = 0; i < FILES; i++) {
+		snprintf(inside, sizeof inside, "%s/%d", folder, i);
+		fclose(fopen(inside, "w"));
+	}
+	for (int most = 0; most <= FILES + 1; most++) {
+		int seen = 0;
+		failing_list_begin(folder, most, ESTALE);
+		disk_list_begin(&l, folder);
+		for (const char *name; (name = disk_list_next(&l));) {
+			assert_true(name[0] >= '0' && name[0] < '0' + FILES && !name[1]);
+			seen++;
+		}
+		assert_true(most > FILES || !disk_list_next(&l)); /* and never goes on */
+		assert_int_equal(disk_list_end(&l, &e), most > FILES ? 0 : -ESTALE);
+		assert_int_equal(seen, most > FILES ? FILES : most);
+		assert_true(most > FILES || strstr(e.text, folder));
+		failing_list_end();
+	}
+	snprintf(inside, sizeof inside, "%s/none", folder);
+	disk_list_begin(&l, inside);
+	assert_null(disk_list_next(&l));
+	assert_int_equal(disk_list_end(&l, NULL), -ENOENT);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(replaced_or_unchanged, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(another_file_in_its_way, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(a_list_that_fails_midway, folder_set_up, folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

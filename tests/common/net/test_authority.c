@@ -7,6 +7,7 @@
 #include "common/base/mem.h"
 #include "common/net/authority.h"
 #include "tests/support/faulty_disk.h"
+#include "tests/support/failing_list.h"
 #include "tests/support/folder.h"
 
 #include <stdarg.h>
@@ -236,12 +237,37 @@ static void a_damaged_record(void **state)
 	same_file(ca, "crl.pem", "farm/crl.pem");
 }
 
+/* Certificates that were not listed are neither revoked nor shown, and that is said. */
+static void a_record_that_cannot_be_listed(void **state)
+{
+	(void)state;
+	char ca[120];
+	struct error e;
+	struct authority_entry *list;
+	size_t n;
+	unsigned count;
+	snprintf(ca, sizeof ca, "%s/unlisted", folder);
+	for (int s = INIT; s < RENEWED; s++)
+		assert_int_equal(run_step(ca, (enum step)s, &e), 0);
+	failing_list_begin("/issued", 0, EIO);
+	int revoked = authority_revoke(ca, "node", &count, &e);
+	assert_int_equal(count, 0);
+	assert_non_null(strstr(e.text, "/issued: "));
+	int shown = authority_list(ca, &list, &n, &e);
+	failing_list_end();
+	assert_int_equal(revoked, -EIO);
+	assert_int_equal(shown, -EIO);
+	assert_int_equal(authority_revoke(ca, "node", &count, &e), 0);
+	assert_int_equal(count, 1);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(a_failure_between_key_and_certificate),
 		cmocka_unit_test(a_damaged_record),
 		cmocka_unit_test(a_loss_of_power_undoes_nothing_that_was_reported),
+		cmocka_unit_test(a_record_that_cannot_be_listed),
 	};
 	shared = mmap(NULL, sizeof *shared, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
 	if (shared == MAP_FAILED)

@@ -3,6 +3,7 @@
 #include "coordinator/jobs/reconcile.h"
 
 #include "common/base/disk.h"
+#include "tests/support/failing_list.h"
 #include "tests/support/folder.h"
 
 #include <setjmp.h>
@@ -102,11 +103,25 @@ static void never_accepted(void **state)
 	assert_false(is_there(NULL));
 }
 
+static void listed_in_part(void **state)
+{
+	(void)state;
+	assert_int_equal(spool_write(jobs.spool, JOB, "checkpoint", "films", 5, &e), 0);
+	failing_list_begin("/jobs/j", 0, EIO);
+	int rc = reconcile(&jobs, &e);
+	failing_list_end();
+	ledger_close(jobs.ledger);
+	jobs.ledger = NULL;
+	assert_int_equal(rc, -EIO);
+	assert_true(is_there("checkpoint"));
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(unreadable, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(never_accepted, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(listed_in_part, set_up, tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -5,6 +5,7 @@
 #include "coordinator/retention/ages.h"
 #include "coordinator/retention/clear.h"
 #include "tests/support/bytes_read.h"
+#include "tests/support/failing_list.h"
 #include "tests/support/folder.h"
 #include "tests/support/ledger_files.h"
 
@@ -344,6 +345,31 @@ static void what_has_just_ended_is_fetched_first(void **state)
 	spool_close(jobs.spool);
 }
 
+/* What is left of a folder without a row is taken for a job that was lost, and the next start would be refused: the
+ * row stays until the folder is gone. */
+static void what_is_left_of_a_folder_has_its_row(void **state)
+{
+	(void)state;
+	struct error e;
+	struct ledger_job j;
+	open_jobs();
+	jobs.config.clear_seconds = DAY;
+	add(1, (double)time(NULL) - 90 * DAY);
+	for (int round = 0; round < 2; round++) {
+		if (round == 0)
+			failing_list_begin("/jobs/j1", 0, EIO);
+		jobs.clear_next = 0;
+		do
+			clear_tick(&jobs);
+		while (jobs.clearing);
+		failing_list_end();
+		assert_int_equal(has(1, NULL), round == 0);
+		assert_int_equal(ledger_get(jobs.ledger, 1, &j, &e), round == 0);
+	}
+	ledger_close(jobs.ledger);
+	spool_close(jobs.spool);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -356,6 +382,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(what_has_changed_stays, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(what_is_read_stays, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(what_has_just_ended_is_fetched_first, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(what_is_left_of_a_folder_has_its_row, folder_set_up, folder_tear_down),
 	};
 	log_set_level(LOG_LEVEL_ERROR);
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Films of finished jobs: those that ended first go when there are too many, all go for a running job; results stay. */
+#include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "coordinator/retention/keep.h"
+#include "tests/support/failing_list.h"
 #include "tests/support/folder.h"
 
 #include <fcntl.h>
@@ -156,11 +158,52 @@ static void the_last_are_known_after_a_start(void **state)
 	spool_close(jobs.spool);
 }
 
+static int no_unlink(const char *path)
+{
+	(void)path;
+	errno = EIO;
+	return -1;
+}
+
+/* Whoever needs room asks until there is none to be had: films that cannot go now, because they are being read for an
+ * extension or the disk does not delete them, must not be said to have gone, or the coordinator asks for ever. */
+static void what_cannot_go_makes_no_room(void **state)
+{
+	(void)state;
+	struct error e;
+	char path[128];
+	snprintf(path, sizeof path, "%s/spool", folder);
+	jobs = (struct jobs){0};
+	assert_int_equal(spool_open(&jobs.spool, path, &e), 0);
+	assert_int_equal(ledger_open(&jobs.ledger, path, &e), 0);
+	for (uint64_t id = 1; id <= 3; id++)
+		add(id);
+	fill();
+	struct disk own = disk_system;
+	own.unlink = no_unlink;
+	disk_use(&own);
+	assert_false(keep_drop_all(&jobs));
+	disk_use(NULL);
+	failing_list_begin("/jobs/j", 1, EIO);
+	keep_trim(&jobs); /* of none is it known how much it has */
+	assert_false(keep_drop_all(&jobs));
+	failing_list_end();
+	for (uint64_t id = 1; id <= 3; id++)
+		assert_true(has(id, "checkpoint") && has(id, "journal.2"));
+	jobs.reading = &(struct live_job){.id = 1};
+	assert_true(keep_drop_all(&jobs));
+	assert_false(keep_drop_all(&jobs));
+	assert_true(has(1, "checkpoint") && !has(2, "checkpoint") && !has(3, "journal.2"));
+	ledger_close(jobs.ledger);
+	spool_close(jobs.spool);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(the_first_go_first, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(the_last_are_known_after_a_start, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(what_cannot_go_makes_no_room, folder_set_up, folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,6 +3,7 @@
 #include "coordinator/store/spool.h"
 #include "common/base/disk.h"
 #include "common/base/mem.h"
+#include "tests/support/failing_list.h"
 #include "tests/support/folder.h"
 
 #include <stdarg.h>
@@ -45,7 +46,7 @@ static void jobs_have_folders(void **state)
 	assert_int_equal(spool_write(s, 21, "preview.exr", "bytes", 5, &e), 0);
 	spool_job_path(s, 21, "preview.exr", path);
 	assert_int_equal(access(path, F_OK), 0);
-	spool_drop_job(s, 21);
+	assert_int_equal(spool_drop_job(s, 21, &e), 0);
 	assert_int_equal(spool_jobs(s, &ids, &count, &e), 0);
 	assert_true(count == 2 && ids[0] == 1 && ids[1] == 41);
 	mem_free(ids);
@@ -118,6 +119,40 @@ static void room_is_kept(void **state)
 	spool_close(s);
 }
 
+/* Jobs that were not listed would be forgotten; a job's folder of which something is left is not gone. */
+static void folders_that_cannot_be_listed(void **state)
+{
+	(void)state;
+	struct spool *s;
+	struct error e;
+	char path[SPOOL_PATH_MAX];
+	uint64_t *ids, bytes;
+	size_t count;
+	assert_int_equal(spool_open(&s, folder, &e), 0);
+	for (uint64_t id = 1; id <= 3; id++)
+		assert_int_equal(spool_make_job(s, id, &e), 0);
+	failing_list_begin("/jobs", 2, EIO);
+	assert_int_equal(spool_jobs(s, &ids, &count, &e), -EIO);
+	assert_true(!ids && count == 0);
+	failing_list_end();
+	assert_int_equal(spool_write(s, 2, "checkpoint", "bytes", 5, &e), 0);
+	assert_int_equal(spool_write(s, 2, "journal.1", "bytes", 5, &e), 0);
+	failing_list_begin("/jobs/j2", 1, EIO);
+	assert_int_equal(spool_film_bytes(s, 2, 1, &bytes, &e), -EIO);
+	assert_int_equal(bytes, 5);
+	assert_int_equal(spool_drop_job(s, 2, &e), -EIO);
+	failing_list_end();
+	assert_int_equal(spool_film_bytes(s, 2, 3, &bytes, &e), 0);
+	assert_true(bytes == 5 || bytes == 15);
+	assert_int_equal(spool_drop_job(s, 2, &e), 0);
+	spool_job_path(s, 2, NULL, path);
+	assert_int_not_equal(access(path, F_OK), 0);
+	assert_int_equal(spool_film_bytes(s, 2, 1, &bytes, &e), 0); /* of a job that is gone: none */
+	assert_int_equal(bytes, 0);
+	assert_int_equal(spool_drop_job(s, 2, &e), 0);
+	spool_close(s);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -125,6 +160,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(what_is_larger_than_the_disk, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(room_is_kept, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(jobs_have_folders, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(folders_that_cannot_be_listed, folder_set_up, folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
