@@ -15,6 +15,7 @@
 	X(START, "start", INFO)                            \
 	X(LISTEN, "listen", INFO)                          \
 	X(LIMITS, "limits", INFO)                          \
+	X(STATUS_SOCKET, "status_socket", WARN)            \
 	X(STOP, "stop", INFO)                              \
 	X(LOG_WITHHELD, "log_withheld", WARN)              \
 	X(LOG_DROPPED, "log_dropped", WARN)                \

@@ -4,8 +4,8 @@
  *
  * A reader gets a snapshot first, and then what it subscribes to: jobs, workers, or the snapshot. status_tick compares
  * each job with what was last sent about it and sends only changes; nothing is done while nobody is subscribed. A
- * thread makes the text of snapshots, one at a time, and until it is sent nothing else is. At the end the socket's file
- * is removed if it is still the same.
+ * thread makes the text of snapshots, one at a time, and until it is sent nothing else is. A socket's file that is
+ * removed is made anew within a second. At the end it is removed if it is still the same.
  *
  * A reader that has not read all lines when something changes gets no more of them, but one snapshot at the first tick
  * after it has read: the newest. So at most the lines of one moment wait for it. What waits for all readers counts with
@@ -16,26 +16,23 @@
  */
 #include "coordinator/status/status.h"
 
+#include "common/base/log.h"
 #include "common/base/mem.h"
 #include "coordinator/jobs/listing.h"
 #include "coordinator/peers/session.h"
 #include "coordinator/status/lines.h"
 #include "coordinator/status/snapshot.h"
+#include "coordinator/status/socket_file.h"
 
-#include <errno.h>
-#include <fcntl.h>
-#include <grp.h>
 #include <stddef.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/queue.h>
-#include <sys/socket.h>
-#include <sys/stat.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 enum { READERS_MAX = 64, LINE_BYTES = 4096, UNREAD_MAX = 1 << 20, KERNEL_BYTES = 100000, BACKLOG = 16 };
+
+static const double look_seconds = 1;
 
 enum topic { TOPIC_JOBS = 1, TOPIC_WORKERS = 2, TOPIC_SNAPSHOT = 4 };
 
@@ -69,7 +66,7 @@ struct making {
 struct status_socket {
 	struct peers *peers;
 	struct jobs *jobs;
-	uv_pipe_t listener;
+	uv_pipe_t *listener;	     /* NULL: there is none for now; its data is the socket, NULL once that is closed */
 	LIST_HEAD(, reader) readers; /* with those that are being closed */
 	unsigned reader_count;	     /* without */
 	bool caller_waits;
@@ -79,8 +76,10 @@ struct status_socket {
 	size_t shown_count;
 	uint64_t shown_changes; /* state of the jobs at the last tick */
 	char *path;		/* NULL: inherited */
-	dev_t device;		/* the socket's file; inode 0: none */
-	ino_t inode;
+	char *group;		/* that may connect; NULL: none */
+	struct socket_file file;
+	double looked; /* jobs' s: when the file was last looked for */
+	bool reported; /* that it cannot be made anew, or that another one is there */
 };
 
 /* ---- writing ---- */
@@ -282,6 +281,8 @@ static void begin_making(struct status_socket *t, unsigned changed);
 static void on_connection(uv_stream_t *listener, int status)
 {
 	struct status_socket *t = listener->data;
+	if (!t)
+		return;
 	struct reader *r = status ? NULL : mem_alloc(1, sizeof *r);
 	t->caller_waits = !r && !status; /* and blocks all other readers until it is accepted */
 	if (!r)
@@ -420,13 +421,88 @@ static void publish_changes(struct status_socket *t)
 	t->shown_count = count;
 }
 
+/* ---- start and end ---- */
+
+static void on_listener_closed(uv_handle_t *h)
+{
+	mem_free(h);
+}
+
+static void close_listener(struct status_socket *t)
+{
+	if (!t->listener)
+		return;
+	t->listener->data = NULL;
+	uv_close((uv_handle_t *)t->listener, on_listener_closed);
+	t->listener = NULL;
+}
+
+/* fd: a socket that is bound, which is taken. */
+static int listen_on(struct status_socket *t, int fd, struct error *e)
+{
+	const char *what = t->path ? t->path : "inherited status socket";
+	uv_pipe_t *l = mem_alloc(1, sizeof *l);
+	int fault = l ? uv_pipe_init(t->jobs->loop, l, 0) : UV_ENOMEM;
+	if (fault) {
+		mem_free(l);
+		close(fd);
+		return error_set(e, -fault, "%s: %s", what, uv_strerror(fault));
+	}
+	close_listener(t);
+	l->data = t;
+	t->listener = l;
+	fault = uv_pipe_open(l, fd);
+	if (fault)
+		close(fd);
+	else
+		fault = uv_listen((uv_stream_t *)l, BACKLOG, on_connection);
+	if (fault)
+		close_listener(t);
+	return fault ? error_set(e, -fault, "%s: %s", what, uv_strerror(fault)) : 0;
+}
+
+static void report(struct status_socket *t, const char *text)
+{
+	if (!t->reported)
+		log_event(LOG_STATUS_SOCKET, "path=%s text=%s", log_quote(t->path).text, log_quote(text).text);
+	t->reported = true;
+}
+
+/* The socket's file may be removed while the coordinator runs: by whoever clears old files away, or by hand. Nobody
+ * could connect then until a restart, so it is made anew; those that are connected stay so. What somebody else has put
+ * there is theirs. */
+static void look_for_file(struct status_socket *t)
+{
+	struct error e;
+	if (!t->path || jobs_now(t->jobs) < t->looked + look_seconds)
+		return;
+	t->looked = jobs_now(t->jobs);
+	enum socket_file_state state = socket_file_look(&t->file);
+	if (state == SOCKET_FILE_OTHERS)
+		report(t, "another file is where the status socket was: nobody can ask for the status");
+	if (state == SOCKET_FILE_OURS)
+		t->reported = false;
+	if (state != SOCKET_FILE_GONE)
+		return;
+	int fd = socket_file_open(&t->file, &e), rc = fd < 0 ? fd : listen_on(t, fd, &e);
+	if (rc) {
+		error_prefix(&e, rc, "the status socket's file was removed, and cannot be made anew yet");
+		report(t, e.text);
+		return;
+	}
+	t->reported = false;
+	report(t, "the status socket's file was removed, and has been made anew");
+	t->reported = false;
+}
+
 void status_tick(struct status_socket *t)
 {
 	unsigned topics = 0;
 	if (!t)
 		return;
-	if (t->caller_waits)
-		on_connection((uv_stream_t *)&t->listener, 0);
+	look_for_file(t);
+	if (t->caller_waits && t->listener)
+		on_connection((uv_stream_t *)t->listener, 0);
 	t->tick_waits = t->making;
 	if (t->making) /* what has changed is seen after it has been sent: lines that are newer do not come before it */
 		return;
@@ -442,92 +518,14 @@ void status_tick(struct status_socket *t)
 	begin_making(t, changed ? topics : 0);
 }
 
-/* ---- start and end ---- */
-
-/* A socket on which nobody listens is left over from an earlier run; anything else is in use. */
-static int remove_stale(const char *path, const struct sockaddr_un *a, struct error *e)
+static void free_socket(struct status_socket *t)
 {
-	struct stat st;
-	if (lstat(path, &st))
-		return 0;
-	if (!S_ISSOCK(st.st_mode))
-		return error_set(e, EEXIST, "%s: exists and is not a socket", path);
-	int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-	if (fd < 0)
-		return error_file(e, errno, path);
-	int fault = connect(fd, (const struct sockaddr *)a, sizeof *a) ? errno : 0;
-	close(fd);
-	if (fault == ENOENT)
-		return 0;
-	if (fault == EACCES || fault == EPROTOTYPE)
-		return error_set(e, fault, "%s: the socket of another user: %s", path, strerror(fault));
-	if (fault != ECONNREFUSED) /* EAGAIN: its backlog is full */
-		return error_set(e, EADDRINUSE, "%s: another program answers there", path);
-	return unlink(path) ? error_file(e, errno, path) : 0;
-}
-
-/* Through a descriptor of the file that we created: the name may refer to another one by now. */
-static int give_to_group(const char *path, gid_t group, struct error *e)
-{
-	char itself[64];
-	struct stat st;
-	int fd = open(path, O_PATH | O_NOFOLLOW | O_CLOEXEC);
-	snprintf(itself, sizeof itself, "/proc/self/fd/%d", fd);
-	bool ours = fd >= 0 && fstat(fd, &st) == 0 && S_ISSOCK(st.st_mode) && st.st_uid == geteuid();
-	int rc = 0;
-	if (!ours)
-		rc = error_set(e, fd < 0 ? errno : EEXIST, "%s: is not the socket that was created there", path);
-	else if (fchownat(fd, "", (uid_t)-1, group, AT_EMPTY_PATH) || chmod(itself, 0660))
-		rc = error_set(e, errno, "%s: the group cannot be set: %s", path, strerror(errno));
-	if (fd >= 0)
-		close(fd);
-	return rc;
-}
-
-static int find_group(const char *name, gid_t *group, struct error *e)
-{
-	errno = 0;
-	const struct group *g = getgrnam(name);
-	if (!g)
-		return error_set(e, EINVAL, "--status-group: there is no group '%s'%s%s", name, errno ? ": " : "",
-				 errno ? strerror(errno) : "");
-	*group = g->gr_gid;
-	return 0;
-}
-
-/* Creates a socket at the path, with mode 0600 from the start. libuv would remove the file when it closes, and by
- * then it may be another's. */
-static int open_socket(struct status_socket *t, const char *group, struct error *e)
-{
-	struct sockaddr_un a = {.sun_family = AF_UNIX};
-	struct stat st = {0};
-	gid_t gid = 0;
-	if (strlen(t->path) >= sizeof a.sun_path)
-		return error_set(e, ENAMETOOLONG, "%s: at most %zu bytes for a socket's path", t->path,
-				 sizeof a.sun_path - 1);
-	memcpy(a.sun_path, t->path, strlen(t->path));
-	int rc = group ? find_group(group, &gid, e) : 0;
-	if (!rc)
-		rc = remove_stale(t->path, &a, e);
-	if (rc)
-		return rc;
-	int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-	mode_t mask = umask(0177);
-	if (fd < 0 || bind(fd, (struct sockaddr *)&a, sizeof a))
-		rc = error_file(e, errno, t->path);
-	umask(mask);
-	if (!rc && lstat(t->path, &st) == 0) {
-		t->device = st.st_dev;
-		t->inode = st.st_ino;
-	}
-	if (!rc && group)
-		rc = give_to_group(t->path, gid, e);
-	int fault = rc ? 0 : uv_pipe_open(&t->listener, fd);
-	if (fault)
-		rc = error_set(e, -fault, "%s: %s", t->path, uv_strerror(fault));
-	if (rc && fd >= 0)
-		close(fd);
-	return rc;
+	if (!t)
+		return;
+	mem_free(t->shown);
+	mem_free(t->path);
+	mem_free(t->group);
+	mem_free(t);
 }
 
 int status_open(struct status_socket **out, struct peers *s, int inherited, const char *path, const char *group,
@@ -538,32 +536,17 @@ int status_open(struct status_socket **out, struct peers *s, int inherited, cons
 			e, EINVAL,
 			"--status-group: the socket belongs to the service manager: set SocketGroup= in its unit");
 	struct status_socket *t = mem_alloc(1, sizeof *t);
-	if (!t || (inherited < 0 && !(t->path = mem_strdup(path)))) {
-		mem_free(t);
+	if (!t || (inherited < 0 && !(t->path = mem_strdup(path))) || (group && !(t->group = mem_strdup(group)))) {
+		free_socket(t);
 		return error_set(e, ENOMEM, "no memory for the status socket");
 	}
 	t->peers = s;
 	t->jobs = s->jobs;
-	uv_pipe_init(s->jobs->loop, &t->listener, 0);
-	t->listener.data = t;
+	t->looked = jobs_now(s->jobs);
+	t->file = (struct socket_file){.path = t->path, .group = t->group};
 	*out = t;
-	int fault = 0, rc = 0;
-	if (t->path)
-		rc = open_socket(t, group, e);
-	else
-		fault = uv_pipe_open(&t->listener, inherited);
-	if (!rc && !fault)
-		fault = uv_listen((uv_stream_t *)&t->listener, BACKLOG, on_connection);
-	return fault ? error_set(e, -fault, "%s: %s", t->path ? path : "inherited status socket", uv_strerror(fault))
-		     : rc;
-}
-
-static void on_closed(uv_handle_t *h)
-{
-	struct status_socket *t = h->data;
-	mem_free(t->shown);
-	mem_free(t->path);
-	mem_free(t);
+	int fd = t->path ? socket_file_open(&t->file, e) : inherited;
+	return fd < 0 ? fd : listen_on(t, fd, e);
 }
 
 void status_close(struct status_socket *t)
@@ -577,8 +560,8 @@ void status_close(struct status_socket *t)
 	}
 	if (t->making)
 		t->making->socket = NULL;
-	struct stat st;
-	if (t->path && t->inode && lstat(t->path, &st) == 0 && st.st_dev == t->device && st.st_ino == t->inode)
-		unlink(t->path);
-	uv_close((uv_handle_t *)&t->listener, on_closed);
+	if (t->path)
+		socket_file_remove(&t->file);
+	close_listener(t);
+	free_socket(t);
 }

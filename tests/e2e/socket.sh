@@ -134,17 +134,46 @@ wait $COORDINATOR_PID 2>/dev/null || :
 [ -S "$AT" ] || fail "it should be there still"
 begin
 answers || fail "a stale socket is in the way"
-rm "$AT"
 first=$COORDINATOR_PID
 rm -f "$DIR/port"
+kill -STOP $first # it would put its own there again
+rm "$AT"
 "$BIN/hslt-coordinator" --listen 127.0.0.1:0 --port-file "$DIR/port" --spool "$DIR/other" --status-socket "$AT" 2>>"$DIR/coordinator.log" &
 second=$!
 PIDS="$PIDS $second"
 until_true 10 test -s "$DIR/port" || fail "the second does not start"
+kill -CONT $first
+until_true 10 grep -q 'event=status_socket .*another file' "$DIR/coordinator.log" || fail "the first does not say that nobody can ask it"
 stop $first
 answers || fail "the first removed the second's socket"
 stop $second
 [ ! -e "$AT" ] || fail "the socket stays"
+
+# One that is removed while the coordinator runs is made anew, with its mode, whoever watches stays connected, and the log says so once
+# each time; so does one whose folder is not there for a while.
+mkdir "$DIR/run"
+AT=$DIR/run/at
+begin
+"$BIN/hslt-status" --socket "$AT" --watch >"$DIR/watched" 2>&1 &
+watcher=$!
+PIDS="$PIDS $watcher"
+until_true 10 test -s "$DIR/watched" || fail "nothing is watched"
+for round in 1 2; do
+	rm "$AT"
+	until_true 10 answers 2>"$DIR/err.log" || fail "the socket is not made anew"
+	[ "$(stat -c %a "$AT")" = 600 ] || fail "the mode of the new one is $(stat -c %a "$AT")"
+	[ "$(grep -c 'event=status_socket .*made anew"' "$DIR/coordinator.log")" = $round ] || fail "not logged once in round $round"
+done
+kill -0 $watcher || fail "who watched was cut off: $(cat "$DIR/watched")"
+mv "$DIR/run" "$DIR/gone"
+until_true 10 grep -q 'event=status_socket .*cannot be made anew yet' "$DIR/coordinator.log" || fail "it is not said that the folder is gone"
+mkdir "$DIR/run"
+until_true 10 answers 2>"$DIR/err.log" || fail "the socket is not made anew in a new folder"
+[ "$(grep -c 'event=status_socket .*cannot be made' "$DIR/coordinator.log")" = 1 ] || fail "the same is logged again and again"
+kill $watcher
+stop $COORDINATOR_PID
+[ ! -e "$AT" ] || fail "the new socket stays"
+AT=$DIR/at
 
 # A group.
 if [ "$(id -u)" = 0 ] && command -v setpriv >/dev/null && id daemon >/dev/null 2>&1; then
