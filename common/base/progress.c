@@ -54,6 +54,16 @@ void progress_show(struct progress *p, double fraction, const char *state, const
 	text_copy(p->state, sizeof p->state, state);
 }
 
+double progress_kept(struct progress *p, double fraction, const char *state)
+{
+	if (strcmp(state, p->most_state) != 0) {
+		text_copy(p->most_state, sizeof p->most_state, state);
+		p->most = 0;
+	}
+	p->most = fmax(p->most, fraction);
+	return p->most;
+}
+
 void progress_end(struct progress *p)
 {
 	if (p->drawn)

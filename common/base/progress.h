@@ -13,11 +13,16 @@ struct progress {
 	double shown;	   /* fraction in the last plain line; negative: none yet */
 	double shown_time; /* s */
 	char state[32];	   /* when the last plain line was written */
+	double most;	   /* of progress_kept */
+	char most_state[32];
 };
 
 void progress_start(struct progress *p);
 /* fraction in [0,1]; state: one word; detail: text after the bar. */
 void progress_show(struct progress *p, double fraction, const char *state, const char *detail);
+/* What is done of an amount that is only estimated falls when the estimate grows, or is withdrawn. People are shown the
+ * most that it was in this state; the time that is left tells them the rest. */
+double progress_kept(struct progress *p, double fraction, const char *state);
 void progress_end(struct progress *p); /* leaves the cursor at the start of a line */
 
 /* A rate in few characters: "3.2 k", "12 M"; a time: "1:02:03", "45 s". */

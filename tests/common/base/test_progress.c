@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Lines of progress where there is no terminal: one for each tenth, and one a minute even if nothing changes. */
+/* Lines of progress where there is no terminal: one for each tenth, and one a minute even if nothing changes. What is
+ * shown of an estimate does not fall. */
 #include "common/base/progress.h"
 
 #include <stdarg.h>
@@ -56,8 +57,21 @@ static void test_lines(void **state)
 	assert_string_equal(said, "running 0.0 % a\nrunning 11.0 % d\nrunning 11.0 % f\n");
 }
 
+static void test_never_back(void **state)
+{
+	(void)state;
+	struct progress p;
+	progress_start(&p);
+	assert_true(progress_kept(&p, 0.4, "bootstrap") == 0.4);
+	assert_true(progress_kept(&p, 0.1, "running") == 0.1); /* of something else */
+	assert_true(progress_kept(&p, 0.6, "running") == 0.6);
+	assert_true(progress_kept(&p, 0.3, "running") == 0.6); /* it takes longer than was thought */
+	assert_true(progress_kept(&p, 0, "running") == 0.6);   /* nobody knows any more */
+	assert_true(progress_kept(&p, 0.7, "running") == 0.7);
+}
+
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_lines)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_lines), cmocka_unit_test(test_never_back)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -223,7 +223,7 @@ static void show(void *user, const struct local_progress *p)
 		fraction = fmax(fraction, fraction_of_time(&s->plan, p));
 	progress_time(fraction > 0 ? p->seconds * (1 / fraction - 1) : 0, eta, sizeof eta);
 	snprintf(detail, sizeof detail, "%s%s%s", fraction > 0 ? eta : "", fraction > 0 ? " left" : "", s->forecast);
-	progress_show(&s->progress, fraction, p->state, detail);
+	progress_show(&s->progress, progress_kept(&s->progress, fraction, p->state), p->state, detail);
 }
 
 /* After an estimate of the error: when the target will be reached, and the cost of halving the error, for the
