@@ -465,6 +465,8 @@ int durable_mend(struct jobs *jobs, struct live_job *job)
 		rc = journal_is_bad(job->journal) ? journal_renew(job->journal, &e) : 0;
 		if (rc && rc != -EAGAIN)
 			live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
+		if (!rc && !room_is_left(jobs, job, 2 * job->held_bytes)) /* or its next result would hold it again */
+			rc = -ENOSPC;
 		if (!rc)
 			rc = journal_reserve(job->journal, 2 * job->held_bytes, &e);
 	} while (disk_is_full(rc) && room_make(jobs)); /* of what has been of use until now */

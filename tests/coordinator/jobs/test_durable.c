@@ -5,8 +5,11 @@
  * extended while a flush of its journal goes on.
  */
 #include "coordinator/jobs/durable.h"
+
+#include "common/base/disk.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/server/server.h"
+#include "coordinator/store/journal_file.h"
 #include "tests/support/folder.h"
 #include "tests/support/staged.h"
 
@@ -403,6 +406,42 @@ static void extended_again_before_that(void **state)
 	an_end_with_films_comes_later(true);
 }
 
+static uint64_t none_left(const char *path)
+{
+	(void)path;
+	return 0;
+}
+
+/* Its journal is as long as its checkpoint, and the disk has no room for one: a job that was let go would be held by
+ * its next result, again and again, with all the leases that are computed in between. */
+static void held_until_a_checkpoint_fits(void **state)
+{
+	(void)state;
+	const struct disk *before = disk_calls;
+	struct disk full = *disk_calls;
+	full.available = none_left;
+	struct error e;
+	uint64_t id = staged_begin_a_job();
+	struct server *s = open_here();
+	assert_int_equal(server_await_jobs(s, &e), 0);
+	struct live_job *job = jobs_find(&s->jobs, id);
+	assert_true(job && job->canvas && journal_bytes(job->journal) > JOURNAL_HEAD);
+	uint64_t kept = job->checkpoint_bytes;
+	job->checkpoint_bytes = 1;
+	job->kept_bytes = 0;
+	job->held_bytes = 100;
+	durable_hold(&s->jobs, job, "its results cannot be stored", "the disk is full");
+	disk_use(&full);
+	int rc = durable_mend(&s->jobs, job);
+	disk_use(before);
+	assert_int_equal(rc, -ENOSPC);
+	assert_true(job->held);
+	assert_int_equal(durable_mend(&s->jobs, job), 0);
+	assert_false(job->held);
+	job->checkpoint_bytes = kept;
+	server_close(s);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -416,6 +455,7 @@ int main(void)
 						folder_tear_down),
 		cmocka_unit_test_setup_teardown(extended_when_memory_has_room, staged_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(extended_when_the_disk_has_room, staged_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(held_until_a_checkpoint_fits, staged_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_row_ends_later, staged_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_refused_extension_ends_later, staged_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(extended_again_before_that, staged_set_up, folder_tear_down),
