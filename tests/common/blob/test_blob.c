@@ -4,7 +4,6 @@
 #include "common/blob/blob_batch.h"
 #include "common/blob/blob_check.h"
 #include "common/blob/blob_state.h"
-#include "tests/support/failing_list.h"
 #include "tests/support/folder.h"
 
 #include <stdarg.h>
@@ -594,25 +593,6 @@ static void a_disk_that_is_full(void **state)
 	}
 }
 
-/* Files that were not listed would be unknown, and never deleted: the store is not opened. */
-static void a_folder_that_cannot_be_listed(void **state)
-{
-	(void)state;
-	struct blob_store *s;
-	struct error e;
-	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
-	struct blob_hash one = store_text(s, "one"), two = store_text(s, "two");
-	blob_store_close(s);
-	failing_list_begin(folder, 1, EIO);
-	int rc = blob_store_open(&s, folder, 0, &e);
-	failing_list_end();
-	assert_int_equal(rc, -EIO);
-	assert_non_null(strstr(e.text, folder));
-	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
-	assert_true(blob_has(s, &one, NULL) && blob_has(s, &two, NULL));
-	blob_store_close(s);
-}
-
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -634,7 +614,6 @@ int main(void)
 		cmocka_unit_test_setup_teardown(stored_meanwhile, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(not_flushed, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(knows_many, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(a_folder_that_cannot_be_listed, folder_set_up, folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

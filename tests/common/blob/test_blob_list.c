@@ -1,0 +1,53 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* A store whose folder cannot be listed to its end is not opened: files that were not listed would be unknown, and
+ * never deleted. */
+#include "common/blob/blob.h"
+#include "tests/support/failing_list.h"
+#include "tests/support/folder.h"
+
+#include <errno.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static struct blob_hash store_text(struct blob_store *s, const char *text)
+{
+	struct blob_hash h;
+	struct blob_writer *w;
+	struct error e;
+	assert_int_equal(blob_hash_bytes(text, strlen(text), &h, &e), 0);
+	assert_int_equal(blob_write_begin(&w, s, &h, strlen(text), &e), 0);
+	assert_int_equal(blob_write_add(w, text, strlen(text), &e), 0);
+	assert_int_equal(blob_write_commit(w, &e), 0);
+	return h;
+}
+
+static void a_folder_that_cannot_be_listed(void **state)
+{
+	(void)state;
+	struct blob_store *s;
+	struct error e;
+	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
+	struct blob_hash one = store_text(s, "one"), two = store_text(s, "two");
+	blob_store_close(s);
+	failing_list_begin(folder, 1, EIO);
+	int rc = blob_store_open(&s, folder, 0, &e);
+	failing_list_end();
+	assert_int_equal(rc, -EIO);
+	assert_non_null(strstr(e.text, folder));
+	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
+	assert_true(blob_has(s, &one, NULL) && blob_has(s, &two, NULL));
+	blob_store_close(s);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(a_folder_that_cannot_be_listed, folder_set_up, folder_tear_down),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
