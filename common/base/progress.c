@@ -64,6 +64,14 @@ double progress_kept(struct progress *p, double fraction, const char *state)
 	return p->most;
 }
 
+void progress_explain_fall(struct progress *p, double fraction, const char *state, char *detail, size_t size)
+{
+	double most = progress_kept(p, fraction, state);
+	size_t n = strlen(detail);
+	if (most - fraction >= 0.001 && n < size)
+		snprintf(detail + n, size - n, "; it was at %.1f %%, and more is to be done now", 100 * most);
+}
+
 void progress_end(struct progress *p)
 {
 	if (p->drawn)

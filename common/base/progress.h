@@ -23,6 +23,9 @@ void progress_show(struct progress *p, double fraction, const char *state, const
 /* What is done of an amount that is only estimated falls when the estimate grows, or is withdrawn. People are shown the
  * most that it was in this state; the time that is left tells them the rest. */
 double progress_kept(struct progress *p, double fraction, const char *state);
+/* Where it falls because there is more to be done than before, as for a job that is extended: appends to the detail
+ * what it was, if that is another number on the screen. */
+void progress_explain_fall(struct progress *p, double fraction, const char *state, char *detail, size_t size);
 void progress_end(struct progress *p); /* leaves the cursor at the start of a line */
 
 /* A rate in few characters: "3.2 k", "12 M"; a time: "1:02:03", "45 s". */

@@ -70,8 +70,26 @@ static void test_never_back(void **state)
 	assert_true(progress_kept(&p, 0.7, "running") == 0.7);
 }
 
+static void test_why_it_fell(void **state)
+{
+	(void)state;
+	struct progress p;
+	char detail[64] = "round 7", small[12] = "round 7";
+	progress_start(&p);
+	progress_explain_fall(&p, 0.4, "bootstrap", detail, sizeof detail);
+	progress_explain_fall(&p, 0.2, "running", detail, sizeof detail);
+	progress_explain_fall(&p, 0.8, "running", detail, sizeof detail);
+	progress_explain_fall(&p, 0.7999, "running", detail, sizeof detail); /* the same number */
+	assert_string_equal(detail, "round 7");
+	progress_explain_fall(&p, 0.5, "running", small, sizeof small);
+	assert_string_equal(small, "round 7; it");
+	progress_explain_fall(&p, 0.5, "running", detail, sizeof detail);
+	assert_string_equal(detail, "round 7; it was at 80.0 %, and more is to be done now");
+}
+
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_lines), cmocka_unit_test(test_never_back)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_lines), cmocka_unit_test(test_never_back),
+					   cmocka_unit_test(test_why_it_fell)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -332,6 +332,7 @@ static void show(struct progress *p, const Farm__JobStatus *s)
 		snprintf(detail, sizeof detail, "round %llu", (unsigned long long)s->rounds);
 	else
 		describe(s, rate, detail, sizeof detail);
+	progress_explain_fall(p, s->progress, s->state, detail, sizeof detail);
 	progress_show(p, s->progress, s->state, detail);
 }
 
