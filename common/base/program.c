@@ -4,7 +4,6 @@
 #include "common/base/option_print.h"
 
 #include <assert.h>
-#include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
 #include <stdio.h>

@@ -19,7 +19,6 @@
 #include "common/plan/resample.h"
 
 #include <assert.h>
-#include <errno.h>
 #include <math.h>
 #include <string.h>
 

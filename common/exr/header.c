@@ -9,7 +9,6 @@
 #include "common/estimate/convergence.h"
 #include "common/estimate/stated_error.h"
 #include "common/estimate/strategy.h"
-#include "common/plan/plan_text.h"
 
 #include <assert.h>
 #include <inttypes.h>

@@ -18,7 +18,6 @@
 #include "common/base/text.h"
 #include "common/net/send_queue.h"
 
-#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
 

@@ -14,7 +14,6 @@
 #include "common/wire/frame.h"
 
 #include <assert.h>
-#include <stddef.h>
 #include <string.h>
 
 enum {

@@ -4,7 +4,6 @@
 #include "common/base/fnv.h"
 #include "common/base/mem.h"
 
-#include <errno.h>
 #include <string.h>
 
 int identity_index_init(struct identity_index *x, uint32_t buckets)

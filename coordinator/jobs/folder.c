@@ -5,8 +5,6 @@
 #include "coordinator/jobs/durable.h"
 #include "coordinator/jobs/late_feed.h"
 
-#include <errno.h>
-
 static const double every_seconds = 1;
 
 static int make_anew(struct jobs *jobs, struct live_job *job, struct error *e)

@@ -5,7 +5,6 @@
 #include "coordinator/job/digest.h"
 #include "coordinator/job/incoming.h"
 #include "coordinator/job/late.h"
-#include "coordinator/job/replay.h"
 #include "coordinator/jobs/step.h"
 
 /* It has been damaged meanwhile: its lease is open. */

@@ -9,7 +9,6 @@
 #include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "common/estimate/stated_error.h"
 #include "common/exr/image_file.h"
 #include "coordinator/jobs/durable.h"
 #include "coordinator/jobs/room.h"

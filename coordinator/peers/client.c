@@ -15,7 +15,6 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "common/film/canvas.h"
 #include "common/plan/plan_text.h"
 #include "coordinator/job/incoming.h"
 #include "coordinator/jobs/listing.h"

@@ -12,7 +12,6 @@
 
 #include <fcntl.h>
 #include <string.h>
-#include <time.h>
 
 enum { CHUNK = 1 << 20 };
 static const double preview_seconds = 5; /* an image younger than this is reused */

@@ -9,7 +9,6 @@
 #include "common/base/clock.h"
 #include "coordinator/jobs/listing.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 

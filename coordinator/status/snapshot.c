@@ -14,8 +14,6 @@
 #include "coordinator/jobs/recovery.h"
 #include "coordinator/status/lines.h"
 
-#include <time.h>
-
 struct shown_worker {
 	struct peer_status peer; /* its texts are these: */
 	char name[128], fingerprint[256];

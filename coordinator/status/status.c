@@ -19,7 +19,6 @@
 #include "common/base/log.h"
 #include "common/base/mem.h"
 #include "coordinator/jobs/listing.h"
-#include "coordinator/peers/session.h"
 #include "coordinator/status/lines.h"
 #include "coordinator/status/snapshot.h"
 #include "coordinator/status/socket_file.h"

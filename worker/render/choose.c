@@ -17,12 +17,10 @@
 #include "common/base/liveness.h"
 #include "common/estimate/tail.h"
 #include "worker/render/halfvec/refract.h"
-#include "worker/render/path/brightness.h"
 #include "worker/render/path/integrate_bdpt.h"
 #include "worker/render/path/integrate_path.h"
 #include "worker/render/path/integrator.h"
 #include "worker/render/pilot.h"
-#include "worker/render/rare_light.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -24,8 +24,6 @@
 #include "worker/render/path/merging.h"
 #include "worker/render/pilot.h"
 
-#include <errno.h>
-#include <math.h>
 #include <string.h>
 
 /* However long the render is: a job that is extended has what a longer one has. */

@@ -3,8 +3,6 @@
 
 #include "worker/cli/base/text_file.h"
 
-#include <math.h>
-
 const struct accuracy_column accuracy_columns[] = {
 	{"setting", "parameter and value"},
 	{"parameter", "what differs from the default"},

@@ -13,7 +13,6 @@
 #include "common/base/text.h"
 #include "worker/render/settings/accuracy_settings.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

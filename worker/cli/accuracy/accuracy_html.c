@@ -13,7 +13,6 @@
 #include "worker/cli/accuracy/accuracy_plots.h"
 #include "worker/cli/image/tonemap.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <time.h>

@@ -9,7 +9,6 @@
 #include "common/base/mem.h"
 #include "common/estimate/canvas_blocks.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 

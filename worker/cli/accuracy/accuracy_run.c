@@ -12,7 +12,6 @@
 #include "common/base/clock.h"
 #include "common/base/mem.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 

@@ -4,7 +4,6 @@
 #include "common/base/clock.h"
 #include "common/json/estimate_json.h"
 #include "worker/render/rays.h"
-#include "worker/render/scene/scene.h"
 #include "worker/render/unseen_light.h"
 
 #include <stdio.h>

@@ -11,7 +11,6 @@
 #include "worker/cli/plot/plot.h"
 #include "worker/cli/render/pilot.h"
 
-#include <errno.h>
 #include <jansson.h>
 #include <math.h>
 #include <stdio.h>

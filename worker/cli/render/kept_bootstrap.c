@@ -10,9 +10,7 @@
 
 #include "common/base/bytes.h"
 #include "common/base/crc.h"
-#include "common/plan/plan_text.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>

@@ -3,7 +3,6 @@
 
 #include "worker/cli/base/options.h"
 
-#include <errno.h>
 #include <math.h>
 
 enum {

@@ -3,9 +3,6 @@
 
 #include "worker/cli/render/local.h"
 #include "worker/render/rays.h"
-#include "worker/render/scene/scene.h"
-
-#include <math.h>
 
 enum {
 	CHAINS = 16,

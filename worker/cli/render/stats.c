@@ -5,9 +5,7 @@
 #include "common/exr/image_file.h"
 #include "common/estimate/stated_error.h"
 #include "common/estimate/strategy.h"
-#include "common/plan/plan_text.h"
 
-#include <jansson.h>
 #include <stdlib.h>
 #include <string.h>
 

@@ -15,7 +15,6 @@
 #include "worker/render/scene/lenient.h"
 
 #include <jansson.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -2,10 +2,8 @@
 #include "worker/cli/submit/farm_pilot.h"
 
 #include "common/base/mem.h"
-#include "worker/cli/base/options.h"
 #include "worker/cli/render/pilot.h"
 
-#include <errno.h>
 #include <stdio.h>
 
 static int run_pilot(struct farm_pilot *p, const char *what, const struct plan_request *plan, struct error *e)

@@ -3,7 +3,6 @@
 
 #include "common/base/clock.h"
 #include <stdio.h>
-#include <time.h>
 
 static const double first_pause = 0.25, longest_pause = 10;
 

@@ -15,9 +15,7 @@
 #include "common/base/text.h"
 #include "common/wire/plan_wire.h"
 #include "worker/cli/base/guarded_source.h"
-#include "worker/cli/base/options.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 

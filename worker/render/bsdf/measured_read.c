@@ -20,8 +20,6 @@
 #include "worker/render/math/search.h"
 #include "worker/render/scene/asset_part.h"
 
-#include <math.h>
-
 enum { SIDE_MAX = 1 << 16, EXPONENT = 0x7f800000 /* of a 32-bit float */ };
 #define NUMBER_MAX 1e30
 

@@ -3,9 +3,7 @@
 
 #include "common/base/spelling.h"
 #include "worker/render/bsdf/fresnel.h"
-#include "worker/render/bsdf/ior.h"
 
-#include <stdbool.h>
 #include <string.h>
 #include <strings.h>
 

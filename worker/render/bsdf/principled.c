@@ -25,7 +25,6 @@
 #include "common/base/color.h"
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/warp.h"
-#include "worker/render/math/minmax.h"
 
 #define PRINCIPLED_ALPHA_MIN 1e-3
 #define CLEARCOAT_REFLECTANCE 0.04 /* of an index of 1.5 */

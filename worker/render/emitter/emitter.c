@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/emitter/emitter.h"
 
-#include <assert.h>
 #include <string.h>
 
 #define EMITTER(name) extern const struct emitter_ops emitter_ops_##name;

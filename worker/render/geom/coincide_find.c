@@ -10,7 +10,6 @@
  * none, and cost nothing.
  */
 #include "worker/render/geom/coincide_find.h"
-#include "worker/render/geom/coincide.h"
 
 #include "common/base/list.h"
 #include "common/base/liveness.h"

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/geom/relief.h"
 
-#include <stdbool.h>
 #include <stddef.h>
 
 /* The bent normal before normalisation, and its derivative. */

@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/halfvec/constraint.h"
 
-#include <assert.h>
-
 /* What a constraint knows of an adjacent vertex. */
 struct neighbour {
 	vec3 w;	     /* unit direction to it */

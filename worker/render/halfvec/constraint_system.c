@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/halfvec/constraint.h"
 
-#include <assert.h>
 #include <string.h>
 
 #define REAL double

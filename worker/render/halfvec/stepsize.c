@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/halfvec/stepsize.h"
 
-#include <assert.h>
-
 /* Standard deviation on the film, of its smaller side. */
 #define FILM_STEP 0.02
 /* Minimum of sigma over the limit: a pixel that sees less than this of a lobe leaves no room for a walk in double. */

@@ -14,8 +14,6 @@
 
 #include "worker/render/path/media.h"
 
-#include <assert.h>
-
 struct walk_limits walk_limits_of(const struct accuracy_settings *k)
 {
 	return (struct walk_limits){(unsigned)k->iterations, k->least_step,	     1, k->tolerance,

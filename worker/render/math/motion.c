@@ -6,7 +6,6 @@
  */
 #include "worker/render/math/motion.h"
 
-#include <math.h>
 #include <string.h>
 
 /* Newton's iteration at least halves what is left: some 20 for lengths that differ by 2^16. */

@@ -9,7 +9,6 @@
 
 #include "worker/render/math/measured_media.h"
 
-#include <math.h>
 #include <string.h>
 
 #define COEFFICIENT VALUE_COLOR, PARAM_UNDERSTOOD, 0, 1e30, NULL

@@ -3,7 +3,6 @@
 
 #include "worker/render/math/frame.h"
 
-#include <math.h>
 #include <string.h>
 
 #define PHASE(name) extern const struct phase_ops phase_ops_##name;

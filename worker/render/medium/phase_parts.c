@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/medium/phase_parts.h"
 
-#include <math.h>
-
 int phase_parts_create(struct phase *p, struct phase_parts **parts, const struct scene_node *n,
 		       const struct volume_build *build, struct error *e)
 {

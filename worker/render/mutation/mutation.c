@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/mutation/mutation.h"
 
-#include "worker/render/math/rng.h"
-
 #include <string.h>
 
 #define MUTATION(name) extern const struct mutation_ops mutation_##name;

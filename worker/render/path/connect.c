@@ -14,7 +14,6 @@
  */
 #include "worker/render/path/connect.h"
 
-#include "worker/render/path/measure.h"
 #include "worker/render/path/media.h"
 #include "worker/render/path/visible.h"
 

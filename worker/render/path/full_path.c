@@ -8,12 +8,10 @@
  */
 #include "worker/render/path/full_path.h"
 
-#include "worker/render/path/connect.h"
 #include "worker/render/path/measure.h"
 #include "worker/render/path/media.h"
 #include "worker/render/path/visible.h"
 
-#include <assert.h>
 #include <string.h>
 
 /* Products are brought back to a largest factor near 1 when they leave this range. */

@@ -25,12 +25,9 @@
 
 #include "common/base/liveness.h"
 #include "common/base/mem.h"
-#include "common/film/path_class.h"
 #include "worker/render/path/connect.h"
 #include "worker/render/path/measure.h"
 #include "worker/render/path/media.h"
-
-#include <errno.h>
 
 enum { PHOTONS = 4 /* places for so many a path */, TICKS = 16 };
 

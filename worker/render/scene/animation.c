@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/scene/animation.h"
 
-#include "worker/render/scene/element.h"
 #include "worker/render/scene/number.h"
 #include "worker/render/scene/transform.h"
 

@@ -9,7 +9,6 @@
 #ifndef WORKER_RENDER_SCENE_ASSET_NAME_H
 #define WORKER_RENDER_SCENE_ASSET_NAME_H
 
-#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 

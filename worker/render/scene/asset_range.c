@@ -7,7 +7,6 @@
 
 #include "common/base/mem.h"
 
-#include <errno.h>
 #include <string.h>
 
 static const char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";

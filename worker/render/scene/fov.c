@@ -2,7 +2,6 @@
 #include "worker/render/scene/fov.h"
 #include "worker/render/scene/number.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 

@@ -7,7 +7,6 @@
 #include "worker/render/scene/gltf_buffer.h"
 #include "worker/render/scene/asset_name.h"
 #include "worker/render/scene/gltf_meshopt.h"
-#include "worker/render/scene/gltf_tree.h"
 
 #include <string.h>
 

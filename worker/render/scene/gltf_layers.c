@@ -13,7 +13,6 @@
 #include "worker/render/scene/gltf_layers.h"
 #include "worker/render/scene/gltf_texture.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 

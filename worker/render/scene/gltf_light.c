@@ -8,9 +8,7 @@
  * radiance 1.
  */
 #include "worker/render/scene/gltf_light.h"
-#include "worker/render/scene/gltf_tree.h"
 
-#include <math.h>
 #include <string.h>
 
 enum { FILM_WIDTH = 768 };

@@ -8,8 +8,6 @@
 #include "worker/render/scene/gltf_surface.h"
 #include "worker/render/scene/gltf_texture.h"
 
-#include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #define DARKEST 1e-6 /* no light at all would be an infinite coefficient */

@@ -12,9 +12,7 @@
 #include "worker/render/scene/gltf_numbers.h"
 #include "worker/render/scene/gltf_pose.h"
 #include "worker/render/scene/gltf_texture.h"
-#include "worker/render/scene/gltf_tree.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 

@@ -13,7 +13,6 @@
 #include "worker/render/math/fptrap.h"
 #include "worker/render/scene/gltf_meshopt_v1.h"
 
-#include <math.h>
 #include <meshoptimizer.h>
 #include <string.h>
 

@@ -6,8 +6,6 @@
  */
 #include "worker/render/scene/gltf_node.h"
 
-#include <math.h>
-
 mat4 gltf_compose(const double t[3], const double r[4], const double s[3], bool *valid)
 {
 	mat4 out = mat4_identity();

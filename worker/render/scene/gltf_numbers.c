@@ -15,7 +15,6 @@
 #include "worker/render/scene/gltf_buffer.h"
 #include "worker/render/scene/gltf_meshopt.h"
 
-#include <math.h>
 #include <string.h>
 
 enum { COMPONENTS_MAX = 16 };

@@ -15,7 +15,6 @@
 #include "worker/render/scene/gltf_node.h"
 #include "worker/render/scene/gltf_numbers.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 

@@ -11,8 +11,6 @@
  */
 #include "worker/render/scene/gltf_surface.h"
 
-#include <math.h>
-
 static const double dielectric = 0.04;
 
 /* As the eye weighs them, with a square root as a rough gamma. */

@@ -10,7 +10,6 @@
 #include "worker/render/scene/gltf_buffer.h"
 
 #include <limits.h>
-#include <math.h>
 #include <string.h>
 
 enum { NEAREST = 9728, CLAMP = 33071, MIRROR = 33648, REPEAT = 10497 };

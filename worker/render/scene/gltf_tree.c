@@ -8,7 +8,6 @@
 #include "common/base/text.h"
 #include "worker/render/scene/element_make.h"
 
-#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>

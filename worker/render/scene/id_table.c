@@ -2,7 +2,6 @@
 #include "worker/render/scene/id_table.h"
 
 #include "common/base/spelling.h"
-#include "worker/render/scene/element.h"
 #include "worker/render/scene/plugin.h"
 
 #include <stdlib.h>

@@ -10,23 +10,17 @@
 #include "worker/render/scene/maker.h"
 
 #include "worker/render/scene/animation.h"
-#include "worker/render/scene/asset_list.h"
-#include "worker/render/scene/element.h"
-#include "worker/render/scene/id_table.h"
 #include "worker/render/scene/lenient.h"
 #include "worker/render/scene/nesting.h"
-#include "worker/render/scene/notes.h"
 #include "worker/render/scene/old_values.h"
 #include "worker/render/scene/param_check.h"
 #include "worker/render/scene/plugin.h"
 #include "worker/render/scene/refuse.h"
 #include "worker/render/scene/remarks.h"
-#include "worker/render/scene/report.h"
 #include "worker/render/scene/snake_case.h"
 #include "worker/render/scene/substitute.h"
 #include "worker/render/scene/transform.h"
 #include "worker/render/scene/value.h"
-#include "worker/render/scene/xml.h"
 
 #include <assert.h>
 #include <string.h>

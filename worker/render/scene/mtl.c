@@ -17,7 +17,6 @@
 #include "worker/render/scene/number.h"
 #include "worker/render/scene/text_lines.h"
 
-#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
 

@@ -3,7 +3,6 @@
 
 #include "worker/render/scene/plugin.h"
 
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 

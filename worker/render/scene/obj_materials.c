@@ -18,7 +18,6 @@
 #include "worker/render/scene/mtl.h"
 #include "worker/render/scene/text_lines.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>

@@ -3,8 +3,6 @@
 
 #include "worker/render/scene/value.h"
 
-#include <errno.h>
-#include <math.h>
 #include <string.h>
 #include <strings.h>
 

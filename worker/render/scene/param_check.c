@@ -2,15 +2,11 @@
 #include "worker/render/scene/param_check.h"
 
 #include "common/base/spelling.h"
-#include "worker/render/scene/element.h"
 #include "worker/render/scene/plugin.h"
 #include "worker/render/scene/snake_case.h"
 #include "worker/render/scene/value.h"
 
-#include <errno.h>
 #include <float.h>
-#include <math.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
 

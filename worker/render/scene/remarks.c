@@ -10,7 +10,6 @@
 #include "worker/render/scene/integrators.h"
 #include "worker/render/scene/plugin.h"
 
-#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 

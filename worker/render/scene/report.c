@@ -3,7 +3,6 @@
 
 #include "common/base/text.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 

@@ -16,7 +16,6 @@
 #include "worker/render/scene/integrators.h"
 #include "worker/render/scene/number.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 

@@ -10,10 +10,8 @@
 
 #include "common/base/spelling.h"
 #include "worker/render/math/cie.h"
-#include "worker/render/scene/element.h"
 #include "worker/render/scene/number.h"
 
-#include <math.h>
 #include <string.h>
 
 #define TEMPERATURE_MAX 1e6 /* kelvin; below 100 there is practically no visible light */

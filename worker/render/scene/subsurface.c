@@ -9,14 +9,11 @@
 #include "worker/render/scene/subsurface.h"
 
 #include "worker/render/math/measured_media.h"
-#include "worker/render/scene/element.h"
 #include "worker/render/scene/element_make.h"
-#include "worker/render/scene/id_table.h"
 #include "worker/render/scene/number.h"
 #include "worker/render/scene/snake_case.h"
 #include "worker/render/scene/value.h"
 
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

@@ -4,7 +4,6 @@
 #include "worker/render/scene/element_make.h"
 #include "worker/render/scene/spectral.h"
 
-#include <errno.h>
 #include <string.h>
 #include <strings.h>
 

@@ -13,9 +13,7 @@
 
 #include "common/base/spelling.h"
 #include "worker/render/math/frame.h"
-#include "worker/render/scene/element.h"
 #include "worker/render/scene/number.h"
-#include "worker/render/scene/param.h"
 
 #include <string.h>
 

@@ -12,7 +12,6 @@
 
 #include "worker/render/scene/number.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>

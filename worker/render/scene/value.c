@@ -6,7 +6,6 @@
 #include "worker/render/scene/value.h"
 
 #include "common/base/spelling.h"
-#include "worker/render/scene/element.h"
 #include "worker/render/scene/number.h"
 #include "worker/render/scene/spectral.h"
 #include "worker/render/scene/transform.h"

@@ -11,7 +11,6 @@
 
 #include "common/base/mem.h"
 #include "worker/render/scene/asset_name.h"
-#include "worker/render/scene/define.h"
 #include "worker/render/scene/element_make.h"
 #include "worker/render/scene/number.h"
 #include "worker/render/scene/upgrade.h"

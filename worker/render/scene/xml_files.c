@@ -10,7 +10,6 @@
 
 #include "worker/render/scene/asset_name.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 

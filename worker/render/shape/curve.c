@@ -11,8 +11,6 @@
 #include "worker/render/shape/spline.h"
 #include "worker/render/shape/tube.h"
 
-#include <errno.h>
-
 enum { CHAIN_POINTS_MAX = 1 << 28 };
 /* In radii. */
 static const double chain_tolerance = 0.05, tube_tolerance = 0.02;

@@ -10,7 +10,6 @@
 
 #include "common/base/liveness.h"
 #include "worker/render/shape/displace_grid.h"
-#include "worker/render/shape/mesh.h"
 
 #include <string.h>
 

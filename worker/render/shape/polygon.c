@@ -13,7 +13,6 @@
 
 #include "common/base/liveness.h"
 
-#include <math.h>
 #include <stdbool.h>
 #include <string.h>
 

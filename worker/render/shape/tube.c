@@ -17,8 +17,6 @@
 #include "common/base/liveness.h"
 #include "worker/render/math/frame.h"
 
-#include <errno.h>
-
 static const double pi = 3.14159265358979323846;
 
 int tube_add(struct list *rings, const struct tube_ring *r)

@@ -4,8 +4,6 @@
 #include "common/base/spelling.h"
 #include "worker/render/scene/srgb.h"
 
-#include <errno.h>
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 

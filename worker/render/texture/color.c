@@ -13,7 +13,6 @@
 #include "worker/render/math/search.h"
 #include "worker/render/texture/upsample.h"
 
-#include <assert.h>
 #include <string.h>
 
 static const float table[3 * UPSAMPLE_TABLE_SIZE * UPSAMPLE_TABLE_SIZE * UPSAMPLE_TABLE_SIZE * 3] = {

@@ -13,8 +13,6 @@
 #include "common/base/liveness.h"
 
 #include <float.h>
-#include <math.h>
-#include <stddef.h>
 
 /* ---- values ---- */
 

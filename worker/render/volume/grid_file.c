@@ -14,7 +14,6 @@
 #include "worker/render/scene/asset_part.h"
 #include "worker/render/volume/grid.h"
 
-#include <math.h>
 #include <string.h>
 
 enum { VERSION = 3, FLOATS = 1, BYTES = 3, HEAD = 4 + 4 * 5 + 4 * 6, TICK_INTERVAL = 1 << 16 };

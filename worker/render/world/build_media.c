@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/world/build_media.h"
 
-#include "worker/render/geom/accel.h"
 #include "worker/render/world/node_table.h"
 
 #include <stdio.h>

@@ -19,8 +19,6 @@
 #include "worker/render/world/emitter_part.h"
 #include "worker/render/world/emitter_points.h"
 
-#include <errno.h>
-
 enum {
 	VALUES = 1 << 21, /* points times parts, and one point a pixel, within these bounds: */
 	POINTS_MOST = 1 << 13,

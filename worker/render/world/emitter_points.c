@@ -9,11 +9,9 @@
  */
 #include "worker/render/world/emitter_points.h"
 
-#include "worker/render/geom/accel.h"
 #include "worker/render/math/rng.h"
 #include "worker/render/world/emitter_part.h"
 
-#include <errno.h>
 #include <string.h>
 
 enum {

@@ -10,8 +10,6 @@
 
 #include "common/base/crash.h"
 #include "common/base/liveness.h"
-#include "worker/render/shape/mesh.h"
-#include "worker/render/shape/shape.h"
 #include "worker/render/world/displacement.h"
 #include "worker/render/world/moving.h"
 #include "worker/render/world/place_curves.h"

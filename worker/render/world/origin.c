@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/world/origin.h"
 
-#include <stdbool.h>
 #include <stdlib.h>
 
 #define MIXED 0x1p-12

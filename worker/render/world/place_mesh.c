@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/world/place_mesh.h"
 
-#include "worker/render/shape/mesh.h"
-#include "worker/render/shape/shape.h"
 #include "worker/render/world/displacement.h"
 
 struct box build_box_of(const struct shape_geometry *g)

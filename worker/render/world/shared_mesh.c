@@ -1,12 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/world/shared_mesh.h"
 
-#include "worker/render/shape/mesh.h"
-#include "worker/render/shape/shape.h"
 #include "worker/render/world/moving.h"
 #include "worker/render/world/place_mesh.h"
-
-#include <string.h>
 
 /* Matrices in files have six digits. */
 #define RIGID_TOLERANCE 1e-5

@@ -1,10 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/world/unseen.h"
 
-#include "worker/render/geom/accel.h"
-#include "worker/render/geom/surface.h"
-
-#include <math.h>
 #include <stdio.h>
 
 /* The sides that a box can be beyond: the near and the far plane, and four planes through the edges of the film. */

@@ -4,7 +4,6 @@
 #include "worker/render/world/visibility_bounds.h"
 
 #include "worker/render/geom/curves.h"
-#include "worker/render/geom/triangle.h"
 #include "worker/render/world/displacement.h"
 #include "worker/render/world/origin.h"
 
