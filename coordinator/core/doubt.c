@@ -91,7 +91,6 @@ static void begin_anew(struct farm *f, struct job *j, struct slot *s, const char
 	const struct lease_key k = slot_key(j, s);
 	lease_revoke_slot(f, s); /* workers that still have the states */
 	s->doubt.anew = true;
-	j->anew++;
 	text_print(f->text, sizeof f->text,
 		   "the chains of group %u part %u start epoch %llu from their seeds: their states, made by %s, were "
 		   "refused by %s",

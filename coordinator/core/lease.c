@@ -130,7 +130,6 @@ void lease_expire(struct farm *f, struct lease *l)
 	l->overdue = true;
 	l->slot->timeouts++;
 	l->job->counts.timeouts++;
-	l->peer->timeouts++;
 	let_go(f, l);
 	peer_was_late(f, l->peer);
 }

@@ -65,7 +65,6 @@ struct job {
 	uint64_t rel_error_rounds, bootstrap_merged, leases_merged;
 	struct job_counts counts;
 	struct failure_quorum failure_quorum; /* workers that failed with any of its leases */
-	uint32_t anew;			      /* leases whose chains started again because their states were lost */
 	uint32_t tries;			      /* failures; several leases of one worker at once count as one */
 	char text[256];
 	char held[JOB_HOLDS][256]; /* why none of its leases go out; "" each if they do */
@@ -91,7 +90,7 @@ struct peer {
 	uint64_t queued; /* its place in the order of waiting */
 	double joined, last_seen;
 	bool returns; /* it has reconnected, and this connection is closing */
-	uint64_t merged, repeats, refused, faults, failures, timeouts;
+	uint64_t merged, repeats, refused, faults, failures;
 	char text[256];
 	uint32_t lease_limit;
 	struct lease leases[];

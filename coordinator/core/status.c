@@ -335,7 +335,6 @@ bool farm_peer(const struct farm *f, uint64_t id, struct peer_status *s)
 		.refused = p->refused,
 		.faults = p->faults,
 		.failures = p->failures,
-		.timeouts = p->timeouts,
 	};
 	memcpy(s->text, p->text, sizeof s->text);
 	return true;
@@ -383,9 +382,7 @@ bool farm_lease(const struct farm *f, uint64_t peer, uint32_t i, struct lease_st
 			continue;
 		*s = (struct lease_status){
 			.key = lease_key(l),
-			.peer = peer,
 			.sent = l->sent,
-			.deadline = l->deadline,
 			.overdue = l->overdue,
 		};
 		return true;

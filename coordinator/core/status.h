@@ -49,14 +49,13 @@ struct peer_status {
 	uint32_t threads, want, leases;
 	enum peer_state state;
 	double joined, last_seen;
-	uint64_t merged, repeats, refused, faults, failures, timeouts;
+	uint64_t merged, repeats, refused, faults, failures;
 	char text[256]; /* its last fault or failure */
 };
 
 struct lease_status {
 	struct lease_key key;
-	uint64_t peer;
-	double sent, deadline;
+	double sent;
 	bool overdue; /* handed out again; an answer still counts if it is the first */
 };
 

@@ -11,7 +11,6 @@
 /* Further contents of a report. */
 struct accuracy_context {
 	const char *scene, *reference; /* names; reference: NULL: none */
-	const struct render_summary *summary;
 	const struct accuracy_design *design;
 	const struct accuracy_run *run;
 	const struct accuracy_judgement *judgement;

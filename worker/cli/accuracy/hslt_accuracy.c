@@ -180,7 +180,6 @@ static int report(struct session *s, struct error *e)
 {
 	struct accuracy_context x = {.scene = s->name,
 				     .reference = s->a->reference,
-				     .summary = &s->summary,
 				     .design = &s->design,
 				     .run = &s->run,
 				     .judgement = &s->judgement};

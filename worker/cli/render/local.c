@@ -206,10 +206,8 @@ static int check_target(struct thread_pool *c, uint64_t rounds, enum merge_end *
 	*end = merge_end_of(r->plan, rounds, seconds, due ? &img : NULL);
 	if (r->round)
 		r->round(r->user, &(struct local_round){.rounds = rounds,
-							.mutations = rounds * plan_round_mutations(r->plan),
 							.cpu_seconds = r->cpu_seconds - r->bootstrap_cpu_seconds,
 							.seconds = seconds - r->bootstrap_seconds,
-							.bootstrap_cpu_seconds = r->bootstrap_cpu_seconds,
 							.bootstrap_seconds = r->bootstrap_seconds,
 							.canvas = r->canvas,
 							.image = due ? &img : NULL});

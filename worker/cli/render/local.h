@@ -17,9 +17,9 @@ struct local_progress {	      /* between leases, from the calling thread's point
 };
 
 struct local_round {		     /* State after a complete round. */
-	uint64_t rounds, mutations;  /* complete rounds; mutations or samples, in the units of plan_round_mutations */
+	uint64_t rounds;	     /* complete ones */
 	double cpu_seconds, seconds; /* of the rounds, CPU time of leases and wall-clock time; without the bootstrap */
-	double bootstrap_cpu_seconds, bootstrap_seconds;
+	double bootstrap_seconds;
 	const struct canvas *canvas;	  /* for making a canvas_image */
 	const struct canvas_image *image; /* if the error is due to be estimated, otherwise NULL */
 };

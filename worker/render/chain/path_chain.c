@@ -193,8 +193,7 @@ static const struct chain_ops chain_path = {
 };
 
 const struct integrator integrator_hslt = {
-	.face = {"hslt", "improved half vector space light transport", PLAN_CHAINS, FULL_PATH_MAX_EDGES,
-		 .has_mutations = true, .to_emitters = true},
+	.face = {"hslt", PLAN_CHAINS, FULL_PATH_MAX_EDGES, .has_mutations = true, .to_emitters = true},
 	.stream = RNG_BOOTSTRAP,
 	.evaluate = path_trace_candidates,
 	.chain = &chain_path,

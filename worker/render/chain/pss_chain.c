@@ -173,10 +173,7 @@ static const struct chain_ops chain_pss = {
 };
 
 const struct integrator integrator_pssmlt = {
-	.face = {.name = "pssmlt",
-		 .summary = "primary sample space Metropolis over bdpt",
-		 .kind = PLAN_CHAINS,
-		 .max_depth = PSS_MAX_EDGES},
+	.face = {.name = "pssmlt", .kind = PLAN_CHAINS, .max_depth = PSS_MAX_EDGES},
 	.stream = RNG_BOOTSTRAP,
 	.evaluate = path_trace_both_ways,
 	.chain = &chain_pss,

@@ -39,7 +39,7 @@ static void weigh_c(const struct path_context *c, const struct full_path *x, uns
 	}
 }
 
-const struct heuristic heuristic_roughness = {"roughness", weigh_b, weigh_c};
+const struct heuristic heuristic_roughness = {weigh_b, weigh_c};
 
 static double sum_of(const double *weight, unsigned n)
 {

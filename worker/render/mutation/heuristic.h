@@ -10,7 +10,6 @@
 #include "worker/render/path/full_path.h"
 
 struct heuristic {
-	const char *name;
 	/* weight[0..k], not normalised; 0: never chosen. */
 	void (*weigh_b)(const struct path_context *c, const struct full_path *x, double *weight);
 	/* weight[0..b-1]. */

@@ -11,7 +11,7 @@ static void weigh_c(const struct path_context *c, const struct full_path *x, uns
 		weight[i] = i > 0 && x->v[i].delta ? 0 : 1;
 }
 
-static const struct heuristic any_end = {"any", NULL, weigh_c};
+static const struct heuristic any_end = {NULL, weigh_c};
 static const struct strategy strategy = {&any_end, STRATEGY_CAMERA, STRATEGY_DRAWN, .aperture = true};
 
 static enum proposal_end propose(const struct mutation_ops *self, struct mutation_ctx *m,

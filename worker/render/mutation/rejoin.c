@@ -26,7 +26,7 @@ static void weigh_c(const struct path_context *c, const struct full_path *x, uns
 		weight[i] = i + 1 == b ? 1 : 0;
 }
 
-static const struct heuristic join = {"join", weigh_b, weigh_c};
+static const struct heuristic join = {weigh_b, weigh_c};
 static const struct strategy strategy = {
 	&join, STRATEGY_DRAWN, STRATEGY_DRAWN, .wavelength = true, .aperture = true, .emitter = true};
 

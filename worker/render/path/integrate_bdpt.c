@@ -115,39 +115,27 @@ void path_trace_both_ways(struct path_context *c, struct sampler *s, struct path
 }
 
 const struct integrator integrator_bdpt8 = {
-	.face = {.name = "bdpt8",
-		 .summary = "bdpt with a light sub-path in one of eight samples",
-		 .kind = PLAN_SAMPLES,
-		 .max_depth = PATH_MAX_EDGES},
+	.face = {.name = "bdpt8", .kind = PLAN_SAMPLES, .max_depth = PATH_MAX_EDGES},
 	.stream = RNG_BDPT8,
 	.evaluate = path_trace_both_ways,
 	.light_every = 8,
 };
 
 const struct integrator integrator_bdpt = {
-	.face = {.name = "bdpt",
-		 .summary = "bidirectional path tracing, all techniques, balance heuristic",
-		 .kind = PLAN_SAMPLES,
-		 .max_depth = PATH_MAX_EDGES},
+	.face = {.name = "bdpt", .kind = PLAN_SAMPLES, .max_depth = PATH_MAX_EDGES},
 	.stream = RNG_BDPT,
 	.evaluate = path_trace_both_ways,
 };
 
 const struct integrator integrator_erpt = {
-	.face = {.name = "erpt",
-		 .summary = "bdpt, whose brightest contributions are spread by short chains of mutations",
-		 .kind = PLAN_SAMPLES,
-		 .max_depth = PATH_MAX_EDGES},
+	.face = {.name = "erpt", .kind = PLAN_SAMPLES, .max_depth = PATH_MAX_EDGES},
 	.stream = RNG_ERPT,
 	.evaluate = path_trace_both_ways,
 	.redistributes = true,
 };
 
 const struct integrator integrator_erpt4 = {
-	.face = {.name = "erpt4",
-		 .summary = "erpt with a light sub-path in one of four samples",
-		 .kind = PLAN_SAMPLES,
-		 .max_depth = PATH_MAX_EDGES},
+	.face = {.name = "erpt4", .kind = PLAN_SAMPLES, .max_depth = PATH_MAX_EDGES},
 	.stream = RNG_ERPT4,
 	.evaluate = path_trace_both_ways,
 	.light_every = 4,

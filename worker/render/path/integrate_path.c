@@ -41,11 +41,7 @@ void path_trace(struct path_context *c, struct sampler *s, struct path_sample *o
 }
 
 const struct integrator integrator_path = {
-	.face = {.name = "path",
-		 .summary = "path tracing with next event estimation and multiple importance sampling",
-		 .kind = PLAN_SAMPLES,
-		 .max_depth = PATH_MAX_EDGES,
-		 .from_camera = true},
+	.face = {.name = "path", .kind = PLAN_SAMPLES, .max_depth = PATH_MAX_EDGES, .from_camera = true},
 	.stream = RNG_PATH,
 	.evaluate = path_trace,
 };

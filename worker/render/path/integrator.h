@@ -11,7 +11,7 @@
 #include "worker/render/path/path.h"
 
 struct integrator {
-	struct render_integrator face; /* name, summary, kind, depth that its state holds */
+	struct render_integrator face; /* name, kind, depth that its state holds */
 	enum rng_stream stream;	       /* of its own samples */
 	path_tracer *evaluate;
 	uint32_t light_every;	       /* of path_context, for its samples */

@@ -6,7 +6,7 @@
 #include "common/plan/plan.h"
 
 struct render_integrator {
-	const char *name, *summary;
+	const char *name;
 	enum plan_kind kind;
 	uint32_t max_depth; /* edges its state holds */
 	bool has_mutations; /* its chains draw proposals from a mixture of strategies */

@@ -34,9 +34,8 @@ struct builder {
 	struct attribute_pool attributes;
 	struct grid_cache grids;
 	struct volume_build volumes; /* with `grids` */
-	struct emitter_surface *surfaces;
-	struct box all, *boxes; /* boxes: one a shape */
-	struct report *found;	/* the problems after which building goes on; NULL: the first ends it */
+	struct box all, *boxes;	     /* boxes: one a shape */
+	struct report *found;	     /* the problems after which building goes on; NULL: the first ends it */
 	struct error *e;
 };
 

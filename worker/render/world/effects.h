@@ -66,9 +66,7 @@ struct effects_choice {
 
 struct effects {
 	bool colour; /* if off, no wavelengths are drawn, and a grey value stands for the common illuminant's shape */
-	bool dispersion, aperture, specular, glossy, diffuse, transmission, textures, environment, area_light,
-		delta_light;
-	bool displacement, half_vectors, emitter_move;
+	bool dispersion, aperture, specular, glossy, emitter_move;
 	bool absorption;	     /* some medium does */
 	bool scattering;	     /* some medium scatters or shines: edges are walked through all of them */
 	bool medium_light;	     /* some medium shines */

@@ -333,17 +333,16 @@ static void lobes(struct report *r, const struct census *c)
 	size_t end = fx->line_count;
 	fx->line_count = (size_t)(at - fx->lines);
 	bool called = fx->specular || fx->glossy;
-	fx->half_vectors =
-		line(r, EFFECT_HALF_VECTORS, called, called ? "lobes are narrow: %s" : "no lobe is narrow: %s",
-		     fx->specular && fx->glossy ? "specular and glossy"
-		     : fx->specular		? "specular"
-		     : fx->glossy		? "glossy"
-						: "paths that are traced and joined are as likely to carry light");
+	line(r, EFFECT_HALF_VECTORS, called, called ? "lobes are narrow: %s" : "no lobe is narrow: %s",
+	     fx->specular && fx->glossy ? "specular and glossy"
+	     : fx->specular		? "specular"
+	     : fx->glossy		? "glossy"
+					: "paths that are traced and joined are as likely to carry light");
 	fx->line_count = end;
-	fx->diffuse = materials(r, EFFECT_DIFFUSE, &c->diffuse, "scatters diffusely only", "scatter diffusely only",
-				"is diffuse only");
-	fx->transmission = materials(r, EFFECT_TRANSMISSION, &c->transmission, "lets light through",
-				     "let light through", "lets it through");
+	materials(r, EFFECT_DIFFUSE, &c->diffuse, "scatters diffusely only", "scatter diffusely only",
+		  "is diffuse only");
+	materials(r, EFFECT_TRANSMISSION, &c->transmission, "lets light through", "let light through",
+		  "lets it through");
 	fx->absorption = tallied(r, EFFECT_ABSORPTION, &c->absorbing, "borders on a medium that absorbs",
 				 "border on a medium that absorbs", "no medium absorbs");
 	fx->scattering = tallied(r, EFFECT_SCATTERING, &c->scattering, "borders on a medium that scatters",
@@ -353,15 +352,14 @@ static void lobes(struct report *r, const struct census *c)
 static void surfaces(struct report *r, const struct census *c, const struct world *w, const struct effects_source *src)
 {
 	char text[NAMES_MAX], more[NAMES_MAX];
-	struct effects *fx = r->fx;
 	if (c->textured.count && c->textured_light.count)
-		fx->textures = line(r, EFFECT_TEXTURES, true, "%s and, of emitters, %s are textured",
-				    names_of(&c->textured, text), names_of(&c->textured_light, more));
+		line(r, EFFECT_TEXTURES, true, "%s and, of emitters, %s are textured", names_of(&c->textured, text),
+		     names_of(&c->textured_light, more));
 	else if (c->textured.count + c->textured_light.count)
-		fx->textures = line(r, EFFECT_TEXTURES, true, "textured: %s",
-				    names_of(c->textured.count ? &c->textured : &c->textured_light, text));
+		line(r, EFFECT_TEXTURES, true, "textured: %s",
+		     names_of(c->textured.count ? &c->textured : &c->textured_light, text));
 	else
-		fx->textures = line(r, EFFECT_TEXTURES, false, "no material and no emitter has a texture");
+		line(r, EFFECT_TEXTURES, false, "no material and no emitter has a texture");
 	struct tally t = {0};
 	uint64_t triangles = 0;
 	for (uint32_t i = 0; i < w->shape_count; i++)
@@ -370,10 +368,10 @@ static void surfaces(struct report *r, const struct census *c, const struct worl
 			triangles += w->shapes[i].triangle_count;
 		}
 	if (t.count)
-		fx->displacement = line(r, EFFECT_DISPLACEMENT, true, "%s %s displaced: %llu triangles",
-					names_of(&t, text), verb(&t, "is", "are"), (unsigned long long)triangles);
+		line(r, EFFECT_DISPLACEMENT, true, "%s %s displaced: %llu triangles", names_of(&t, text),
+		     verb(&t, "is", "are"), (unsigned long long)triangles);
 	else
-		fx->displacement = line(r, EFFECT_DISPLACEMENT, false, "no shape is displaced");
+		line(r, EFFECT_DISPLACEMENT, false, "no shape is displaced");
 	static const enum effect absent[] = {EFFECT_BUMP, EFFECT_ALPHA};
 	for (size_t i = 0; i < sizeof absent / sizeof *absent; i++)
 		line(r, absent[i], false, "%s", effect_table[absent[i]].refuse);
@@ -392,13 +390,13 @@ static void surfaces(struct report *r, const struct census *c, const struct worl
 	if (w->camera.moves)
 		count(&moving, src->sensor, "");
 	if (moving.count)
-		fx->motion = line(r, EFFECT_MOTION, true, "%s move%s while the shutter is open",
-				  names_of(&moving, text), verb(&moving, "s", ""));
+		r->fx->motion = line(r, EFFECT_MOTION, true, "%s move%s while the shutter is open",
+				     names_of(&moving, text), verb(&moving, "s", ""));
 	else
-		fx->motion = line(r, EFFECT_MOTION, false, "%s",
-				  w->settings.shutter_open < w->settings.shutter_close
-					  ? "nothing moves while the shutter is open"
-					  : "the shutter is open for no time");
+		r->fx->motion = line(r, EFFECT_MOTION, false, "%s",
+				     w->settings.shutter_open < w->settings.shutter_close
+					     ? "nothing moves while the shutter is open"
+					     : "the shutter is open for no time");
 	const struct render_coincident *k = &w->coincident;
 	if (k->total > 1)
 		line(r, EFFECT_COINCIDENCE, true, "%zu pairs of shapes coincide visibly", k->total);
@@ -468,14 +466,13 @@ void effects_analyse(struct world *w, const struct effects_source *src, const st
 	emitter_moves(&r, &c);
 	lobes(&r, &c);
 	surfaces(&r, &c, w, src);
-	fx->environment = tallied(&r, EFFECT_ENVIRONMENT, &c.environment, "shines on everything that escapes", "",
-				  "rays that escape meet nothing");
-	fx->area_light = tallied(&r, EFFECT_AREA_LIGHT, &c.area, "shines from its surface", "shine from their surfaces",
-				 "no surface shines");
-	fx->delta_light =
-		tallied(&r, EFFECT_DELTA_LIGHT, &c.delta, "is a point or parallel light, which no path hits by chance",
-			"are points or parallel light, which no path hits by chance",
-			"no emitter is a point or parallel light");
+	tallied(&r, EFFECT_ENVIRONMENT, &c.environment, "shines on everything that escapes", "",
+		"rays that escape meet nothing");
+	tallied(&r, EFFECT_AREA_LIGHT, &c.area, "shines from its surface", "shine from their surfaces",
+		"no surface shines");
+	tallied(&r, EFFECT_DELTA_LIGHT, &c.delta, "is a point or parallel light, which no path hits by chance",
+		"are points or parallel light, which no path hits by chance",
+		"no emitter is a point or parallel light");
 	fx->medium_light = tallied(&r, EFFECT_MEDIUM_LIGHT, &c.shining, "borders on a medium that shines",
 				   "border on a medium that shines", "no medium shines");
 	fx->scattering = fx->scattering || fx->medium_light;

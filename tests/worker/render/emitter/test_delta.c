@@ -204,6 +204,13 @@ static void test_even_texture(void **state)
 	}
 }
 
+static bool has(const struct world *w, const char *effect)
+{
+	struct render_summary s;
+	world_summary(w, &s);
+	return render_effect_on(&s, effect);
+}
+
 static void test_world(void **state)
 {
 	(void)state;
@@ -212,10 +219,10 @@ static void test_world(void **state)
 		"<emitter type='directional'/><emitter type='constant'/><emitter type='point'/><emitter type='directional'/>");
 	assert_int_equal(w->emitter_count, 4);
 	assert_int_equal(w->environment, 1);
-	assert_true(w->effects.delta_light && w->effects.environment && !w->effects.area_light && !w->effects.colour);
+	assert_true(has(w, "delta-light") && has(w, "environment") && !has(w, "area-light") && !w->effects.colour);
 	world_free(w);
 	w = world_of("3.0.0", "<emitter type='constant'/>");
-	assert_true(!w->effects.delta_light);
+	assert_false(has(w, "delta-light"));
 	world_free(w);
 }
 

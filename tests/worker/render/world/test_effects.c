@@ -193,7 +193,7 @@ static void test_forced(void **state)
 	assert_true(w->emitter_cdf[w->emitter_count] == 0);
 	world_free(w);
 	w = forced("all", VIEW LAMP BALL("1", ""));
-	assert_true(w->effects.aperture && camera_has_aperture(&w->camera) && w->effects.half_vectors &&
+	assert_true(w->effects.aperture && camera_has_aperture(&w->camera) && line_of(w, "half-vectors")->on &&
 		    w->effects.max_depth == 128);
 	world_free(w);
 }
