@@ -34,7 +34,7 @@ struct bsdf_point {
 	const struct wavelengths *w;
 	enum transport transport;
 	bool culled;		   /* no ray meets the surface from below its normal: struct bsdf.culls */
-	struct relief_place place; /* for parts that look at other shading frames: tilted.h, bump_shadow.h */
+	struct relief_place place; /* for parts that look at other shading frames: tilted.h, bumpmap.c */
 };
 
 struct bsdf_sample {

@@ -6,9 +6,90 @@
  * vectors and their derivatives take it into account.
  */
 #include "common/base/color.h"
-#include "worker/render/bsdf/bump_shadow.h"
+#include "worker/render/bsdf/create.h"
 
 #include <string.h>
+
+/* ---- shadows of bumps */
+
+/*
+ * The shadow that bumps cast on each other. A bent normal brings light to where the surface itself is already turned
+ * away, and that light ends abruptly. Taken for microfacets whose slopes are as wide as the normal is bent, bumps lose
+ * some of what comes in at grazing angles: by Smith's factor for light alone, G = 2 / (1 + sqrt(1 + a^2 tan^2 l)) with
+ * a^2 = min(tan^2 b / 8, 1), l and b the angles of light and bent normal to the normal that the surface has without
+ * relief (Conty Estevez, Lecocq, Stein: A Microfacet-Based Shadowing Function to Solve the Bump Terminator Problem.
+ * Ray Tracing Gems, ch. 12, 2019). Not reciprocal. Densities stay as they are, since G lies between 0 and 1.
+ */
+static double square_of_tangent(double cosine)
+{
+	double c2 = cosine * cosine;
+	return fmax(1 - c2, 0) / c2;
+}
+
+/* Where the surface faces away by 90 degrees G is 0, or 1 if the normal is not bent. */
+static double shadow(const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	if (!p->place.frame)
+		return 1;
+	vec3 light = p->transport == TRANSPORT_RADIANCE ? wi : wo, n = p->place.frame(p->place.point, NULL).n;
+	double a2 = fmin(square_of_tangent(n.z) / 8, 1);
+	return a2 > 0 ? 2 / (1 + sqrt(1 + a2 * square_of_tangent(vec3_dot(n, light)))) : 1;
+}
+
+static spectrum shadowed_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct bsdf *inner = b->data;
+	return spectrum_scale(shadow(p, wo, wi), inner->ops->eval(inner, p, wo, wi));
+}
+
+static double shadowed_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct bsdf *inner = b->data;
+	return inner->ops->pdf_solid(inner, p, wo, wi);
+}
+
+/* Of radiance: wi is towards the light. */
+static spectrum shadowed_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	struct bsdf_point radiance = *p;
+	radiance.transport = TRANSPORT_RADIANCE;
+	return spectrum_scale(shadow(&radiance, wo, wi), bsdf_eval_halfvec(b->data, p, wo, wi));
+}
+
+static spectrum shadowed_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
+				    double *chance)
+{
+	spectrum weight = bsdf_eval_delta(b->data, p, wo, mode, wi, chance);
+	return spectrum_is_zero(weight) ? weight : spectrum_scale(shadow(p, wo, *wi), weight);
+}
+
+static bool shadowed_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+			    struct bsdf_sample *out)
+{
+	const struct bsdf *inner = b->data;
+	if (!inner->ops->sample(inner, p, wo, u, out))
+		return false;
+	out->f = spectrum_scale(shadow(p, wo, out->wi), out->f);
+	return true;
+}
+
+static const struct bsdf_ops shadowed_ops = {
+	.decl.type = "bump_shadow",
+	.eval = shadowed_eval,
+	.pdf_solid = shadowed_pdf,
+	.eval_halfvec = shadowed_eval_halfvec,
+	.eval_delta = shadowed_eval_delta,
+	.sample = shadowed_sample,
+};
+
+/* Scales f of all lobes of b, whose relief is known, by G. */
+static int shadow_bumps(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+{
+	b->uses_place = true;
+	return bsdf_wrap(b, &shadowed_ops, n, build, e);
+}
+
+/* ---- bent normals */
 
 struct bend {
 	struct relief relief;
@@ -114,8 +195,7 @@ static int create(struct bsdf *b, const struct scene_node *n, const struct bsdf_
 	b->relief = &bend->relief;
 	b->textured = true;
 	b->uses_tangents |= kind == RELIEF_NORMAL;
-	bool shadow = node_bool(n, "use_shadowing_function", build->dialect_3);
-	return shadow ? bsdf_shadow_bumps(b, n, build, e) : 0;
+	return node_bool(n, "use_shadowing_function", build->dialect_3) ? shadow_bumps(b, n, build, e) : 0;
 }
 
 static int bumpmap_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
