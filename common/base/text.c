@@ -164,6 +164,14 @@ bool text_seconds(const char *text, double *seconds)
 	return with_unit(text, "smhd", units, seconds);
 }
 
+bool text_is_among(const char *text, const char *const *list, size_t count)
+{
+	for (size_t i = 0; i < count; i++)
+		if (strcmp(text, list[i]) == 0)
+			return true;
+	return false;
+}
+
 char *text_borrow(const char *text)
 {
 	union {

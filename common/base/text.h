@@ -19,6 +19,8 @@ size_t text_utf8_length(const unsigned char *p);
 /* Makes a text safe in place: invalid UTF-8 becomes '?', a control character a blank. */
 void text_clean(char *text);
 
+bool text_is_among(const char *text, const char *const *list, size_t count);
+
 /* Casts const away for interfaces that lack it but change nothing: generated messages, constant arguments. */
 char *text_borrow(const char *text);
 

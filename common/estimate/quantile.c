@@ -77,9 +77,3 @@ double f_quantile(double p, double a, double b)
 	}
 	return (double)(float)high;
 }
-
-double chi_square_5(double degrees)
-{
-	double s = 2 / (9 * degrees), root = 1 - s - 1.6448536269514722 * sqrt(s);
-	return root > 0 ? degrees * root * root * root : 0;
-}

@@ -13,8 +13,4 @@ double f_below(double x, double a, double b);
  * libraries whose logarithms differ in the last bits agree. */
 double f_quantile(double p, double a, double b);
 
-/* 5 % quantile of chi-square: the lower end of a two-sided 90 % interval (Wilson and Hilferty 1931; too low below 3
- * degrees, which widens intervals). Uses square roots and products only: the same bits on any machine. */
-double chi_square_5(double degrees);
-
 #endif

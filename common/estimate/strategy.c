@@ -51,10 +51,10 @@ static const char *thousands(uint64_t n, char out[NUMBER])
 }
 
 /* A cell of the given width: a / b with a suffix, or '-' if b is 0. */
-static void put_ratio(struct text *t, int width, int decimals, double factor, uint64_t a, uint64_t b)
+static void put_ratio(struct text *t, int width, double factor, uint64_t a, uint64_t b)
 {
 	if (b)
-		text_put(t, " %*.*f", width, decimals, factor * (double)a / (double)b);
+		text_put(t, " %*.2f", width, factor * (double)a / (double)b);
 	else
 		text_put(t, " %*s", width, "-");
 }
@@ -97,12 +97,12 @@ void strategy_table(const char *mixture, const struct canvas_counts *n, char *te
 		char name[NAME + 1], number[3][NUMBER];
 		plan_strategy_name(mixture, (uint32_t)i, name, sizeof name);
 		text_put(&t, "%-*s %14s", NAME, name, thousands(c[STRATEGY_PROPOSED], number[0]));
-		put_ratio(&t, 9, 2, 100, c[STRATEGY_ACCEPTED], c[STRATEGY_PROPOSED]);
-		put_ratio(&t, 9, 2, 1, c[STRATEGY_RAYS], c[STRATEGY_PROPOSED]);
+		put_ratio(&t, 9, 100, c[STRATEGY_ACCEPTED], c[STRATEGY_PROPOSED]);
+		put_ratio(&t, 9, 1, c[STRATEGY_RAYS], c[STRATEGY_PROPOSED]);
 		text_put(&t, " %14s", thousands(c[STRATEGY_WALKS], number[1]));
-		put_ratio(&t, 9, 2, 1, c[STRATEGY_ITERATIONS], c[STRATEGY_WALKS]);
+		put_ratio(&t, 9, 1, c[STRATEGY_ITERATIONS], c[STRATEGY_WALKS]);
 		text_put(&t, " %14s", thousands(c[STRATEGY_REVERSE_WALKS], number[2]));
-		put_ratio(&t, 8, 2, 100, failures(c), c[STRATEGY_PROPOSED]);
+		put_ratio(&t, 8, 100, failures(c), c[STRATEGY_PROPOSED]);
 		put_failures(&t, c);
 	}
 }

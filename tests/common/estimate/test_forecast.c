@@ -25,6 +25,13 @@ static double chi_square(struct dice *d, double degrees)
 	return degrees * root * root * root;
 }
 
+/* 5 % quantile of chi-square (Wilson and Hilferty 1931). */
+static double chi_square_5(double degrees)
+{
+	double s = 2 / (9 * degrees), root = 1 - s - 1.6448536269514722 * sqrt(s);
+	return root > 0 ? degrees * root * root * root : 0;
+}
+
 /* A render: sum of squares over `degrees` dimensions of a Brownian motion whose variance grows by 1 a unit of work. */
 struct walk {
 	double degrees, square, work, scale; /* relMSE = scale / work */

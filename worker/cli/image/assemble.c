@@ -9,6 +9,7 @@
 #include "worker/cli/image/assemble.h"
 
 #include "common/base/mem.h"
+#include "common/base/text.h"
 #include "common/exr/image_file.h"
 #include "common/exr/exr_read.h"
 
@@ -244,14 +245,6 @@ static int close_up(struct assembly *a, struct error *e)
 	return 0;
 }
 
-static bool among(const char *name, const char *const *list, size_t count)
-{
-	for (size_t i = 0; i < count; i++)
-		if (strcmp(name, list[i]) == 0)
-			return true;
-	return false;
-}
-
 static void put_number(struct exr_image *f, const char *name, double x)
 {
 	f->attributes[f->attribute_count++] =
@@ -282,7 +275,7 @@ static int write(struct assembly *a, size_t count, unsigned char **bytes, size_t
 	f->attributes = list;
 	for (size_t i = 0; i < a->first.attribute_count; i++) {
 		const struct exr_attribute *from = &a->first.attributes[i];
-		if (a->kept[i] && !among(from->name, added, ADDED) && !among(from->name, own, OWN))
+		if (a->kept[i] && !text_is_among(from->name, added, ADDED) && !text_is_among(from->name, own, OWN))
 			list[f->attribute_count++] = *from;
 	}
 	for (size_t i = 0; i < ADDED; i++)

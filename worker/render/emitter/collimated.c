@@ -65,7 +65,7 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	b->axis = vec3_normalize(mat4_vector(&to_world, (vec3){0, 0, 1}));
 	if (!vec3_is_finite(b->axis))
 		return node_error(n, e, EINVAL, "to_world gives the beam no direction");
-	b->light.x.p = vec3_scale(build->scale, vec3_sub(mat4_point(&to_world, (vec3){0, 0, 0}), build->center));
+	b->light.x.p = delta_origin(&to_world, build);
 	int code = delta_create(em, n, "power", build->scale * build->scale, build, e);
 	if (code)
 		return code;

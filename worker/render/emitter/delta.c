@@ -55,11 +55,16 @@ double delta_strength(const struct delta_light *l)
 	return l->factor * color_mean(&l->color);
 }
 
-int delta_either(const struct scene_node *n, const char *name, const char *other, struct error *e)
+int delta_either(const struct scene_node *n, const char *name, struct error *e)
 {
-	if (node_find(n, name) && node_find(n, other))
-		return node_error(n, e, EINVAL, "%s and %s are both given: only one is allowed", name, other);
+	if (node_find(n, name) && node_find(n, "to_world"))
+		return node_error(n, e, EINVAL, "%s and to_world are both given: only one is allowed", name);
 	return 0;
+}
+
+vec3 delta_origin(const mat4 *to_world, const struct emitter_build *build)
+{
+	return vec3_scale(build->scale, vec3_sub(mat4_point(to_world, (vec3){0, 0, 0}), build->center));
 }
 
 bool delta_sample_point(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf_point)

@@ -34,8 +34,10 @@ bool delta_axes_of(const mat4 *to_world, vec3 axes[3]);
 /* The same for a node; -EINVAL with a sentence. */
 int delta_axes(const struct scene_node *n, const mat4 *to_world, vec3 axes[3], struct error *e);
 double delta_strength(const struct delta_light *l);
-/* -EINVAL with a sentence if the node gives both. */
-int delta_either(const struct scene_node *n, const char *name, const char *other, struct error *e);
+/* -EINVAL with a sentence if the node gives both `name` and to_world. */
+int delta_either(const struct scene_node *n, const char *name, struct error *e);
+/* The origin of to_world in the rescaled world. */
+vec3 delta_origin(const mat4 *to_world, const struct emitter_build *build);
 
 bool delta_sample_point(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf_point);
 double delta_pdf_point(const struct emitter *em, const struct emitter_point *x);

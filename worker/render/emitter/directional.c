@@ -13,7 +13,7 @@ static spectrum radiance(const struct emitter *em, const struct emitter_point *x
 static int create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
 {
 	struct delta_light *l = em->data;
-	int code = delta_either(n, "direction", "to_world", e);
+	int code = delta_either(n, "direction", e);
 	if (code)
 		return code;
 	mat4 to_world = node_transform(n, "to_world");

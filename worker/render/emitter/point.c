@@ -28,7 +28,7 @@ static double pdf_direction(const struct emitter *em, const struct emitter_point
 static int create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
 {
 	struct delta_light *l = em->data;
-	int code = delta_either(n, "position", "to_world", e);
+	int code = delta_either(n, "position", e);
 	if (code)
 		return code;
 	mat4 to_world = node_transform(n, "to_world");

@@ -74,7 +74,7 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	mat4 to_world = node_transform(n, "to_world");
 	double degrees, scale = node_float(n, "scale", 1);
 	char axis[FOV_AXIS_MAX];
-	p->light.x.p = vec3_scale(build->scale, vec3_sub(mat4_point(&to_world, (vec3){0, 0, 0}), build->center));
+	p->light.x.p = delta_origin(&to_world, build);
 	int code = delta_axes(n, &to_world, p->axes, e);
 	if (!code)
 		code = fov_read(n, &degrees, axis, e);

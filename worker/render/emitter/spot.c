@@ -97,7 +97,7 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	s->cutoff = cutoff * (M_PI / 180);
 	s->beam = beam * (M_PI / 180);
 	s->height = 2 * pow(sin(0.5 * s->cutoff), 2);
-	s->light.x.p = vec3_scale(build->scale, vec3_sub(mat4_point(&to_world, (vec3){0, 0, 0}), build->center));
+	s->light.x.p = delta_origin(&to_world, build);
 	int code = delta_create(em, n, "intensity", build->scale * build->scale, build, e);
 	if (code)
 		return code;

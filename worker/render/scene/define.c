@@ -2,6 +2,7 @@
 #include "worker/render/scene/define.h"
 
 #include "common/base/spelling.h"
+#include "common/base/text.h"
 
 #include <string.h>
 
@@ -69,14 +70,6 @@ int define_default(struct define_table *t, const char *name, const char *value, 
 	return 0;
 }
 
-static bool is_missing(const struct define_table *t, const char *name)
-{
-	for (size_t i = 0; i < t->missing_count; i++)
-		if (strcmp(t->missing[i], name) == 0)
-			return true;
-	return false;
-}
-
 static int add_missing(struct define_table *t, const char *name, struct error *e)
 {
 	const char *kept = arena_strdup(t->arena, name);
@@ -88,7 +81,7 @@ static int add_missing(struct define_table *t, const char *name, struct error *e
 
 int define_without_value(struct define_table *t, const char *name, struct error *e)
 {
-	if (t->missing_count == DEFINE_MISSING_MAX || is_missing(t, name))
+	if (t->missing_count == DEFINE_MISSING_MAX || text_is_among(name, t->missing, t->missing_count))
 		return 0;
 	return add_missing(t, name, e);
 }
@@ -99,7 +92,8 @@ static int refuse_unknown(struct define_table *t, const char *name, size_t lengt
 	size_t n = length < sizeof wanted - 1 ? length : sizeof wanted - 1;
 	memcpy(wanted, name, n);
 	wanted[n] = 0;
-	if (t->incomplete || t->missing_count == DEFINE_MISSING_MAX || is_missing(t, wanted))
+	if (t->incomplete || t->missing_count == DEFINE_MISSING_MAX ||
+	    text_is_among(wanted, t->missing, t->missing_count))
 		return -EEXIST;
 	int r = add_missing(t, wanted, e);
 	if (r)

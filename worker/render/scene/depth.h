@@ -4,7 +4,8 @@
 #ifndef WORKER_RENDER_SCENE_DEPTH_H
 #define WORKER_RENDER_SCENE_DEPTH_H
 
-#include <stdbool.h>
+#include "common/base/text.h"
+
 #include <string.h>
 
 enum { SCENE_MAX_DEPTH = 128, SCENE_DIRECT_DEPTH = 2, SCENE_PRB_DEPTH = 6 };
@@ -19,10 +20,7 @@ static inline bool depth_is_direct(const char *type)
 static inline bool depth_is_prb(const char *type)
 {
 	static const char *const names[] = {"prb", "prb_basic", "prb_projective", "prb_reparam"};
-	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-		if (strcmp(type, names[i]) == 0)
-			return true;
-	return false;
+	return text_is_among(type, names, sizeof names / sizeof *names);
 }
 
 #endif

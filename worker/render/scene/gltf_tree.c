@@ -47,24 +47,17 @@ int gltf_fail(struct gltf *g, const struct gltf_at *at, int errno_value, const c
 	return g->failed;
 }
 
-/* A mesh of several nodes says the same of each. */
-static bool is_noted(const struct gltf *g)
-{
-	for (uint32_t i = 0; i < g->tree->missing_count; i++)
-		if (strcmp(g->tree->missing[i], g->error->text) == 0)
-			return true;
-	return false;
-}
-
 void gltf_go_on(struct gltf *g)
 {
 	struct xml_tree *t = g->tree;
 	bool limit = g->failed == -ENOMEM || g->failed == -E2BIG || g->failed == -EFBIG;
-	if (g->failed && !limit && (is_noted(g) || t->missing_count < XML_MISSING_MAX)) {
-		const char *text = is_noted(g) ? NULL : arena_strdup(g->arena, g->error->text);
+	/* A mesh of several nodes says the same of each. */
+	bool noted = g->failed && text_is_among(g->error->text, t->missing, t->missing_count);
+	if (g->failed && !limit && (noted || t->missing_count < XML_MISSING_MAX)) {
+		const char *text = noted ? NULL : arena_strdup(g->arena, g->error->text);
 		if (text)
 			t->missing[t->missing_count++] = text;
-		g->failed = text || is_noted(g) ? 0 : -ENOMEM;
+		g->failed = text || noted ? 0 : -ENOMEM;
 		t->holes = true;
 	}
 }
@@ -289,10 +282,7 @@ bool gltf_knows(const char *extension)
 		"MSFT_texture_dds",
 		/* They change no light: order of triangles, other looks, who made it. */
 		"FB_ngon_encoding", "KHR_materials_variants", "KHR_xmp", "KHR_xmp_json_ld"};
-	for (size_t i = 0; i < sizeof known / sizeof *known; i++)
-		if (strcmp(known[i], extension) == 0)
-			return true;
-	return false;
+	return text_is_among(extension, known, sizeof known / sizeof *known);
 }
 
 void gltf_grow_box(struct gltf *g, vec3 p)

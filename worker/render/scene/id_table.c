@@ -36,12 +36,11 @@ struct xml_element *id_table_look(const struct id_table *t, const char *id)
 	return found ? found->element : NULL;
 }
 
-int id_table_find(struct id_table *t, const struct xml_element *el, const char *attribute, struct xml_element **out,
-		  struct error *e)
+int id_table_find(struct id_table *t, const struct xml_element *el, struct xml_element **out, struct error *e)
 {
-	const char *id = xml_attribute(el, attribute);
+	const char *id = xml_attribute(el, "id");
 	if (!id)
-		return xml_error(el, e, EINVAL, "needs an attribute `%s`", attribute);
+		return xml_error(el, e, EINVAL, "needs an attribute `id`");
 	if ((*out = id_table_look(t, id)))
 		return 0;
 	if (t->incomplete || el->unset)
@@ -90,7 +89,7 @@ static int read_alias(struct id_table *t, const struct xml_element *el, struct e
 		return xml_error(el, e, EINVAL, "needs an attribute `as`");
 	int r = element_check(el, "id|as", false, e);
 	if (!r)
-		r = id_table_find(t, el, "id", &target, e);
+		r = id_table_find(t, el, &target, e);
 	if (r)
 		return r;
 	size_t at = t->count;

@@ -32,9 +32,8 @@ bool id_table_is_absent(const struct xml_element *el);
 /* The object of that id. NULL: none. */
 struct xml_element *id_table_look(const struct id_table *t, const char *id);
 
-/* The object that el's attribute names. -ENOENT, with the nearest id, or REPORT_TOLD, where what is missing has been
+/* The object that el's id names. -ENOENT, with the nearest id, or REPORT_TOLD, where what is missing has been
  * reported. */
-int id_table_find(struct id_table *t, const struct xml_element *el, const char *attribute, struct xml_element **out,
-		  struct error *e);
+int id_table_find(struct id_table *t, const struct xml_element *el, struct xml_element **out, struct error *e);
 
 #endif

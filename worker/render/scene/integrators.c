@@ -19,10 +19,7 @@ bool integrators_show_other(const struct scene_node *n)
 					     "sppm",
 					     "ppm",
 					     "photonmapper"};
-	for (size_t i = 0; i < sizeof others / sizeof *others; i++)
-		if (strcmp(n->type, others[i]) == 0)
-			return true;
-	return false;
+	return text_is_among(n->type, others, sizeof others / sizeof *others);
 }
 
 const struct scene_node *integrators_inner(const struct scene_node *n)
@@ -55,8 +52,7 @@ const struct scene_node *integrators_without_media(const struct scene_node *n)
 	static const char *const without[] = {"path", "direct",	   "direct_projective",
 					      "prb",  "prb_basic", "prb_projective"};
 	for (; n; n = integrators_inner(n))
-		for (size_t i = 0; i < sizeof without / sizeof *without; i++)
-			if (strcmp(n->type, without[i]) == 0)
-				return n;
+		if (text_is_among(n->type, without, sizeof without / sizeof *without))
+			return n;
 	return NULL;
 }

@@ -288,7 +288,7 @@ struct xml_element *lenient_inner(struct id_table *ids, const struct xml_element
 	enum plugin_class cls;
 	for (struct xml_element *c = el->first; c; c = c->next) {
 		struct xml_element *target = c;
-		if (strcmp(c->name, "ref") == 0 && id_table_find(ids, c, "id", &target, &unused))
+		if (strcmp(c->name, "ref") == 0 && id_table_find(ids, c, &target, &unused))
 			continue;
 		if (plugin_class_find(target->name, &cls) && cls == wanted)
 			return target;

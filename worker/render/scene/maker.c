@@ -266,7 +266,7 @@ static int read_content(struct maker *m, struct draft *d, const struct xml_eleme
 	struct xml_element *target;
 	int r = element_check(el, "id|name", false, m->error);
 	if (!r)
-		r = id_table_find(&m->ids, el, "id", &target, m->error);
+		r = id_table_find(&m->ids, el, &target, m->error);
 	if (!r && id_table_is_absent(target)) /* which is reported where it stands */
 		return REPORT_TOLD;
 	return r ? r : read_object(m, d, owner, el, target);
@@ -352,7 +352,7 @@ static int read_inside(struct maker *m, struct xml_element *el, int refused)
 		if (!c->ignored && plugin_class_find(c->name, &cls))
 			r = maker_node(m, c, &unused);
 		else if (!c->ignored && strcmp(c->name, "ref") == 0)
-			r = id_table_find(&m->ids, c, "id", &target, m->error);
+			r = id_table_find(&m->ids, c, &target, m->error);
 		else if (!c->ignored && value_is_element(c->name))
 			r = read_unknown(m, c);
 		r = report_problem(&m->report, r, m->error);

@@ -78,9 +78,9 @@ const struct scene_node *node_ref(const struct scene_node *n, const char *name)
 	return p && p->value.type == VALUE_NODE ? p->value.as.node : NULL;
 }
 
-const struct animation *node_animation(const struct scene_node *n, const char *name)
+const struct animation *node_animation(const struct scene_node *n)
 {
-	const struct property *p = node_find(n, name);
+	const struct property *p = node_find(n, "to_world");
 	return p ? p->value.animation : NULL;
 }
 

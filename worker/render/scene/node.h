@@ -57,8 +57,8 @@ double node_float(const struct scene_node *n, const char *name, double fallback)
 int64_t node_int(const struct scene_node *n, const char *name, int64_t fallback);
 bool node_bool(const struct scene_node *n, const char *name, bool fallback);
 const char *node_string(const struct scene_node *n, const char *name, const char *fallback);
-mat4 node_transform(const struct scene_node *n, const char *name); /* identity if absent; the first if it moves */
-const struct animation *node_animation(const struct scene_node *n, const char *name); /* NULL: it is still */
+mat4 node_transform(const struct scene_node *n, const char *name);  /* identity if absent; the first if it moves */
+const struct animation *node_animation(const struct scene_node *n); /* of its to_world; NULL: it is still */
 const struct scene_node *node_child(const struct scene_node *n, enum plugin_class cls, uint32_t index); /* NULL: none */
 const struct scene_node *node_ref(const struct scene_node *n, const char *name); /* VALUE_NODE or NULL */
 

@@ -85,7 +85,7 @@ static const char *kind_of(const struct spread *s, const struct xml_element *el)
 {
 	struct error unused;
 	struct xml_element *target;
-	if (strcmp(el->name, "ref") == 0 && id_table_find(s->ids, el, "id", &target, &unused) == 0)
+	if (strcmp(el->name, "ref") == 0 && id_table_find(s->ids, el, &target, &unused) == 0)
 		return target->name;
 	return el->name;
 }

@@ -316,7 +316,7 @@ bool scene_settings_upright(mat4 m, mat4 *out)
 /* Where the camera is when the shutter opens. */
 static int read_place(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
 {
-	const struct animation *a = node_animation(sensor, "to_world");
+	const struct animation *a = node_animation(sensor);
 	mat4 m = node_transform(sensor, "to_world");
 	if (a) {
 		struct motion motion;

@@ -39,7 +39,7 @@ static const struct scene_node *placed_at(const struct scene_node *n, mat4 place
  * shutter is open; NULL: it does not. */
 static int stop(struct listing *l, const struct scene_node **n, const struct animation **moves)
 {
-	const struct animation *a = node_animation(*n, "to_world");
+	const struct animation *a = node_animation(*n);
 	struct motion m;
 	*moves = NULL;
 	if (!a)
@@ -56,7 +56,7 @@ static int stop(struct listing *l, const struct scene_node **n, const struct ani
 static int append(struct listing *l, const struct scene_node *n, const struct scene_node *instance)
 {
 	const struct animation *moves = l->moves;
-	if (instance && node_animation(n, "to_world"))
+	if (instance && node_animation(n))
 		return node_error(n, l->e, ENOTSUP, "motion of a shape in a shapegroup is not supported");
 	int rc = instance ? 0 : stop(l, &n, &moves);
 	if (rc)

@@ -11,6 +11,7 @@
  *
  * The distance to the edge across from a corner is the corner's barycentric coordinate times its height.
  */
+#include "common/base/text.h"
 #include "worker/render/texture/attribute_table.h"
 #include "worker/render/texture/texture.h"
 
@@ -26,10 +27,7 @@ struct wireframe {
 static bool has_lines(const struct attribute_table *mesh)
 {
 	static const char *const types[] = {"obj", "ply", "serialized", "gltf", "cube"};
-	for (size_t i = 0; mesh->triangle_count > 0 && i < sizeof types / sizeof *types; i++)
-		if (strcmp(mesh->shape->type, types[i]) == 0)
-			return true;
-	return false;
+	return mesh->triangle_count > 0 && text_is_among(mesh->shape->type, types, sizeof types / sizeof *types);
 }
 
 static double mean_side(const struct attribute_table *mesh)

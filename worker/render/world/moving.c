@@ -130,7 +130,7 @@ static int check_emitter(const struct builder *b, const struct emitter *em, cons
 int moving_emitter(struct builder *b, struct emitter *em, const struct scene_node *n)
 {
 	struct world *w = b->w;
-	const struct animation *a = node_animation(n, "to_world");
+	const struct animation *a = node_animation(n);
 	if (!a)
 		return 0;
 	struct motion *m;
@@ -154,7 +154,7 @@ int moving_camera(struct builder *b)
 	const struct scene_node *sensor = scene_sensor(b->scene, (uint32_t)w->accuracy.sensor);
 	if (!w->settings.moves)
 		return 0;
-	const struct animation *a = node_animation(sensor, "to_world");
+	const struct animation *a = node_animation(sensor);
 	struct motion *m;
 	bool moves;
 	struct keyframe *upright = arena_alloc(&b->scratch, a->count, sizeof *upright);

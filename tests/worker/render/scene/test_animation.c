@@ -61,7 +61,7 @@ static void test_animations(void **state)
 	struct scene s =
 		read_ok("<scene version='3.0.0'><shape type='sphere'>" TWO("5") "</shape><shape type='sphere'>" TWO(
 			"6") "</shape><shape type='sphere'>" TWO("5") "</shape></scene>");
-	const struct animation *a = node_animation(s.objects[0], "to_world");
+	const struct animation *a = node_animation(s.objects[0]);
 	mat4 m = node_transform(s.objects[0], "to_world");
 	assert_true(m.m[0][3] == 4 && s.note_count == 0);
 	assert_non_null(a);
@@ -77,7 +77,7 @@ static void test_animations(void **state)
 	assert_int_equal(read_xml(&s, grouped, false, &e), -ENOTSUP);
 	assert_int_equal(read_xml(&s, grouped, true, &e), 0);
 	m = node_transform(s.objects[0]->children[0], "to_world");
-	assert_true(m.m[0][3] == 4 && s.note_count == 1 && !node_animation(s.objects[0]->children[0], "to_world"));
+	assert_true(m.m[0][3] == 4 && s.note_count == 1 && !node_animation(s.objects[0]->children[0]));
 	assert_non_null(
 		strstr(s.notes[0], "all but the start of the `motion` is not supported and left out (lenient)"));
 	scene_fini(&s);
