@@ -519,14 +519,17 @@ int client_fetch(struct client *cl, uint64_t job, Farm__What what, const char *p
 	return rc;
 }
 
-/* Turns a name that somebody else chose into a safe file name: not hidden, and not like an option. */
-static int take_name(const char *output, char name[CLIENT_NAME_BYTES], struct error *e)
+/* Turns a name that somebody else chose into a safe file name: not hidden, and not like an option. That of the image
+ * stays free while there is only a preview: room.exr is previewed in room.preview.exr. */
+static int take_name(const char *output, bool preview, char name[CLIENT_NAME_BYTES], struct error *e)
 {
 	struct stat st;
-	const char *slash = strrchr(output, '/'), *last = slash ? slash + 1 : output;
-	if (!envelope_text_ok(last, CLIENT_NAME_BYTES - 1) || !*last || *last == '.' || *last == '-')
+	const char *slash = strrchr(output, '/'), *last = slash ? slash + 1 : output, *dot = strrchr(last, '.');
+	int stem = (int)(dot ? (size_t)(dot - last) : strlen(last)), n = 0;
+	if (envelope_text_ok(last, CLIENT_NAME_BYTES - 1) && *last && *last != '.' && *last != '-')
+		n = snprintf(name, CLIENT_NAME_BYTES, "%.*s%s%s", stem, last, preview ? ".preview" : "", last + stem);
+	if (n <= 0 || n >= CLIENT_NAME_BYTES)
 		return error_set(e, EEXIST, "the name of the job's image cannot be used here: give one with -o FILE");
-	text_copy(name, CLIENT_NAME_BYTES, last);
 	return lstat(name, &st) == 0 ? error_set(e, EEXIST, "%s exists: -o FILE replaces it", name) : 0;
 }
 
@@ -536,7 +539,7 @@ int client_fetch_here(struct client *cl, uint64_t job, Farm__What what, char nam
 	int rc = fetch_chunk(cl, job, what, 0, &first, e);
 	if (rc)
 		return rc;
-	rc = take_name(first.envelope.message->fetch_chunk->output, name, e);
+	rc = take_name(first.envelope.message->fetch_chunk->output, what == FARM__WHAT__WHAT_PREVIEW, name, e);
 	if (!rc)
 		rc = fetch_file(cl, &first, job, what, name, false, e);
 	client_message_fini(&first);

@@ -41,8 +41,9 @@ void client_message_fini(struct client_message *m);
  * fetch on the way, in favour of others, it begins again up to four times, and says so on stderr. -EIO: an error of the
  * local file; -EAGAIN: it was dropped each time. */
 int client_fetch(struct client *cl, uint64_t job, Farm__What what, const char *path, struct error *e);
-/* The same into the current folder, under the last part of the name that hslt-submit was given. Because that name
- * came over the wire, -EEXIST if a file of that name exists, or if the name is unsafe (hidden, or like an option). */
+/* The same into the current folder, under the last part of the name that hslt-submit was given, for a preview with
+ * `.preview` before its extension. Because that name came over the wire, -EEXIST if a file of that name exists, or if
+ * the name is unsafe (hidden, or like an option). */
 int client_fetch_here(struct client *cl, uint64_t job, Farm__What what, char name[CLIENT_NAME_BYTES], struct error *e);
 /* The same, to a stream, which gets nothing before the last byte has arrived. */
 int client_fetch_stream(struct client *cl, uint64_t job, Farm__What what, int fd, struct error *e);

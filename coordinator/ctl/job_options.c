@@ -24,7 +24,8 @@ static const struct option_row rows[] = {
 	 "fetch: the output file; only an image is replaced (without it: into the current folder, under the last "
 	 "part of the name given to hslt-submit, never replacing a file); -: stdout",
 	 OPTION_OUTPUT(struct job_options, output)},
-	{"preview", 0, NULL, "fetch: the image so far, while the job runs", OPTION_FLAG(struct job_options, preview)},
+	{"preview", 0, NULL, "fetch: the image so far, while the job runs; room.exr is previewed in room.preview.exr",
+	 OPTION_FLAG(struct job_options, preview)},
 	{"json", 0, NULL, "list: one JSON array", OPTION_FLAG(struct job_options, json)},
 	{"spp", 0, "+N", "extend: additional samples per pixel", OPTION_COUNT(struct job_options, more_spp, 1, 1e15)},
 	{"mutations", 0, "+N", "extend: additional mutations or samples",

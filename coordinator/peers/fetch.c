@@ -96,8 +96,9 @@ static int begin_fetch(struct session *p, const Farm__Fetch *f, struct job_view 
 	if (f->what == FARM__WHAT__WHAT_RESULT && v->record.cleared > 0)
 		return cleared(&v->record, e);
 	if (f->what == FARM__WHAT__WHAT_RESULT && !v->record.has_result)
-		return error_set(e, ENOENT, "job j%llu is %s: it has no result", (unsigned long long)f->job,
-				 v->record.state);
+		return error_set(e, ENOENT, "job j%llu is %s: it has no result%s", (unsigned long long)f->job,
+				 v->record.state,
+				 v->record.ended > 0 ? "" : "; hslt-job fetch --preview fetches the image so far");
 	return open_file(p, f, file, e);
 }
 

@@ -11,6 +11,8 @@ is_state "$id" queued || fail "without workers a job waits"
 [ -n "$(value "$id" waiting)" ] || fail "it does not say why it waits"
 "$BIN/hslt-job" fetch --preview "$id" -o "$DIR/early.exr" 2>"$DIR/err.log" && fail "there is a preview of nothing"
 grep -q "no round of $id is complete yet" "$DIR/err.log" || fail "a preview of nothing: $(cat "$DIR/err.log")"
+code 1 "$BIN/hslt-job" fetch "$id" -o "$DIR/early.exr"
+grep -q "it has no result; hslt-job fetch --preview" "$DIR/err.log" || fail "too early: $(cat "$DIR/err.log")"
 for name in "$(printf %0200d 0)" "$(printf 'a\033[2J')"; do
 	code 2 "$BIN/hslt-submit" "$BOX" -o "$DIR/b.exr" --spp 1 --name "$name"
 	grep -q -e '--name takes 1 to 127 bytes of UTF-8 without control characters' "$DIR/err.log" || fail "a name: $(cat "$DIR/err.log")"
@@ -22,6 +24,8 @@ code 6 "$BIN/hslt-submit" "$long" --path "$(dirname "$BOX")" -o "$DIR/b.exr" --s
 grep -q -e "--name: at most 127 bytes" "$DIR/err.log" || fail "a long name: $(cat "$DIR/err.log")"
 second=$(submit "$BOX" -o "$DIR/b.exr" --integrator path --spp 1)
 "$BIN/hslt-job" cancel "$second" >/dev/null
+code 1 "$BIN/hslt-job" fetch "$second" -o "$DIR/early.exr"
+grep -q "is cancelled: it has no result$" "$DIR/err.log" || fail "a cancelled job: $(cat "$DIR/err.log")"
 for list in "$BIN/hslt-status" "$BIN/hslt-job list"; do
 	$list | grep -q "^$second  *cancelled [^#]*$" || fail "$list says twice that it is cancelled: $($list | grep "^$second")"
 done

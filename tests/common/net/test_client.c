@@ -294,6 +294,34 @@ static void names_lead_nowhere(void **state)
 	is_plain = false;
 }
 
+/* The image's name is free when it is done, and a preview replaces nothing either. */
+static void previews_leave_the_name(void **state)
+{
+	(void)state;
+	static const char *const names[][2] = {
+		{"/home/ann/soon.exr", "soon.preview.exr"}, {"plain", "plain.preview"}, {"a.b.exr", "a.b.preview.exr"}};
+	char taken[CLIENT_NAME_BYTES], longest[CLIENT_NAME_BYTES];
+	struct error e;
+	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+		for (int again = 0; again < 2; again++) {
+			struct coordinator c = {.name = names[i][0]};
+			struct client *cl = meet(&c);
+			int rc = client_fetch_here(cl, 1, FARM__WHAT__WHAT_PREVIEW, taken, &e);
+			part(&c, cl);
+			assert_int_equal(rc, again ? -EEXIST : 0);
+			assert_string_equal(taken, names[i][1]);
+			assert_true(holds(taken, image, sizeof image));
+		}
+	assert_int_not_equal(access("soon.exr", F_OK), 0);
+	/* no room for the addition */
+	memset(longest, 'x', sizeof longest - 1);
+	longest[sizeof longest - 1] = 0;
+	struct coordinator c = {.name = longest};
+	struct client *cl = meet(&c);
+	assert_int_equal(client_fetch_here(cl, 1, FARM__WHAT__WHAT_PREVIEW, taken, &e), -EEXIST);
+	part(&c, cl);
+}
+
 static void who_names_a_file_gets_it(void **state)
 {
 	(void)state;
@@ -513,6 +541,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(names_lead_nowhere),
+		cmocka_unit_test(previews_leave_the_name),
 		cmocka_unit_test(who_names_a_file_gets_it),
 		cmocka_unit_test(a_file_of_another_size_is_another_file),
 		cmocka_unit_test(a_signal_leaves_nothing_half_done),
