@@ -172,6 +172,22 @@ bool text_is_among(const char *text, const char *const *list, size_t count)
 	return false;
 }
 
+void text_lines(char *out, size_t size, const char *const *texts, size_t count)
+{
+	enum { MORE = 40 }; /* bytes of "\nand N more" */
+	size_t used = 0;
+	*out = 0;
+	for (size_t i = 0; i < count; i++) {
+		size_t n = strlen(texts[i]) + (i > 0), rest = i + 1 < count ? MORE : 0;
+		if (used + n + rest >= size) {
+			text_print(out + used, size - used, "%sand %zu more", i ? "\n" : "", count - i);
+			return;
+		}
+		text_print(out + used, size - used, "%s%s", i ? "\n" : "", texts[i]);
+		used += strlen(out + used);
+	}
+}
+
 char *text_borrow(const char *text)
 {
 	union {

@@ -40,4 +40,7 @@ struct text {
 };
 __attribute__((format(printf, 2, 3))) void text_put(struct text *t, const char *format, ...);
 
+/* The texts, one per line, without a newline at the end. Where not all fit, the last line is "and N more". */
+void text_lines(char *out, size_t size, const char *const *texts, size_t count);
+
 #endif

@@ -202,6 +202,8 @@ static void add_extra(struct header *h, const struct header_extra *x)
 		add_string(h, H_SCENE_HASH, x->scene_hash);
 	if (x->camera && *x->camera)
 		add_string(h, H_CAMERA, x->camera);
+	if (x->scene_notes && *x->scene_notes)
+		add_string(h, H_SCENE_NOTES, x->scene_notes);
 	add_int(h, H_MIXED, x->mixed);
 	begin_string(h, H_EFFECTS);
 	for (size_t i = 0; i < x->effect_count; i++)

@@ -33,6 +33,7 @@ struct header_extra {
 	const char *scene_hash;		 /* its SHA-256 in hexadecimal; NULL: not known */
 	const struct plan_scene *inputs; /* NULL: none */
 	const char *camera;		 /* render_camera_text; NULL or "": not known */
+	const char *scene_notes;	 /* text_lines of them, in HEADER_SCENE_NOTES bytes; NULL or "": none */
 	size_t effect_count;
 	const struct header_effect *effects;
 	bool mixed; /* workers of different numeric fingerprints took part: the bits are not reproducible */
@@ -42,7 +43,7 @@ struct header_extra {
 	const char *end;  /* merge_end_name; NULL: a preview */
 };
 
-enum { HEADER_ATTRIBUTES = 64, HEADER_TEXT = 49152 };
+enum { HEADER_ATTRIBUTES = 64, HEADER_TEXT = 49152, HEADER_SCENE_NOTES = 4096 };
 struct header {
 	size_t count;
 	struct exr_attribute attributes[HEADER_ATTRIBUTES]; /* storage of the strings */

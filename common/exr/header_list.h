@@ -46,6 +46,8 @@ ROW(STUCK, "hslt:stuck", STRING, false, "times that a chain accepted nothing dur
 ROW(LONGEST_STUCK, "hslt:longestStuck", STRING, false, "most rejections in a row")
 ROW(STRATEGIES, "hslt:strategies", STRING, false, "what each strategy of the mixture did; one per line")
 ROW(NOTE, "hslt:note", STRING, false, "notes on the image")
+ROW(SCENE_NOTES, "hslt:sceneNotes", STRING, false,
+    "notes on the scene file: what is ignored, read otherwise, or replaced by --lenient; one per line")
 ROW(AGREEMENT, "hslt:agreement", STRING, false,
     "whether the chains agree: agree, too short, disagree (Metropolis only)")
 ROW(DISAGREEMENT, "hslt:disagreement", STRING, false, "what disagrees, where, by how much")

@@ -220,6 +220,14 @@ static void print_share(const json_t *job)
 	       number_of(job, "share"));
 }
 
+static void print_scene_notes(const json_t *job)
+{
+	size_t i;
+	const json_t *one;
+	json_array_foreach(json_object_get(job, "sceneNotes"), i, one)
+		printf("       note: %s\n", json_string_value(one));
+}
+
 static void print_effects(const json_t *job)
 {
 	size_t i;
@@ -342,6 +350,7 @@ static void print_snapshot(const json_t *snapshot, const char *only)
 			print_doubt(job);
 			print_forecast(job);
 			print_verified(job);
+			print_scene_notes(job);
 			print_effects(job);
 			print_strategies(job);
 			print_agreement(job);

@@ -50,6 +50,7 @@ static void begin_record(struct live_job *job, const char *owner, double submitt
 	text_copy(r->output, sizeof r->output, m->output);
 	r->priority = m->priority;
 	record_take_effects(r, effects_to_json(m));
+	text_lines(r->scene_notes, sizeof r->scene_notes, (const char *const *)m->notes, m->n_notes);
 	r->target_error = job->plan.target_error;
 	r->submitted = submitted > 0 ? submitted : clock_wall_seconds();
 }

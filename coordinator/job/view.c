@@ -148,8 +148,19 @@ static void add_forecast(json_t *o, const struct job_view *v)
 						"wallSeconds", forecast_range_to_json(&v->halving_seconds)));
 }
 
+static json_t *lines_to_json(const char *lines)
+{
+	json_t *list = json_array();
+	for (size_t n = 0; *lines; lines += n + (lines[n] == '\n')) {
+		n = strcspn(lines, "\n");
+		json_array_append_new(list, json_stringn(lines, n));
+	}
+	return list;
+}
+
 static void add_details(json_t *o, const struct job_record *r)
 {
+	json_object_set_new(o, "sceneNotes", lines_to_json(r->scene_notes));
 	json_object_set_new(o, "strategies", record_strategies(r));
 	json_object_set_new(o, "classes", classes_to_json(r->classes));
 	json_object_set_new(o, "effects", record_effects(r));

@@ -65,6 +65,7 @@ static int write_image(struct publishing *w)
 				 .scene_hash = scene_hash(m, hex) ? hex : NULL,
 				 .inputs = &inputs,
 				 .camera = m->camera,
+				 .scene_notes = job->record.scene_notes,
 				 .effects = effects,
 				 .mixed = m->mixed,
 				 .wall_seconds = w->wall_seconds,

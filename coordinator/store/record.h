@@ -11,6 +11,7 @@
 #include "common/estimate/forecast.h"
 #include "common/estimate/stated_error.h"
 #include "common/estimate/strategy.h"
+#include "common/exr/header.h"
 #include "coordinator/core/counts.h"
 #include "coordinator/store/fields.h"
 #include "coordinator/store/record_fields.h"

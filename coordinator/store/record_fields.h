@@ -50,6 +50,7 @@
 	NUMBER(real, verify, "verify", "verify", AT(verify), LIVE) /* share of its leases computed by two workers */ \
 	TEXT(mixture, PLAN_MUTATIONS_MAX, "mixture", "mixture", NOWHERE, KEPT)                                       \
 	TEXT(note, STRATEGY_NOTE, "note", "note", AT(note), KEPT)                                                    \
-	NUMBER(positive, b, "b", "b", NOWHERE, KEPT) /* of the last image */
+	TEXT(scene_notes, HEADER_SCENE_NOTES, "sceneNotes", NULL, NOWHERE, KEPT) /* text_lines of them */            \
+	NUMBER(positive, b, "b", "b", NOWHERE, KEPT)				 /* of the last image */
 
 #endif

@@ -115,6 +115,30 @@ start_worker w1
 "$BIN/hslt-submit" "$DIR/back.xml" -o "$DIR/back.exr" --integrator path --size 16x16 --spp 1 >/dev/null 2>"$DIR/back.log" ||
 	fail "hslt-submit: the back: ended with $?"
 noted "$DIR/back.log" "$words"
+# What the reader ignores or replaces is in the log, the status and the header, and both programs write the same.
+cat >"$DIR/fork.xml" <<-'XML'
+	<scene version="3.0.0"><sensor type="perspective"/><emitter type="constant"/><integrator type="path"/>
+	<shape type="sphere"><bsdf type="irawan"/></shape>
+	<emitter type="astroobject"/></scene>
+XML
+LENIENT="--lenient --integrator path --size 8x8 --spp 2"
+"$BIN/hslt-render" "$DIR/fork.xml" -o "$DIR/fork.exr" $LENIENT 2>"$DIR/fork.log" || fail "--lenient: ended with $?"
+id=$("$BIN/hslt-submit" "$DIR/fork.xml" -o "$DIR/farm-fork.exr" $LENIENT --wait 2>"$DIR/submit-fork.log") || fail "--lenient on a farm: ended with $?"
+"$BIN/hslt-status" "$id" >"$DIR/shown-fork"
+"$BIN/hslt-status" --json "$id" >"$DIR/shown.json"
+"$BIN/hslt-job" log "$id" >"$DIR/log-fork"
+for words in '<integrator type="path"> is ignored except for' '<bsdf type="irawan"> is not supported; the plug-in diffuse stands in for it (lenient)' \
+	'the plug-in `astroobject` is not supported and left out (lenient)'; do
+	noted "$DIR/fork.log" "$words"
+	noted "$DIR/submit-fork.log" "$words"
+	noted "$DIR/shown-fork" "$words"
+	for file in fork.exr farm-fork.exr; do
+		grep -aqF "$words" "$DIR/$file" || fail "$file does not say '$words' in its header"
+	done
+	escaped=$(echo "$words" | sed 's/"/\\"/g')
+	grep -qF "$escaped" "$DIR/shown.json" && grep -qF "$escaped" "$DIR/log-fork" || fail "JSON or the log does not say '$words'"
+done
+same "$DIR/fork.exr" "$DIR/farm-fork.exr"
 for kind in black dark stuck; do # dark: it would never have the error that it is to stop at
 	[ $kind = black ] && options=$BLACK words='image is black: none of the 16,384 bootstrap samples' ||
 		options=$STUCK words='of 320 chain epochs accepted nothing .*16 chains.*longest run: [0-9,]* rejections'

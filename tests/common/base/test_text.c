@@ -42,6 +42,28 @@ static void buffers_keep_their_limit(void **state)
 	buf_fini(&b);
 }
 
+static void texts_become_lines(void **state)
+{
+	(void)state;
+	char out[64], longest[64];
+	const char *const three[] = {"one", "two", "three"};
+	text_lines(out, sizeof out, NULL, 0);
+	assert_string_equal(out, "");
+	text_lines(out, sizeof out, three, 1);
+	assert_string_equal(out, "one");
+	text_lines(out, sizeof out, three, 3);
+	assert_string_equal(out, "one\ntwo\nthree");
+	memset(longest, 'x', sizeof longest - 1);
+	longest[sizeof longest - 1] = 0;
+	const char *const full[] = {longest}, *const cut[] = {"one", longest, "three"};
+	text_lines(out, sizeof out, full, 1);
+	assert_string_equal(out, longest);
+	text_lines(out, sizeof out, cut, 3);
+	assert_string_equal(out, "one\nand 2 more");
+	text_lines(out, 8, cut + 1, 2);
+	assert_string_equal(out, "and 2 m"); /* never beyond the end */
+}
+
 static void texts_are_cut_between_characters(void **state)
 {
 	(void)state;
@@ -185,10 +207,10 @@ static void test_times_with_units(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_counts_with_units),   cmocka_unit_test(test_times_with_units),
-		cmocka_unit_test(buffers_keep_their_limit), cmocka_unit_test(texts_are_cut_between_characters),
-		cmocka_unit_test(texts_are_made_clean),	    cmocka_unit_test(values_cannot_forge_a_line),
-		cmocka_unit_test(figures_read_well),
+		cmocka_unit_test(test_counts_with_units),	    cmocka_unit_test(test_times_with_units),
+		cmocka_unit_test(buffers_keep_their_limit),	    cmocka_unit_test(texts_become_lines),
+		cmocka_unit_test(texts_are_cut_between_characters), cmocka_unit_test(texts_are_made_clean),
+		cmocka_unit_test(values_cannot_forge_a_line),	    cmocka_unit_test(figures_read_well),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

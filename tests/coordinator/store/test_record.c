@@ -38,6 +38,7 @@ static void records_come_back(void **state)
 	strcpy(r.output, "a b.exr");
 	strcpy(r.mixture, "independent=0.1,hslt=0.9");
 	strcpy(r.note, "3 of 8 \"times\"");
+	strcpy(r.scene_notes, "s.xml:3: \"one\"\ns.xml:4: two");
 	strcpy(r.rel_error_doubt, "the chains are too short to be judged");
 	r.rel_error_about = 0.218;
 	record_take_effects(
@@ -74,6 +75,7 @@ static void records_come_back(void **state)
 	assert_true(back.has_result && record_is_ended(&back));
 	assert_string_equal(back.mixture, r.mixture);
 	assert_string_equal(back.note, r.note);
+	assert_string_equal(back.scene_notes, r.scene_notes);
 	assert_string_equal(back.rel_error_doubt, r.rel_error_doubt);
 	assert_true(back.rel_error_about == r.rel_error_about);
 	record_add_doubt(&back);

@@ -102,6 +102,7 @@ struct session {
 	struct arguments *a;
 	char *folder, *name;
 	char scene_hash[BLOB_HEX_SIZE];
+	char scene_notes[HEADER_SCENE_NOTES];
 	struct plan_scene inputs;
 	struct world *world;
 	struct render_summary summary;
@@ -153,6 +154,7 @@ static int load(struct session *s, struct error *e)
 	option_plan_scene(&s->a->render, &s->inputs);
 	for (uint32_t i = 0; !s->a->quiet && i < scene.note_count; i++)
 		fprintf(stderr, "note: %s\n", scene.notes[i]);
+	text_lines(s->scene_notes, sizeof s->scene_notes, scene.notes, scene.note_count);
 	rc = world_new(&s->world, &scene, &assets, &s->a->render.render, e);
 	scene_fini(&scene);
 	if (rc)
@@ -315,6 +317,7 @@ static int write_image(const struct session *s, struct error *e)
 				 .scene_hash = s->scene_hash,
 				 .inputs = &s->inputs,
 				 .camera = camera,
+				 .scene_notes = s->scene_notes,
 				 .effect_count = s->summary.line_count,
 				 .effects = effects,
 				 .wall_seconds = s->run.seconds,
