@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # hslt-scene: everything that is wrong with a file in one run; what was read of a good one; what leniency makes of what is not supported.
 . "$(dirname "$0")/lib.sh"
-need hslt-scene hslt-render hslt-compare
+need hslt-scene hslt-render hslt-compare hslt-submit hslt-accuracy
 
 code 0 "$BIN/hslt-scene" --help
 grep -qi example "$DIR/out" || fail "--help has no examples"
@@ -74,6 +74,15 @@ code 1 "$BIN/hslt-scene" check "$DIR/hole.xml"
 	fail "a hole hides or makes problems: $(cat "$DIR/out")"
 code 1 "$BIN/hslt-scene" check -D r=1 "$DIR/hole.xml"
 grep -q '^hole.xml: 3 problems' "$DIR/out" || fail "a hole with a value: $(cat "$DIR/out")"
+
+# A scene that is not there: not one of its files, which --path could find.
+for program in "$BIN/hslt-scene check" "$BIN/hslt-render -o $DIR/a.exr" "$BIN/hslt-render --explain" "$BIN/hslt-submit -c 127.0.0.1:1 -o $DIR/a.exr" \
+	"$BIN/hslt-accuracy -o $DIR/a.html"; do
+	code 1 $program "$DIR/hle.xml"
+	grep -qF ": $DIR/hle.xml: no such file; did you mean \`hole.xml\`?" "$DIR/err.log" || fail "$program: $(cat "$DIR/err.log")"
+	code 1 $program "$DIR/nowhere/scene.xml"
+	grep -q "/nowhere/scene.xml: no such file$" "$DIR/err.log" || fail "$program: $(cat "$DIR/err.log")"
+done
 
 # Names of Windows differ in capitals.
 : >"$DIR/stone.png"

@@ -105,7 +105,7 @@ static void show(void *user, double fraction, const char *state)
 static int load(struct session *s, struct error *e)
 {
 	struct render_arguments *r = &s->a->render;
-	int rc = scene_path_split(s->a->render.scene, &s->folder, &s->name, e);
+	int rc = scene_path_split(s->a->render.scene, &s->a->render, &s->folder, &s->name, e);
 	if (rc)
 		return rc;
 	s->folders = option_folders(r, s->folder);

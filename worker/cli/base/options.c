@@ -12,7 +12,10 @@
 #include "worker/render/choose.h"
 #include "worker/render/settings/accuracy_settings.h"
 
+#include <dirent.h>
+#include <errno.h>
 #include <float.h>
+#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -450,7 +453,27 @@ void option_depth_note(const char *integrator, uint32_t max_depth, char *text, s
 			i->name, i->max_depth);
 }
 
-int scene_path_split(const char *path, char **folder, char **name, struct error *e)
+/* Of a scene that is not there: with the nearest name in its folder. */
+static int no_scene(const char *path, const char *folder, const char *name, struct error *e)
+{
+	struct spelling near = {.wanted = name};
+	struct dirent *entry;
+	char hint[512] = "";
+	DIR *d = opendir(folder);
+	char best[NAME_MAX + 1] = ""; /* readdir reuses its memory */
+	while (d && (entry = readdir(d))) {
+		spelling_offer(&near, entry->d_name);
+		if (near.best == entry->d_name) {
+			text_copy(best, sizeof best, entry->d_name);
+			near.best = best;
+		}
+	}
+	if (d)
+		closedir(d);
+	return error_set(e, ENOENT, "%s: no such file%s", path, spelling_hint(&near, hint, sizeof hint));
+}
+
+int scene_path_split(const char *path, const struct render_arguments *a, char **folder, char **name, struct error *e)
 {
 	const char *slash = strrchr(path, '/');
 	*name = mem_strdup(slash ? slash + 1 : path);
@@ -460,6 +483,8 @@ int scene_path_split(const char *path, char **folder, char **name, struct error 
 		(*folder)[slash == path ? 1 : slash - path] = 0;
 	if (!rc && !**name)
 		rc = error_set(e, EINVAL, "%s is a folder, not a scene file", path);
+	if (!rc && !a->path_count && access(path, F_OK) && errno == ENOENT)
+		rc = no_scene(path, *folder, *name, e);
 	if (rc) {
 		mem_free(*folder);
 		mem_free(*name);

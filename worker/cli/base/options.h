@@ -57,7 +57,8 @@ void option_plan_scene(const struct render_arguments *a, struct plan_scene *out)
 /* The folders in which the scene's files are searched: its own, then those of --path. */
 struct asset_folders option_folders(const struct render_arguments *a, const char *folder);
 
-/* "a/b/room.xml" -> "a/b" and "room.xml"; free both with mem_free. */
-int scene_path_split(const char *path, char **folder, char **name, struct error *e);
+/* "a/b/room.xml" -> "a/b" and "room.xml"; free both with mem_free. -ENOENT: it is not there, and no --path may hold it.
+ */
+int scene_path_split(const char *path, const struct render_arguments *a, char **folder, char **name, struct error *e);
 
 #endif

@@ -88,7 +88,7 @@ int explain(const char *path, struct render_arguments *a, bool json, bool *usage
 	char *folder, *name;
 	static struct render_summary m; /* large */
 	*usage = false;
-	int rc = scene_path_split(path, &folder, &name, e);
+	int rc = scene_path_split(path, a, &folder, &name, e);
 	if (rc)
 		return rc;
 	struct choice choice;

@@ -140,7 +140,7 @@ static int load(struct session *s, struct error *e)
 {
 	struct scene scene;
 	double begin = clock_seconds();
-	int rc = scene_path_split(s->a->render.scene, &s->folder, &s->name, e);
+	int rc = scene_path_split(s->a->render.scene, &s->a->render, &s->folder, &s->name, e);
 	if (rc)
 		return rc;
 	struct asset_folders folders = option_folders(&s->a->render, s->folder);

@@ -28,7 +28,7 @@ struct opened {
 
 static int open_scene(const struct render_arguments *a, struct opened *o, struct error *e)
 {
-	int rc = scene_path_split(a->scene, &o->folder, &o->name, e);
+	int rc = scene_path_split(a->scene, a, &o->folder, &o->name, e);
 	if (rc)
 		return rc;
 	o->folders = option_folders(a, o->folder);

@@ -80,7 +80,7 @@ int scene_bundle_read(struct scene_bundle *b, const char *path, struct render_ar
 {
 	struct scene scene;
 	memset(b, 0, sizeof *b);
-	int rc = scene_path_split(path, &b->folder, &b->scene, e);
+	int rc = scene_path_split(path, a, &b->folder, &b->scene, e);
 	if (rc)
 		return rc;
 	b->folders = option_folders(a, b->folder);
