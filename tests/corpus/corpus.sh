@@ -18,9 +18,11 @@ while IFS= read -r file; do
 			find "$here" "${here%/*}" -path "$here/$name" -o -path "${here%/*}/$name"
 		done
 done <"$work/all" | sort -u >"$work/included"
-# The first complaints without their places, numbers and the list of what is supported.
+# The first complaints without their places, numbers and the list of what is supported. They begin with the scene's folder.
 reasons() {
-	grep -v -e '^note: ' -e ' problems\{0,1\}, ' "$1" |
+	while IFS= read -r line; do
+		printf '%s\n' "${line#"${file%/*}/"}"
+	done <"$1" | grep -v -e '^note: ' -e ' problems\{0,1\}, ' |
 		sed 's/^hslt-scene: //; s/^[^ ]*:[0-9]*: //; s/ (supported: .*//; s/; supported: .*//; s/"[^"]*\.[a-zA-Z]*"/FILE/g; s/[-+]*[0-9.][0-9.e+-]*/N/g' |
 		cut -c1-110
 }

@@ -73,7 +73,7 @@ stop $hup
 	fail "--spp: $(cat "$DIR/ends.log")"
 "$BIN/hslt-render" "$BOX" -o "$DIR/ends.exr" --size 8x8 -i path 2>"$DIR/ends.log" && grep -q "stopped by: the scene's samples per pixel" "$DIR/ends.log" ||
 	fail "no bound: $(cat "$DIR/ends.log")"
-grep -q '^note: box.xml:15: ' "$DIR/ends.log" && grep -q 'MB for Embree$' "$DIR/ends.log" || fail "notes: $(cat "$DIR/ends.log")"
+grep -q "^note: $BOX:15: " "$DIR/ends.log" && grep -q 'MB for Embree$' "$DIR/ends.log" || fail "notes: $(cat "$DIR/ends.log")"
 code 2 "$BIN/hslt-render" "$BOX" -o "$DIR/ends.exr" --json
 grep -q -- '--json requires --estimate or --explain' "$DIR/err.log" || fail "--json: $(cat "$DIR/err.log")"
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # hslt-scene: everything that is wrong with a file in one run; what was read of a good one; what leniency makes of what is not supported.
 . "$(dirname "$0")/lib.sh"
+PROGRAMS=$(cd "$BIN" && pwd)
 need hslt-scene hslt-render hslt-compare hslt-submit hslt-accuracy
 
 code 0 "$BIN/hslt-scene" --help
@@ -29,7 +30,7 @@ for line in 3 4 7 8 10 11; do
 	grep -q "bad.xml:$line " "$DIR/places" || fail "nothing is said of line $line: $(cat "$DIR/out")"
 done
 [ "$(grep -c 'type="irawan"' "$DIR/out")" = 1 ] || fail "one unknown material is complained of more than once: $(cat "$DIR/out")"
-grep -q "^bad.xml: 6 problems" "$DIR/out" || fail "it does not sum up: $(tail -n 1 "$DIR/out")"
+grep -q "^$DIR/bad.xml: 6 problems" "$DIR/out" || fail "it does not sum up: $(tail -n 1 "$DIR/out")"
 code 1 "$BIN/hslt-render" "$DIR/bad.xml" -o "$DIR/bad.exr"
 grep -q "bad.xml:3.*and 5 more: hslt-scene check lists them" "$DIR/err.log" || fail "a render says: $(cat "$DIR/err.log")"
 
@@ -43,7 +44,21 @@ cat >"$DIR/order.xml" <<'XML'
 </scene>
 XML
 code 1 "$BIN/hslt-scene" check "$DIR/order.xml"
-[ "$(sed -n 's/^order.xml:\([0-9]*\): .*/\1/p' "$DIR/out" | tr '\n' ' ')" = "2 3 4 5 " ] || fail "not in the order of lines: $(cat "$DIR/out")"
+[ "$(sed -n 's/^\/.*\/order.xml:\([0-9]*\): .*/\1/p' "$DIR/out" | tr '\n' ' ')" = "2 3 4 5 " ] || fail "not in the order of lines: $(cat "$DIR/out")"
+
+# A message begins with a file that can be opened from here; the notes in images do not.
+mkdir "$DIR/parts"
+echo '<scene version="3.0.0"><shape type="spher"/></scene>' >"$DIR/parts/odd.xml"
+echo '<scene version="3.0.0"><sensor type="perspective"/><emitter type="constant"/><include filename="parts/odd.xml"/></scene>' >"$DIR/whole.xml"
+for from in "$DIR:whole.xml:" "$DIR/parts:../whole.xml:../" "/:$DIR/whole.xml:$DIR/"; do
+	place=${from#*:}
+	(cd "${from%%:*}" && "$PROGRAMS/hslt-scene" check "${place%%:*}") >"$DIR/out" && fail "$from: a shape that is none"
+	grep -q "^${place#*:}parts/odd.xml:1: <shape" "$DIR/out" || fail "$from: $(cat "$DIR/out")"
+	(cd "${from%%:*}" && "$PROGRAMS/hslt-render" -i path --size 8 --spp 2 --lenient "${place%%:*}" -o "$DIR/whole.exr") 2>"$DIR/err.log" ||
+		fail "$from: $(cat "$DIR/err.log")"
+	grep -q "^note: ${place#*:}parts/odd.xml:1: " "$DIR/err.log" || fail "$from: $(cat "$DIR/err.log")"
+	grep -aq "parts/odd.xml:1: " "$DIR/whole.exr" && ! grep -aq "[./]parts/odd.xml" "$DIR/whole.exr" || fail "$from: the image has the place here"
+done
 
 # What the reader cannot see by itself.
 sed 's/filename" value="[^"]*"/filename" value="gone.obj"/' "$BOX" >"$DIR/gone.xml"
@@ -58,7 +73,7 @@ cat >"$DIR/gone2.xml" <<'XML'
 </scene>
 XML
 code 1 "$BIN/hslt-scene" check "$DIR/gone2.xml"
-grep -q "^gone2.xml: 3 problems" "$DIR/out" && grep -q 'gone2.xml:2: <shape type="obj">: a.obj: no such file' "$DIR/out" ||
+grep -q "^$DIR/gone2.xml: 3 problems" "$DIR/out" && grep -q 'gone2.xml:2: <shape type="obj">: a.obj: no such file' "$DIR/out" ||
 	fail "not all missing files are said: $(cat "$DIR/out")"
 
 # A file to include that is not there, and a name without a value, do not hide what else is wrong.
@@ -70,10 +85,10 @@ cat >"$DIR/hole.xml" <<'XML'
 <shape type="spher"/></scene>
 XML
 code 1 "$BIN/hslt-scene" check "$DIR/hole.xml"
-[ "$(sed -n 's/^hole.xml:\([0-9]*\): .*/\1/p' "$DIR/out" | tr '\n' ' ')" = "2 4 5 " ] && grep -q '^hole.xml: 3 problems' "$DIR/out" ||
+[ "$(sed -n 's/^\/.*\/hole.xml:\([0-9]*\): .*/\1/p' "$DIR/out" | tr '\n' ' ')" = "2 4 5 " ] && grep -q "^$DIR/hole.xml: 3 problems" "$DIR/out" ||
 	fail "a hole hides or makes problems: $(cat "$DIR/out")"
 code 1 "$BIN/hslt-scene" check -D r=1 "$DIR/hole.xml"
-grep -q '^hole.xml: 3 problems' "$DIR/out" || fail "a hole with a value: $(cat "$DIR/out")"
+grep -q "^$DIR/hole.xml: 3 problems" "$DIR/out" || fail "a hole with a value: $(cat "$DIR/out")"
 
 # A scene that is not there: not one of its files, which --path could find.
 for program in "$BIN/hslt-scene check" "$BIN/hslt-render -o $DIR/a.exr" "$BIN/hslt-render --explain" "$BIN/hslt-submit -c 127.0.0.1:1 -o $DIR/a.exr" \
@@ -91,7 +106,7 @@ cat >"$DIR/capitals.xml" <<'XML'
 <texture type="bitmap" name="reflectance"><string name="filename" value="Stone.PNG"/></texture></bsdf></shape></scene>
 XML
 code 1 "$BIN/hslt-scene" check "$DIR/capitals.xml"
-grep -q '^capitals.xml:2: .*Stone.PNG: no such file in the scene.s folder; did you mean `stone.png`? --lenient leaves the texture out$' \
+grep -q '/capitals.xml:2: .*Stone.PNG: no such file in the scene.s folder; did you mean `stone.png`? --lenient leaves the texture out$' \
 	"$DIR/out" || fail "a name with other capitals: $(cat "$DIR/out")"
 
 # Textures that are not there, or nowhere that may be read, are left out by --lenient.
@@ -102,7 +117,7 @@ cat >"$DIR/lost.xml" <<'XML'
 </bsdf></shape></scene>
 XML
 code 1 "$BIN/hslt-scene" check "$DIR/lost.xml"
-grep -q "^lost.xml: 2 problems" "$DIR/out" && grep -q "lost.png: .*; --lenient leaves the texture out" "$DIR/out" || fail "of lost textures it says: $(cat "$DIR/out")"
+grep -q "^$DIR/lost.xml: 2 problems" "$DIR/out" && grep -q "lost.png: .*; --lenient leaves the texture out" "$DIR/out" || fail "of lost textures it says: $(cat "$DIR/out")"
 code 1 "$BIN/hslt-render" --size 16 --spp 1 "$DIR/lost.xml" -o "$DIR/lost.exr"
 grep -q "lost.xml:[23]: .*lost.png: " "$DIR/err.log" || fail "a render with a lost texture: $(cat "$DIR/err.log")"
 code 0 "$BIN/hslt-scene" check --lenient "$DIR/lost.xml"
@@ -168,7 +183,7 @@ for bad in "$(camera a 1)$(camera b 2)$(camera c 3)$(film 32)" "$(film 32)" "<se
 done
 
 code 0 "$BIN/hslt-scene" check "$BOX"
-grep -q "^box.xml: can be rendered: [0-9]* shapes" "$DIR/out" || fail "of a good scene it says: $(cat "$DIR/out")"
+grep -q "^$BOX: can be rendered: [0-9]* shapes" "$DIR/out" || fail "of a good scene it says: $(cat "$DIR/out")"
 code 0 "$BIN/hslt-scene" show "$BOX"
 sum=$(sha256sum "$BOX" | cut -c1-16)
 grep -q "^$sum .* box.xml$" "$DIR/out" || fail "show has no file box.xml with its hash: $(cat "$DIR/out")"

@@ -13,6 +13,7 @@
 #include "worker/cli/base/guarded_source.h"
 #include "worker/cli/base/interrupt.h"
 #include "worker/cli/base/options.h"
+#include "worker/cli/base/place.h"
 
 #include <stdio.h>
 
@@ -115,7 +116,7 @@ static int load(struct session *s, struct error *e)
 		return rc;
 	s->scene_read = true;
 	for (uint32_t i = 0; !s->a->quiet && i < s->scene.note_count; i++)
-		fprintf(stderr, "note: %s\n", s->scene.notes[i]);
+		place_print(stderr, "note: ", s->a->render.scene, s->scene.notes[i]);
 	return render_check(&s->scene, &s->assets, &r->render, &s->summary, e);
 }
 
@@ -250,6 +251,6 @@ int main(int argc, char **argv)
 	mem_free(s.folder);
 	mem_free(s.name);
 	if (rc)
-		fprintf(stderr, "hslt-accuracy: %s\n", e.text);
+		place_print(stderr, "hslt-accuracy: ", a.render.scene, e.text);
 	return rc ? s.usage ? 2 : 1 : 0;
 }

@@ -26,6 +26,7 @@
 #include "worker/cli/base/guarded_source.h"
 #include "worker/cli/base/interrupt.h"
 #include "worker/cli/base/options.h"
+#include "worker/cli/base/place.h"
 #include "worker/cli/render/pilot.h"
 #include "worker/cli/render/stats.h"
 #include "worker/render/fingerprint.h"
@@ -153,7 +154,7 @@ static int load(struct session *s, struct error *e)
 		return rc;
 	option_plan_scene(&s->a->render, &s->inputs);
 	for (uint32_t i = 0; !s->a->quiet && i < scene.note_count; i++)
-		fprintf(stderr, "note: %s\n", scene.notes[i]);
+		place_print(stderr, "note: ", s->a->render.scene, scene.notes[i]);
 	text_lines(s->scene_notes, sizeof s->scene_notes, scene.notes, scene.note_count);
 	rc = world_new(&s->world, &scene, &assets, &s->a->render.render, e);
 	scene_fini(&scene);
@@ -198,7 +199,7 @@ static int make_plan(struct session *s, struct error *e)
 	if (*text)
 		fprintf(stderr, "hslt-render: note: %s\n", text);
 	for (size_t i = 0; render_scene_note(&s->summary, i, text, sizeof text); i++)
-		fprintf(stderr, "hslt-render: note: %s\n", text);
+		place_print(stderr, "hslt-render: note: ", s->a->render.scene, text);
 	fprintf(stderr, "scene built in %.2f s: %llu triangles, %zu MB for Embree\n", s->build_seconds,
 		(unsigned long long)s->summary.triangles, world_embree_bytes(s->world) >> 20);
 	return 0;
@@ -486,7 +487,7 @@ int main(int argc, char **argv)
 	mem_free(s.folder);
 	mem_free(s.name);
 	if (rc) {
-		fprintf(stderr, "hslt-render: %s\n", e.text);
+		place_print(stderr, "hslt-render: ", a.render.scene, e.text);
 		return s.usage ? 2 : 1;
 	}
 	if (s.convergence.verdict == CHAINS_DISAGREE)

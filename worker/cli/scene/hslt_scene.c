@@ -4,6 +4,7 @@
 
 #include "common/base/program.h"
 #include "worker/cli/base/options.h"
+#include "worker/cli/base/place.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -84,6 +85,6 @@ int main(int argc, char **argv)
 	int rc = strcmp(a.verb, "check") == 0 ? scene_report_check(&a.render, a.lenient, &bad, &e)
 					      : scene_report_show(&a.render, a.lenient, a.json, &e);
 	if (rc)
-		fprintf(stderr, "hslt-scene: %s\n", e.text);
+		place_print(stderr, "hslt-scene: ", a.render.scene, e.text);
 	return rc || bad ? 1 : 0;
 }

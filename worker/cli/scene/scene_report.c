@@ -11,6 +11,7 @@
 
 #include "common/base/mem.h"
 #include "common/blob/blob.h"
+#include "worker/cli/base/place.h"
 #include "worker/render/scene/gltf.h"
 #include "worker/render/scene/lenient.h"
 
@@ -97,12 +98,12 @@ static int by_place(const void *x, const void *y)
 	return a->index < b->index ? -1 : 1;
 }
 
-static void print_problems(struct problem_list *p)
+static void print_problems(struct problem_list *p, const char *scene)
 {
 	if (p->count)
 		qsort(p->at, p->count, sizeof *p->at, by_place);
 	for (size_t i = 0; i < p->count; i++) {
-		printf("%s\n", p->at[i].text);
+		place_print(stdout, "", scene, p->at[i].text);
 		mem_free(p->at[i].text);
 	}
 	mem_free(p->at);
@@ -132,7 +133,8 @@ static uint32_t find_missing(const struct scene *s, const struct asset_source *a
 }
 
 /* What the reader cannot see, in meshes, pictures and values that do not go together. */
-static uint32_t print_deeper(const struct scene *s, const struct asset_source *assets, struct render_summary *m)
+static uint32_t print_deeper(const struct scene *s, const struct asset_source *assets, const char *scene,
+			     struct render_summary *m)
 {
 	const struct render_options as_it_is = {0};
 	struct arena arena = {0};
@@ -145,9 +147,9 @@ static uint32_t print_deeper(const struct scene *s, const struct asset_source *a
 		problems = found.problem_count;
 	}
 	for (uint32_t i = 0; i < problems; i++)
-		printf("%s\n", found.problems[i]);
+		place_print(stdout, "", scene, found.problems[i]);
 	if (rc)
-		printf("%s\n", e.text);
+		place_print(stdout, "", scene, e.text);
 	arena_fini(&arena);
 	return problems + (rc != 0);
 }
@@ -162,7 +164,7 @@ static const char *segments_text(uint64_t n, char *text, size_t size)
 }
 
 /* That is looked at when all else is right. */
-static int print_check(const struct scene *s, const struct asset_source *assets, const char *name, bool *bad)
+static int print_check(const struct scene *s, const struct asset_source *assets, const char *scene, bool *bad)
 {
 	static struct render_summary m; /* large */
 	uint32_t problems = s->problem_count, notes = s->note_count;
@@ -170,19 +172,19 @@ static int print_check(const struct scene *s, const struct asset_source *assets,
 	for (uint32_t i = 0; i < s->problem_count; i++)
 		add_problem(&list, s->problems[i]);
 	problems += find_missing(s, assets, &list);
-	print_problems(&list);
+	print_problems(&list, scene);
 	if (!problems)
-		problems = print_deeper(s, assets, &m);
+		problems = print_deeper(s, assets, scene, &m);
 	for (uint32_t i = 0; i < s->note_count; i++)
-		printf("note: %s\n", s->notes[i]);
+		place_print(stdout, "note: ", scene, s->notes[i]);
 	char text[512];
 	for (size_t i = 0; !problems && render_scene_note(&m, i, text, sizeof text); i++, notes++)
-		printf("note: %s\n", text);
+		place_print(stdout, "note: ", scene, text);
 	*bad = problems > 0;
 	if (*bad)
-		printf("%s: %u problem%s, %u note%s\n", name, problems, plural(problems), notes, plural(notes));
+		printf("%s: %u problem%s, %u note%s\n", scene, problems, plural(problems), notes, plural(notes));
 	else
-		printf("%s: can be rendered: %llu shape%s, %llu triangle%s%s, %u file%s, %u note%s\n", name,
+		printf("%s: can be rendered: %llu shape%s, %llu triangle%s%s, %u file%s, %u note%s\n", scene,
 		       (unsigned long long)m.shapes, plural(m.shapes), (unsigned long long)m.triangles,
 		       plural(m.triangles), segments_text(m.segments, text, sizeof text), s->asset_count + 1,
 		       plural(s->asset_count + 1), notes, plural(notes));
@@ -198,7 +200,7 @@ int scene_report_check(const struct render_arguments *a, bool lenient, bool *bad
 		return rc;
 	rc = scene_read_all(&s, &o.assets, o.name, render_plugins(), a->defines, a->define_count, lenient, e);
 	if (!rc) {
-		rc = print_check(&s, &o.assets, o.name, bad);
+		rc = print_check(&s, &o.assets, a->scene, bad);
 		scene_fini(&s);
 	}
 	close_scene(&o);

@@ -14,6 +14,7 @@
 #include "worker/cli/render/estimate.h"
 #include "worker/cli/submit/farm_pilot.h"
 #include "worker/cli/base/options.h"
+#include "worker/cli/base/place.h"
 #include "worker/cli/submit/reconnect.h"
 #include "worker/cli/render/pilot.h"
 #include "worker/cli/render/speed.h"
@@ -262,11 +263,11 @@ int main(int argc, char **argv)
 	if (!rc)
 		rc = scene_bundle_read(&b, a.render.scene, &a.render, &outputs, &e);
 	if (rc) {
-		fprintf(stderr, "hslt-submit: %s\n", e.text);
+		place_print(stderr, "hslt-submit: ", a.render.scene, e.text);
 		return 1;
 	}
 	for (size_t i = 0; i < b.note_count; i++)
-		fprintf(stderr, "note: %s\n", b.notes[i]);
+		place_print(stderr, "note: ", a.render.scene, b.notes[i]);
 	rc = a.estimate ? pilot_plan_from_scene(&a.render, &b.summary, &e)
 			: render_plan_from_scene(&a.render, &b.summary, &e);
 	if (rc) {
@@ -276,7 +277,7 @@ int main(int argc, char **argv)
 	}
 	char note[512];
 	for (size_t i = 0; render_scene_note(&b.summary, i, note, sizeof note); i++)
-		fprintf(stderr, "hslt-submit: note: %s\n", note);
+		place_print(stderr, "hslt-submit: note: ", a.render.scene, note);
 	a.request.output = a.estimate ? "" : last_part(a.render.output);
 	a.request.name = a.name ? a.name : b.scene;
 	if ((rc = knock(&a, &e))) {

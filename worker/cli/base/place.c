@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/cli/base/place.h"
+
+#include <limits.h>
+#include <string.h>
+#include <unistd.h>
+
+/* Length of the file's name in "name:12: ..."; 0: the text begins otherwise. */
+static size_t place_length(const char *text)
+{
+	for (const char *at = strchr(text, ':'); at; at = strchr(at + 1, ':')) {
+		size_t digits = strspn(at + 1, "0123456789");
+		if (digits && at[1 + digits] == ':')
+			return (size_t)(at - text);
+	}
+	return 0;
+}
+
+void place_print(FILE *to, const char *label, const char *scene, const char *text)
+{
+	char path[PATH_MAX];
+	const char *slash = strrchr(scene, '/');
+	int folder = slash ? (int)(slash + 1 - scene) : 0, name = (int)place_length(text);
+	int n = folder && name ? snprintf(path, sizeof path, "%.*s%.*s", folder, scene, name, text) : -1;
+	if (n < 0 || (size_t)n >= sizeof path || access(path, F_OK))
+		folder = 0;
+	fprintf(to, "%s%.*s%s\n", label, folder, scene, text);
+}
