@@ -132,6 +132,8 @@ static int take_done(struct client *cl, const Farm__Envelope *m, const struct jo
 	const Farm__Done *done = answer.envelope.message->done;
 	if (!done->ok)
 		rc = error_set(e, ENOENT, "j%llu: %s", (unsigned long long)o->job, done->text);
+	else if (*done->text && o->verb == JOB_EXTEND)
+		printf("j%llu %s\n", (unsigned long long)o->job, done->text);
 	else if (*done->text)
 		printf("%s\n", done->text);
 	else

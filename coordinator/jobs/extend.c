@@ -87,7 +87,8 @@ static void describe(const struct live_job *job, char *text, size_t size)
 {
 	struct text t = {text, size};
 	const char *comma = "";
-	text_put(&t, "after %llu rounds it goes on until", (unsigned long long)live_job_rounds(job));
+	uint64_t rounds = live_job_rounds(job);
+	text_put(&t, "continues after %llu round%s, until", (unsigned long long)rounds, rounds == 1 ? "" : "s");
 	if (job->plan.rounds != UINT64_MAX) {
 		text_put(&t, " %llu are done", (unsigned long long)job->plan.rounds);
 		comma = " or";

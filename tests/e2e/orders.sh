@@ -102,7 +102,8 @@ refused 1 'scene.xml exists and is not an OpenEXR file' job fetch "$e" -o "$DIR/
 refused 2 'the name of a file' job fetch "$e" -o ''
 "$BIN/hslt-job" fetch "$e" -o - >"$DIR/stdout.exr" 2>"$DIR/fetch.log" && cmp "$DIR/stdout.exr" "$DIR/short.exr" || fail "fetch -o -: $(cat "$DIR/fetch.log")"
 refused 2 'a bound is missing' job extend "$e"
-job extend "$e" --spp +100
+"$BIN/hslt-job" extend "$e" --spp +100 >"$DIR/extend.log" && grep -qE "^$e continues after 1 round, until [0-9]+ are done$|^$e continues after [0-9]+ rounds, until" "$DIR/extend.log" ||
+	fail "extend says: $(cat "$DIR/extend.log")"
 job fetch "$e" -o "$DIR/between.exr" || fail "the image of before is gone while it goes on"
 again # in the midst of it
 done_in 60 "$e"
@@ -117,7 +118,7 @@ until_true 60 more_rounds "$e" "$first" || fail "$e does not go on after $first 
 done_in 60 "$e"
 job fetch "$e" -o "$DIR/extended.exr"
 same "$DIR/extended.exr" "$DIR/long.exr"
-job log "$e" | grep -q 'state=extended by=- text="after 6 rounds it goes on until 12 are done"' || fail "the log of $e does not say that it went on"
+job log "$e" | grep -q 'state=extended by=- text="continues after 6 rounds, until 12 are done"' || fail "the log of $e does not say that it went on"
 
 # samples, and until an error is reached
 SAMPLES="--integrator path --epoch 4 --bootstrap 16384"

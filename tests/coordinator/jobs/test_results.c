@@ -482,8 +482,8 @@ static void extensions_wait_for_films(void **state)
 	say_extend(b, 2, 8, 1);
 	hear_done(a, false, "one extension at a time");
 	hear_done(a, false, "one extension at a time");
-	hear_done(a, true, "it goes on until");
-	hear_done(b, true, "it goes on until"); /* the job lives by then */
+	hear_done(a, true, "continues after");
+	hear_done(b, true, "continues after"); /* the job lives by then */
 	say_extend(a, 1, 8, 1);
 	hear_done(a, false, "it is black");
 	scripted_hang_up(a);
@@ -593,7 +593,7 @@ static void extensions_are_served_as_they_came(void **state)
 	for (int i = 0; i < CLIENTS; i++, last = rounds) {
 		if (i == 1)
 			continue;
-		hear_done(p[order[i]], true, "it goes on until");
+		hear_done(p[order[i]], true, "continues after");
 		const char *text = strstr(p[order[i]]->env.message->done->text, "until ");
 		assert_int_equal(sscanf(text, "until %llu", &rounds), 1);
 		assert_true(rounds > last);
