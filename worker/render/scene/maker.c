@@ -23,6 +23,7 @@
 #include "worker/render/scene/value.h"
 
 #include <assert.h>
+#include <stdio.h>
 #include <string.h>
 #include <strings.h>
 
@@ -96,6 +97,21 @@ static bool is_foreign_parameter(const struct maker *m, const struct draft *d, c
 	return !s.best || (meant && meant->status == PARAM_IGNORED);
 }
 
+/* Of an integrator or sampler all is ignored but a few parameters: a name that resembles one of these may be meant for
+ * it.
+ */
+static int note_resembling(const struct maker *m, const struct draft *d, const struct xml_element *owner,
+			   const struct xml_element *el, const char *name)
+{
+	struct spelling s = {.wanted = name};
+	char hint[128], text[192];
+	plugin_offer_params(d->decl, &s);
+	if (!s.best)
+		return 0;
+	snprintf(text, sizeof text, "is not known and is ignored%s", spelling_hint(&s, hint, sizeof hint));
+	return note_parameter(&m->notes, owner, el, element_spelling(el, name), text);
+}
+
 /* Looks up a name in the table: *p is its parameter, or NULL if it was dealt with here (ignored, or an error). */
 static int look_up(struct maker *m, const struct draft *d, const struct xml_element *owner,
 		   const struct xml_element *el, const char *name, const struct param **p)
@@ -107,7 +123,7 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 	*p = NULL;
 	if (d->decl->status == PARAM_IGNORED) {
 		*p = found && found->status == PARAM_UNDERSTOOD ? found : NULL;
-		return 0;
+		return *p || !value_is_element(el->name) ? 0 : note_resembling(m, d, owner, el, name);
 	}
 	if (!found && m->lenient && !el->snake && (found = lenient_old_param(d->decl, d->stands_in, el, name)))
 		r = note_old_name(&m->notes, owner, el, found->name);

@@ -3,8 +3,11 @@
 
 #include "worker/render/scene/plugin.h"
 
+#include <ctype.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* One note for each kind of thing, where it is met first. */
 int note(const struct notes *t, const struct xml_element *el, const char *type, const char *property,
@@ -44,8 +47,36 @@ int note_guide(const struct notes *t, const struct xml_element *el)
 		    el->file, el->line, el->name, type);
 }
 
+/* Without capitals and underscores, as other renderers' settings are written. */
+static bool is_depth(const char *name)
+{
+	const char *want = "maxdepth";
+	for (; *name; name++)
+		if (*name != '_' && (!*want || tolower((unsigned char)*name) != *want++))
+			return false;
+	return !*want;
+}
+
+/* The depth that another renderer would take from its settings; NULL: none. */
+static const struct xml_element *stated_depth(const struct xml_element *el)
+{
+	for (el = el->first; el; el = el->next) {
+		const char *name = xml_attribute(el, "name"), *value = xml_attribute(el, "value");
+		if (name && value && is_depth(name) && *value >= '1' && *value <= '9' &&
+		    !value[strspn(value, "0123456789")])
+			return el;
+	}
+	return NULL;
+}
+
 int note_foreign(const struct notes *t, const struct xml_element *el)
 {
+	const struct xml_element *depth = stated_depth(el);
+	if (depth)
+		return note(
+			t, el, "", "",
+			"%s:%d: <%.64s> is ignored with its contents, also with `%.64s`: --max-depth %.16s limits paths",
+			el->file, el->line, el->name, xml_attribute(depth, "name"), xml_attribute(depth, "value"));
 	return note(t, el, "", "", "%s:%d: <%.64s> is ignored with its contents", el->file, el->line, el->name);
 }
 

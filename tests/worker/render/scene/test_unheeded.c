@@ -19,7 +19,7 @@
 	"<bsdf type='" type "'><texture name='t' type='checkerboard'/><bsdf type='diffuse'/><boolean name='" name \
 	"' value='" value "'/></bsdf>"
 
-/* note: NULL: there is none with `not supported` */
+/* note: NULL: there is none of what may be visible */
 static void check(const char *inside, const char *note)
 {
 	char xml[1024];
@@ -30,8 +30,12 @@ static void check(const char *inside, const char *note)
 	struct asset_source assets = memory_assets(files);
 	if (scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e))
 		fail_msg("%s: %s", inside, e.text);
-	if (scene_has_note(&s, note ? note : "not supported") != (note != NULL))
-		fail_msg("%s: %s", inside, note ? note : "a note too many");
+	static const char *const unwanted[] = {"not supported", "limits paths", "not known"};
+	if (note && !scene_has_note(&s, note))
+		fail_msg("%s: %s", inside, note);
+	for (size_t i = 0; !note && i < sizeof unwanted / sizeof *unwanted; i++)
+		if (scene_has_note(&s, unwanted[i]))
+			fail_msg("%s: a note too many: %s", inside, unwanted[i]);
 	scene_fini(&s);
 }
 
@@ -47,8 +51,44 @@ static void test_notes(void **state)
 	check("<emitter type='directional'><float name='angle' value='0.0'/></emitter>", NULL);
 }
 
+/* What is ignored as a whole may hold the depth of paths, which is visible in the image. */
+static void test_depths(void **state)
+{
+	(void)state;
+	check("<dpt><string name='a' value='b'/><integer name='maxdepth' value='8'/></dpt>",
+	      "s.xml:1: <dpt> is ignored with its contents, also with `maxdepth`: --max-depth 8 limits paths");
+	check("<mode><integer name='max_Depth' value='12'/></mode>", "also with `max_Depth`: --max-depth 12 limits");
+	static const char *const others[] = {"<integer name='maxdepth' value='-1'/>",
+					     "<integer name='maxdepth' value='8x'/>",
+					     "<integer name='maxdepths' value='8'/>",
+					     "<integer name='maxdept' value='8'/>",
+					     "<integer name='maxdepth'/>",
+					     ""};
+	for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
+		char text[256];
+		snprintf(text, sizeof text, "<dpt>%s</dpt>", others[i]);
+		check(text, "<dpt> is ignored with its contents");
+		check(text, NULL);
+	}
+}
+
+static void test_names_of_integrators(void **state)
+{
+	(void)state;
+	check("<integrator type='path'><integer name='maxdepth' value='8'/></integrator>",
+	      "s.xml:1: <integrator type=\"path\">: `maxdepth` is not known and is ignored; did you mean `max_depth`?");
+	check("<integrator type='path'><boolean name='hide_emiters' value='true'/></integrator>",
+	      "did you mean `hide_emitters`?");
+	check("<sampler type='independent'><integer name='sample_cout' value='8'/></sampler>",
+	      "did you mean `sample_count`?");
+	check("<integrator type='path'><integer name='max_depth' value='8'/><boolean name='use_path_guiding' value='true'/>"
+	      "</integrator>",
+	      NULL);
+}
+
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_notes)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_notes), cmocka_unit_test(test_depths),
+					   cmocka_unit_test(test_names_of_integrators)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
