@@ -135,8 +135,8 @@ struct pilot {
 	uint64_t counters[BATCH_COUNTERS];
 };
 
-static int look(struct pilot *p, const struct world *w, const struct plan *film, const struct integrator *of,
-		struct plan_request *r, struct error *e)
+static int run_pilot(struct pilot *p, const struct world *w, const struct plan *film, const struct integrator *of,
+		     struct plan_request *r, struct error *e)
 {
 	path_context_for_samples(&p->context, w, film, p->counters);
 	p->context.refract = halfvec_refract;
@@ -161,7 +161,7 @@ int render_unseen_light(const struct world *w, struct plan_request *r, struct er
 	int rc = pilot_film(r, &film, e);
 	struct pilot *p = rc ? NULL : mem_alloc(1, sizeof *p);
 	if (!rc)
-		rc = p ? look(p, w, &film, of, r, e) : error_set(e, ENOMEM, "no memory for a pilot");
+		rc = p ? run_pilot(p, w, &film, of, r, e) : error_set(e, ENOMEM, "no memory for a pilot");
 	mem_free(p);
 	return rc;
 }

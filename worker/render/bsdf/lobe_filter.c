@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/bsdf/lobe_filter.h"
 
-struct without {
+struct lobe_filter {
 	struct bsdf inside;
 	unsigned lobes;
 };
 
-static bool is_gone(const struct without *x, bool transmit, bool delta)
+static bool is_gone(const struct lobe_filter *x, bool transmit, bool delta)
 {
 	return (transmit && (x->lobes & BSDF_WITHOUT_TRANSMISSION)) ||
 	       (x->lobes & (delta ? BSDF_WITHOUT_DELTA : BSDF_WITHOUT_SMOOTH));
@@ -14,26 +14,26 @@ static bool is_gone(const struct without *x, bool transmit, bool delta)
 
 static spectrum lobe_filter_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
-	const struct without *x = b->data;
+	const struct lobe_filter *x = b->data;
 	return is_gone(x, wo.z * wi.z < 0, false) ? spectrum_of(0) : x->inside.ops->eval(&x->inside, p, wo, wi);
 }
 
 static double lobe_filter_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
-	const struct without *x = b->data;
+	const struct lobe_filter *x = b->data;
 	return is_gone(x, wo.z * wi.z < 0, false) ? 0 : x->inside.ops->pdf_solid(&x->inside, p, wo, wi);
 }
 
 static spectrum lobe_filter_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
-	const struct without *x = b->data;
+	const struct lobe_filter *x = b->data;
 	return is_gone(x, wo.z * wi.z < 0, false) ? spectrum_of(0) : bsdf_eval_halfvec(&x->inside, p, wo, wi);
 }
 
 static spectrum lobe_filter_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode,
 				       vec3 *wi, double *chance)
 {
-	const struct without *x = b->data;
+	const struct lobe_filter *x = b->data;
 	return is_gone(x, mode & BSDF_TRANSMIT, true) ? spectrum_of(0)
 						      : bsdf_eval_delta(&x->inside, p, wo, mode, wi, chance);
 }
@@ -41,7 +41,7 @@ static spectrum lobe_filter_eval_delta(const struct bsdf *b, const struct bsdf_p
 static bool lobe_filter_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
 			       struct bsdf_sample *out)
 {
-	const struct without *x = b->data;
+	const struct lobe_filter *x = b->data;
 	return x->inside.ops->sample(&x->inside, p, wo, u, out) &&
 	       !is_gone(x, out->mode & BSDF_TRANSMIT, out->mode & BSDF_DELTA);
 }
@@ -49,17 +49,17 @@ static bool lobe_filter_sample(const struct bsdf *b, const struct bsdf_point *p,
 int bsdf_filter_lobes(struct bsdf *b, unsigned lobes, struct arena *arena, struct error *e)
 {
 	static const struct bsdf_ops ops = {
-		.decl.type = "without",
+		.decl.type = "lobe_filter",
 		.eval = lobe_filter_eval,
 		.pdf_solid = lobe_filter_pdf,
 		.eval_halfvec = lobe_filter_eval_halfvec,
 		.eval_delta = lobe_filter_eval_delta,
 		.sample = lobe_filter_sample,
 	};
-	struct without *x = arena_alloc(arena, 1, sizeof *x);
+	struct lobe_filter *x = arena_alloc(arena, 1, sizeof *x);
 	if (!x)
 		return error_set(e, ENOMEM, "out of memory");
-	*x = (struct without){.inside = *b, .lobes = lobes};
+	*x = (struct lobe_filter){.inside = *b, .lobes = lobes};
 	b->ops = &ops;
 	b->data = x;
 	if (lobes & BSDF_WITHOUT_TRANSMISSION)
