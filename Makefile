@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # make            programs into build/bin
 # make test       unit and end-to-end tests (SAN=address,undefined for sanitizers, FULL=1 for the long forms)
 # make test-numerics   what is hard on the numbers, one row a case

@@ -5,7 +5,8 @@
 cd "$(dirname "$0")/../.." || exit 1
 sources=$(git ls-files '*.[ch]' '*.inc' 2> /dev/null || find common coordinator worker tests -name '*.[ch]' -o -name '*.inc')
 sources=$(echo "$sources" | grep -v /data/)
-unnamed=$(echo "$sources" | xargs grep -L 'SPDX-License-Identifier: Apache-2.0')
+scripts=$(git ls-files Makefile .ci deploy '*.mk' '*.sh' '*.py' '*.awk' '*.dict' '*.proto' 2>/dev/null | grep -v '\.md$')
+unnamed=$(echo "$sources $scripts" | xargs grep -L 'SPDX-License-Identifier: Apache-2.0')
 if [ -n "$unnamed" ]; then
 	echo "WRONG: no line SPDX-License-Identifier: Apache-2.0"
 	echo "$unnamed" | sed 's/^/	/'

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # What came of a job's results. Reads the coordinator's log of all its lives (-v), then the workers' logs (-v), and prints
 # "LOST DOUBLED RESULTS AGAIN".
 #   awk -v job=j1 -f count.awk coordinator.log w1.log ...

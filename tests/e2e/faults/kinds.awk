@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # The attempts that tls.sh writes ("tried|WHAT" before, "refused|WHAT" or "cut off|WHAT" after), by kind: a row "KIND|HOW|TRIED|REFUSED"
 # each, in this order. Ends with 1 when an attempt belongs to no kind, or was not refused.
 function kind_of(what) {

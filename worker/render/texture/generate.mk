@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Tables that are made at build time: published data as C initialisers, and the coefficients of upsampled colours.
 TABLES := $(addprefix $(BUILD)/gen/,cie_observer.inc cie_d65.inc wavelength_cells.inc wavelength_guide.inc conductors.inc upsample_table.inc)
 generated: $(TABLES)
