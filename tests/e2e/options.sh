@@ -111,6 +111,7 @@ answered worker "$BIN/hslt-ca" wroker node1
 answered check "$BIN/hslt-scene" chekc "$BOX"
 answered bidirectional "$BIN/hslt-render" "$BOX" -o "$DIR/a.exr" --mutations bidirectionl=1
 answered dispersion "$BIN/hslt-render" "$BOX" -o "$DIR/a.exr" --effects -disperson
+answered '+dispersion` or `-dispersion' "$BIN/hslt-render" "$BOX" -o "$DIR/a.exr" --effects disperson
 answered tolerance "$BIN/hslt-accuracy" "$BOX" -o "$DIR/a.html" --parameters tolerence
 answered --stall "$BIN/hslt-worker" --stal1 5
 echo "options of $(echo $PROGRAMS | wc -w) programs: help, manual pages, completions"

@@ -93,9 +93,17 @@ static int parse_item(const char *item, size_t length, struct effects_choice *ou
 				out->of[i] = 1;
 		return 0;
 	}
-	if (length < 2 || (*item != '+' && *item != '-'))
-		return error_set(e, EINVAL, "takes 'all', or +NAME and -NAME separated by commas, not '%.*s'",
-				 (int)length, item);
+	if (length < 2 || (*item != '+' && *item != '-')) {
+		char wanted[64], hint[96] = "";
+		snprintf(wanted, sizeof wanted, "%.*s", (int)length, item);
+		struct spelling s = {.wanted = wanted};
+		for (int i = 0; i < EFFECTS; i++)
+			spelling_offer(&s, effect_table[i].name);
+		if (s.best)
+			snprintf(hint, sizeof hint, "; did you mean `+%s` or `-%s`?", s.best, s.best);
+		return error_set(e, EINVAL, "takes 'all', or +NAME and -NAME separated by commas, not '%s'%s", wanted,
+				 hint);
+	}
 	enum effect which = find(item + 1, length - 1);
 	if (which == EFFECTS)
 		return unknown(item + 1, length - 1, e);
