@@ -8,6 +8,7 @@ ROOT=$(cd "$HERE/../.." && pwd)
 for command in deploy/demo.sh deploy/test.sh deploy/workers.sh; do
 	cat "$ROOT/README.md" "$ROOT/docs/farm.md" | grep -q "sh $command" && [ -f "$ROOT/$command" ] || fail "$command is not both in the README or docs/farm.md and there"
 done
+head -n 9 "$ROOT/README.md" | grep -q '](docs/compatibility.md)' || fail "the README does not begin with what is supported"
 # Links of the first pages lead somewhere.
 for page in "$ROOT/README.md" "$ROOT"/docs/*.md; do
 	for link in $(grep -o '](\([^)#]*\)' "$page" | sed 's/^](//' | grep -v '^http' | sort -u); do
