@@ -202,8 +202,8 @@ bool gltf_material_shines(struct gltf *g, const struct gltf_at *at, double rgb[3
 	return rgb[0] > 0 || rgb[1] > 0 || rgb[2] > 0;
 }
 
-/* Clear glass with a varying index: a dielectric, with Cauchy's law for the Abbe number 20 / dispersion. false:
- * another material. */
+/* Clear glass with a varying index: a dielectric, with Cauchy's law for the Abbe number 20 / dispersion, which is
+ * coloured as `principled` is, by the root of the base colour at each boundary. false: another material. */
 static bool put_dispersive(struct gltf *g, const struct gltf_at *at, const struct gltf_surface *s)
 {
 	static const double f_line = 0.48613, c_line = 0.65627; /* micrometres */
@@ -211,8 +211,12 @@ static bool put_dispersive(struct gltf *g, const struct gltf_at *at, const struc
 		     *dispersion = gltf_extension(g, at, at->json, "KHR_materials_dispersion"),
 		     *ior = gltf_extension(g, at, at->json, "KHR_materials_ior");
 	double strength = dispersion ? gltf_number(g, at, dispersion, "dispersion", 0) : 0;
-	bool clear =
-		s->base[0] == 1 && s->base[1] == 1 && s->base[2] == 1 && s->metallic == 0 && !s->colour && !s->both;
+	bool clear = s->metallic == 0 && !s->colour && !s->both, white = true;
+	double root[3];
+	for (int k = 0; k < 3; k++) {
+		root[k] = s->base[k] > 0 ? sqrt(s->base[k]) : s->base[k]; /* negative ones are refused */
+		white &= s->base[k] == 1;
+	}
 	if (!(strength > 0) || !clear || !t || gltf_number(g, at, t, "transmissionFactor", 0) != 1 ||
 	    json_object_get(t, "transmissionTexture") || gltf_extension(g, at, at->json, "KHR_materials_clearcoat") ||
 	    gltf_extension(g, at, at->json, "KHR_materials_specular"))
@@ -225,6 +229,8 @@ static bool put_dispersive(struct gltf *g, const struct gltf_at *at, const struc
 	gltf_put_number(g, bsdf, at, "int_ior", n);
 	gltf_put_number(g, bsdf, at, "ext_ior", 1);
 	gltf_put_number(g, bsdf, at, "int_cauchy_b", (n - 1) * strength / 20 / spread);
+	if (!white)
+		gltf_put_colour(g, bsdf, at, "specular_transmittance", root, NULL);
 	if (s->roughness > 0) {
 		gltf_put_text(g, bsdf, at, "distribution", "ggx");
 		gltf_put_number(g, bsdf, at, "alpha", s->roughness * s->roughness);

@@ -183,6 +183,22 @@ static void test_materials(void **state)
 	assert_string_equal(glass->type, "roughdielectric");
 	assert_near(0.75 / (b / (0.48613 * 0.48613) - b / (0.65627 * 0.65627)), 40);
 	assert_near(node_float(glass, "alpha", 0), 0.25);
+	assert_null(node_find(glass, "specular_transmittance"));
+	scene_fini(&s);
+
+	/* Coloured, as `principled` would be. */
+	s = gltf_files_scene(
+		"\"metallicFactor\": 0, \"roughnessFactor\": 0.5},\n\"extensions\": {\"KHR_materials_transmission\": ",
+		"\"metallicFactor\": 0, \"roughnessFactor\": 0.5, \"baseColorFactor\": [0.25, 0.81, 0.04, 1]},\n"
+		"\"extensions\": {\"KHR_materials_dispersion\": {\"dispersion\": 0.5}, \"KHR_materials_transmission\": ",
+		false);
+	glass = scene_named(&s, third);
+	assert_string_equal(glass->type, "roughdielectric");
+	const struct property *colour = node_find(glass, "specular_transmittance");
+	assert_non_null(colour);
+	assert_near(colour->value.as.rgb[0], 0.5);
+	assert_near(colour->value.as.rgb[1], 0.9);
+	assert_near(colour->value.as.rgb[2], 0.2);
 	scene_fini(&s);
 
 	s = gltf_files_scene(
