@@ -60,6 +60,17 @@ for from in "$DIR:whole.xml:" "$DIR/parts:../whole.xml:../" "/:$DIR/whole.xml:$D
 	grep -aq "parts/odd.xml:1: " "$DIR/whole.exr" && ! grep -aq "[./]parts/odd.xml" "$DIR/whole.exr" || fail "$from: the image has the place here"
 done
 
+# A film of more pixels than one render may have.
+cat >"$DIR/wall.xml" <<'XML'
+<scene version="3.0.0"><sensor type="perspective"><film type="hdrfilm"><integer name="width" value="4097"/><integer name="height" value="4096"/>
+</film></sensor><emitter type="constant"/><shape type="sphere"/></scene>
+XML
+code 0 "$BIN/hslt-scene" check "$DIR/wall.xml"
+grep -q '^note: the image has 16781312 pixels; a render has at most 16777216' "$DIR/out" || fail "of a large film it says: $(cat "$DIR/out")"
+sed 's/4097/4096/' "$DIR/wall.xml" >"$DIR/less.xml"
+code 0 "$BIN/hslt-scene" check "$DIR/less.xml"
+! grep -q 'a render has at most' "$DIR/out" || fail "of a film that is just small enough it says: $(cat "$DIR/out")"
+
 # What the reader cannot see by itself.
 sed 's/filename" value="[^"]*"/filename" value="gone.obj"/' "$BOX" >"$DIR/gone.xml"
 if grep -q gone.obj "$DIR/gone.xml"; then

@@ -180,6 +180,12 @@ static int print_check(const struct scene *s, const struct asset_source *assets,
 	char text[512];
 	for (size_t i = 0; !problems && render_scene_note(&m, i, text, sizeof text); i++, notes++)
 		place_print(stdout, "note: ", scene, text);
+	uint64_t pixels = (uint64_t)scene_settings_width(&m.settings) * scene_settings_height(&m.settings);
+	if (!problems && pixels > PLAN_MAX_PIXELS) {
+		printf("note: the image has %llu pixels; a render has at most %d: --crop or --size is needed\n",
+		       (unsigned long long)pixels, PLAN_MAX_PIXELS);
+		notes++;
+	}
 	*bad = problems > 0;
 	if (*bad)
 		printf("%s: %u problem%s, %u note%s\n", scene, problems, plural(problems), notes, plural(notes));
