@@ -1,5 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Passes results of leases to the core, at once or when nobody reads their film any more. */
+/*
+ * Passes results of leases to the core, at once or when nobody reads their film any more.
+ *
+ * A result is unpacked and checked, room for its record is reserved, and the core decides: it is merged, noted,
+ * repeated or refused. A result that the core would merge while its film is being read waits, and comes here again
+ * afterwards.
+ *
+ * Failures: a key that cannot be read is a fault of the peer, which is hung up on. Values that may be those of any
+ * worker (-ERANGE) count as a failed lease. Other contents that fail the checks go to the core as invalid, with the
+ * reason. Without room, in memory, on the disk or among those that wait, a result is refused and its lease handed out
+ * again. A failure that may be the fault of the job's files counts once these have been read.
+ */
 #include "coordinator/jobs/results.h"
 
 #include "common/base/mem.h"

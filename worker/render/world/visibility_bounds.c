@@ -1,5 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Finds shapes inside of closed opaque ones by their boxes first, then by planes; and scenes in which nothing shines.
+/*
+ * Finds shapes inside of closed opaque ones by their boxes first, then by planes; and scenes in which nothing shines.
+ *
+ * Shapes are sorted by where they start along x, so that for each container only those between its ends are looked at.
+ * Of these, the ones whose boxes are inside its box are compared with each of its planes. Nothing fails: what cannot be
+ * proved, as of shapes that move or of a camera that may be inside, counts as visible, which costs time and no light.
  */
 #include "worker/render/world/visibility_bounds.h"
 
