@@ -17,9 +17,10 @@
 
 enum { FOLDED = ERROR_FOLDED, VALUES = 3 * PLAN_MAX_GROUPS };
 
-/* A kurtosis above this share of the number of groups: one of them has most of the pixel's variance. A single
- * outlier would have nearly 1. */
-static const double one_group = 0.6;
+/* Of 16 groups, with which limits were calibrated: above this kurtosis one of them has most of a pixel's variance; a
+ * single outlier would have 14. A pixel that is brighter than its surroundings by so many of its standard errors
+ * received its light in three groups or more. */
+static const double one_group_of_16 = 9.6, highlight_of_16 = 1.5;
 
 /* The tail index of errors is estimated from the largest in 128 and in 512, as that of samples when an integrator is
  * chosen (worker/render/choose.h), but from at least 32 and 8. From fewer than ERRORS_LEAST it would be the index of
@@ -75,7 +76,7 @@ static void add_bounds(struct tile_error *t, size_t pixel, size_t k, double part
 	t->sum.low += square / divisor_square(t, t->brightness[pixel][k], square, 1);
 	t->sum.high += high;
 	t->sum.kurtosis += part * t->kurtosis[pixel][k];
-	if (t->kurtosis[pixel][k] > one_group * t->groups)
+	if (t->kurtosis[pixel][k] > t->one_group_kurtosis)
 		t->sum.one_group += part;
 }
 
@@ -180,7 +181,7 @@ static bool settle_by_base(struct tile_error *t, size_t pixel, size_t k, double 
 /*
  * The block's weight for its waiting pixels. Its brightness is the mean over all its pixels, with and without
  * fireflies. Excluded are pixels that are reliable and more than twice as bright as the waiting ones, such as a lamp
- * beside a wall. A pixel brighter than the block by 1.5 of its standard errors received its light in three groups or
+ * beside a wall. A pixel brighter than the block by highlight_errors of its own received its light in three groups or
  * more: that is a highlight, not a firefly (which is one standard error high), and it keeps its own brightness.
  */
 static void settle_block(struct tile_error *t, struct block *b, size_t k, uint32_t x, uint32_t y, uint32_t size)
@@ -202,7 +203,7 @@ static void settle_block(struct tile_error *t, struct block *b, size_t k, uint32
 			if (t->settled[pixel][k])
 				continue;
 			t->settled[pixel][k] = true;
-			if (t->brightness[pixel][k] - brightness > 1.5 * sqrt(t->square[pixel][k])) {
+			if (t->brightness[pixel][k] - brightness > t->highlight_errors * sqrt(t->square[pixel][k])) {
 				settle_pixel(t, pixel, k, false);
 				continue;
 			}
@@ -364,6 +365,29 @@ static void error_tile(struct making *m, struct tile_error *t, uint32_t x, uint3
 		add_row(t, (size_t)row * t->width);
 }
 
+/* Of n values one of which differs from the others, which are equal: no n values have a larger one. */
+static double outlier_kurtosis(double n)
+{
+	return (n * n - 3 * n + 3) / (n - 1);
+}
+
+/* The square of how many of its standard errors a pixel is bright that two of n groups hit alike. */
+static double two_hits_square(double n)
+{
+	return 2 * (n - 1) / (n - 2);
+}
+
+/* Other numbers of groups have limits at the same share of the largest kurtosis, and above two hits by the same factor.
+ * With the limits of 16, two hits of nine were a highlight, and a kurtosis of four groups was never too large. Of so
+ * few groups any spread looks like this: canvas_interval.c asks the tail of the errors instead. */
+static void find_limits(struct tile_error *t)
+{
+	double n = t->groups, two = n > 2 ? two_hits_square(n) : INFINITY;
+	t->one_group_kurtosis =
+		n < ERROR_GROUPS ? INFINITY : one_group_of_16 * (outlier_kurtosis(n) / outlier_kurtosis(16));
+	t->highlight_errors = highlight_of_16 * sqrt(two / two_hits_square(16));
+}
+
 static void free_tile(struct tile_error *t)
 {
 	if (t) {
@@ -391,6 +415,7 @@ int canvas_error(struct making *m, struct error *e)
 	mean /= (double)values;
 	t->groups = m->c->plan.groups;
 	t->floor_square = 1e-4 * mean * mean;
+	find_limits(t);
 	for (uint32_t y = 0; y < m->img->height; y += TILE_SIZE)
 		for (uint32_t x = 0; x < m->img->width; x += TILE_SIZE)
 			error_tile(m, t, x, y);

@@ -16,7 +16,7 @@
  * divided by a block's brightness counts twice: some of them are darker than the block. It is not known where too much
  * of the estimate comes from pixels of which too little is known (limits are of calibration, too), and where errors
  * are so unequal that those which count most may not have come: where their tail index does not rule out an infinite
- * variance.
+ * variance, or where neither it nor the groups of single pixels, of which there are too few, would show that.
  */
 #include "common/estimate/canvas_interval.h"
 
@@ -92,6 +92,8 @@ static void find_doubt(const struct error_sums *s, double known, struct canvas_i
 		img->rel_mse_doubt = ERROR_WIDE;
 	} else if (!(s->tail > img->error_tail_least)) {
 		img->rel_mse_doubt = ERROR_TAIL;
+	} else if (s->groups < ERROR_GROUPS && s->tail == INFINITY) {
+		img->rel_mse_doubt = ERROR_FEW_GROUPS;
 	}
 	if (img->rel_mse_doubt)
 		img->rel_mse_95[0] = img->rel_mse_95[1] = NAN;

@@ -6,6 +6,9 @@
 #include "common/estimate/image.h"
 
 enum { ERROR_FOLDED = 16 };
+/* With fewer groups a pixel does not show whether one outweighs the others: of four normal values one nearly always
+ * does. */
+enum { ERROR_GROUPS = 5 };
 
 /* Sums of the groups' weighted errors over an image. Parts of the relMSE are sums over pixels and channels, not
  * means. */

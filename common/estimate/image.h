@@ -24,9 +24,11 @@ enum error_doubt {
 	ERROR_WIDE,	 /* the interval would span more than a factor of ten in relative error */
 	ERROR_TAIL, /* the largest errors of pixels are so unequal that larger ones may still come: error_tail is not
 		       above error_tail_least */
-	ERROR_NO_SPREAD, /* a single group: nothing to compare it with */
-	ERROR_SHORT,	 /* the chains are too short to be judged (common/estimate/convergence.h) */
-	ERROR_UNSEEN,	 /* light that so few samples hardly ever find is missing (struct plan_unseen) */
+	ERROR_FEW_GROUPS, /* too few groups, and too few pixels for a tail index, to tell whether the largest errors
+			     have come */
+	ERROR_NO_SPREAD,  /* a single group: nothing to compare it with */
+	ERROR_SHORT,	  /* the chains are too short to be judged (common/estimate/convergence.h) */
+	ERROR_UNSEEN,	  /* light that so few samples hardly ever find is missing (struct plan_unseen) */
 };
 
 /* By which pilots' estimates of rel_mse_unseen may be too small: they are made of few photons. */

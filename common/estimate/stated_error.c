@@ -57,6 +57,9 @@ void stated_error_doubt(const struct canvas_image *img, char *text, size_t size)
 			"their variance may be infinite",
 			img->error_tail, img->error_tail_least);
 		break;
+	case ERROR_FEW_GROUPS:
+		text_put(&t, "so few groups of samples in so few pixels do not show whether the rarest light has come");
+		break;
 	case ERROR_NO_SPREAD:
 		text_put(&t, "%s", no_spread);
 		break;

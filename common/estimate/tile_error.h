@@ -18,10 +18,11 @@ enum { BASE_POWERS = 32 };
 /* A tile being worked on. Rows of `apart` hold three channels of `groups` values. */
 struct tile_error {
 	const struct canvas *c;
-	uint32_t groups, x, y, width, height; /* the tile's place and size in the crop */
-	double floor_square;		      /* of 0.01 m */
-	bool lit;			      /* rendered by chains, and some visited the tile */
-	double mean_square[3];		      /* over the tile's pixels */
+	uint32_t groups, x, y, width, height;	     /* the tile's place and size in the crop */
+	double floor_square;			     /* of 0.01 m */
+	double one_group_kurtosis, highlight_errors; /* by the number of groups (canvas_error.c) */
+	bool lit;				     /* rendered by chains, and some visited the tile */
+	double mean_square[3];			     /* over the tile's pixels */
 	float *apart; /* [height][width][3][groups]: a group's image minus the mean of the groups */
 	double brightness[TILE_SIZE * TILE_SIZE][3],
 		square[TILE_SIZE * TILE_SIZE][3]; /* of the mean: value, variance */

@@ -37,7 +37,7 @@ void group_image_with_blue(const struct plan *p, group_image_value *of, group_im
 {
 	struct canvas *c;
 	assert_int_equal(canvas_new(&c, p, -30, NULL, NULL), 0);
-	for (uint32_t g = 0; g < GROUP_IMAGE_GROUPS; g++) {
+	for (uint32_t g = 0; g < p->groups; g++) {
 		struct batch b = {.key = {1, LEASE_RENDER, g, 0, 0}, .tile_count = 1};
 		b.tiles = mem_alloc(1, sizeof *b.tiles);
 		b.tiles[0] = (struct tile){0, 0, p->width, p->height,

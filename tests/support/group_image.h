@@ -10,7 +10,8 @@
 
 enum { GROUP_IMAGE_GROUPS = 16 };
 
-/* Of one part, one round of one epoch; at most TILE_SIZE pixels a side. */
+/* Of one part, one round of one epoch; at most TILE_SIZE pixels a side. Of samples the caller may make the groups
+ * fewer. */
 struct plan group_image_plan(enum plan_kind kind, uint32_t width, uint32_t height);
 
 /* What a pixel has in a group, asked once for each, in order. */
