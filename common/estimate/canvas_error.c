@@ -179,6 +179,37 @@ static bool settle_by_base(struct tile_error *t, size_t pixel, size_t k, double 
 }
 
 /*
+ * The largest share of a block's waiting pixels that may be as dark as nothing, by Cantelli's inequality: v / (v + B^2)
+ * for a variance v of their brightness around the block's, B, without that of their noise. It is nearly 0 where pixels
+ * are alike, however rarely light comes, and large at the edge of something bright before a black background, where a
+ * few pixels have a hundredth of the brightness of the others.
+ */
+static double share_of_dark(const struct tile_error *t, size_t k, uint32_t x, uint32_t y, uint32_t size,
+			    double brightness)
+{
+	double spread = 0, n = 0;
+	for (uint32_t j = y; j < y + size && j < t->height; j++)
+		for (uint32_t i = x; i < x + size && i < t->width; i++) {
+			size_t pixel = (size_t)j * t->width + i;
+			double d = t->brightness[pixel][k] - brightness;
+			if (t->settled[pixel][k])
+				continue;
+			spread += d * d - t->square[pixel][k];
+			n++;
+		}
+	return spread > 0 ? spread / (spread + n * (brightness * brightness + t->floor_square)) : 0;
+}
+
+/* The error of a pixel that has a block's brightness: the upper bound is that of a pixel which may be darker. The
+ * interval counts `dark` once more anyway. */
+static void add_dark(struct tile_error *t, size_t pixel, size_t k, double part, double dark_share)
+{
+	double darker = dark_share * by_others(t, pixel, k);
+	add_bounds(t, pixel, k, part, fmax(part, darker - part));
+	t->sum.dark += part;
+}
+
+/*
  * The block's weight for its waiting pixels. Its brightness is the mean over all its pixels, with and without
  * fireflies. Excluded are pixels that are reliable and more than twice as bright as the waiting ones, such as a lamp
  * beside a wall. A pixel brighter than the block by highlight_errors of its own received its light in three groups or
@@ -196,6 +227,7 @@ static void settle_block(struct tile_error *t, struct block *b, size_t k, uint32
 	if (!brightness_is_known(t, brightness, square) && size < TILE_SIZE)
 		return;
 	double divisor = divisor_square(t, brightness, square, 1);
+	double dark = share_of_dark(t, k, x, y, size, brightness);
 	float root = (float)(1 / sqrt(divisor));
 	for (uint32_t j = y; j < y + size && j < t->height; j++)
 		for (uint32_t i = x; i < x + size && i < t->width; i++) {
@@ -211,8 +243,7 @@ static void settle_block(struct tile_error *t, struct block *b, size_t k, uint32
 			if (settle_by_base(t, pixel, k, rare, square))
 				continue;
 			double own_part = t->square[pixel][k] / divisor;
-			add_bounds(t, pixel, k, own_part, own_part);
-			t->sum.dark += own_part;
+			add_dark(t, pixel, k, own_part, dark);
 			for (uint32_t g = 0; g < t->groups; g++)
 				own[g] *= root;
 			part += t->square[pixel][k];

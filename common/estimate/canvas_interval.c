@@ -13,10 +13,11 @@
  * tails: the variance of a variance is (kurtosis - 1) / 2 times the normal's. The kurtosis of a few groups is too small
  *   where tails are heavy, hence the power of 1.5, which is of calibration (tests/image/README.md).
  * The interval begins at the lower bound of the sums and ends at the upper one, in which the part of pixels that are
- * divided by a block's brightness counts twice: some of them are darker than the block. It is not known where too much
- * of the estimate comes from pixels of which too little is known (limits are of calibration, too), and where errors
- * are so unequal that those which count most may not have come: where their tail index does not rule out an infinite
- * variance, or where neither it nor the groups of single pixels, of which there are too few, would show that.
+ * divided by a block's brightness counts twice: some of them are darker than the block, and where that shows, by as
+ * much as it may be. It is not known where too much of the estimate comes from pixels of which too little is known
+ * (limits are of calibration, too), and where errors are so unequal that those which count most may not have come:
+ * where their tail index does not rule out an infinite variance, or where neither it nor the groups of single pixels,
+ * of which there are too few, would show that.
  */
 #include "common/estimate/canvas_interval.h"
 

@@ -7,7 +7,10 @@
  * - Intervals hold the realised relMSE of at least 90 % of the pictures for which they are known. Level: at a true
  *   coverage of 95 % fewer than 90 % of 300 have a probability of 3e-4, at 97 % of 5e-8. Power: a coverage of 85 % is
  *   found with 99 %, of 80 % with more than 99.99 %. Seeds are fixed: a run that passes passes always.
- * - Planted: the same interval with estimates that are too small by 2 (errors of pixels by 1.4) holds less.
+ * - At the edges of something bright before a black background, where few pixels are much darker than the others of
+ *   their block, 80 % have to: 57 of 67 do, and 45 if no pixel may be darker than its block.
+ * - Planted: the same interval with estimates that are too small by 2 (errors of pixels by 1.4) holds less; by 4 where
+ *   pixels may be darker than their block, since the interval allows for that.
  * - Where one group in one pixel decides, no interval is stated, and no target is met; neither where no pixel's
  *   brightness is known, nor, in 48 of 50 pictures or more, where errors follow a law without a variance; always where
  *   it has one.
@@ -88,6 +91,28 @@ static double checks(void *user, uint32_t group, uint32_t pixel)
 	return pixel % WIDTH < CHECKED ? dice_poisson(user, hits * strip(pixel)) / hits : 1 + 1.05 * dice_normal(user);
 }
 
+/* Something bright before a black background, which covers 1/32 to 31/32 of the pixels at its two edges. */
+static double edges(uint32_t pixel)
+{
+	uint32_t x = pixel % WIDTH, y = pixel / WIDTH;
+	if (x == 4 || x == 11)
+		return (2 * y + (x == 11) + 0.5) / 16;
+	return x > 4 && x < 11 ? 1 : 0;
+}
+
+/* Each of a group's samples meets it or does not. */
+static double seen(void *user, uint32_t group, uint32_t pixel)
+{
+	(void)group;
+	enum { SAMPLES = 8 };
+	double covered = edges(pixel), met = 0;
+	if (covered == 1)
+		return 1 + 0.3 * dice_normal(user);
+	for (int i = 0; i < SAMPLES && covered > 0; i++)
+		met += dice_throw(user) < covered;
+	return met / SAMPLES;
+}
+
 typedef double truth_of(uint32_t pixel);
 
 static double realised(const struct canvas_image *img, truth_of *truth)
@@ -102,8 +127,13 @@ static double realised(const struct canvas_image *img, truth_of *truth)
 	return sum / (3 * PIXELS);
 }
 
-/* least_known: the share of the pictures whose interval is known. */
-static void check_interval(const char *name, group_image_value *of, truth_of *truth, double least_known, double bias)
+struct least {
+	double known, held; /* shares: of the pictures, and of the intervals that are known */
+};
+
+/* fault: by which planted estimates are too small. */
+static void check_interval(const char *name, group_image_value *of, truth_of *truth, struct least least, double bias,
+			   double fault)
 {
 	const int pictures = of_length(300);
 	struct plan p = group_image_plan(PLAN_SAMPLES, WIDTH, HEIGHT);
@@ -119,16 +149,16 @@ static void check_interval(const char *name, group_image_value *of, truth_of *tr
 		if (img.rel_mse_doubt == ERROR_KNOWN) {
 			known++;
 			held += img.rel_mse_95[0] <= x && x <= img.rel_mse_95[1];
-			planted += img.rel_mse_95[0] / 2 <= x && x <= img.rel_mse_95[1] / 2;
+			planted += img.rel_mse_95[0] / fault <= x && x <= img.rel_mse_95[1] / fault;
 			own += x;
 			stated += img.rel_mse;
 		}
 		canvas_image_fini(&img);
 	}
-	print_message("%s: %d of %d known, %d held, %d with the estimate halved; stated over true %.2f\n", name, known,
-		      pictures, held, planted, stated / own);
-	assert_true(known >= least_known * pictures);
-	assert_true(held >= 0.9 * known);
+	print_message("%s: %d of %d known, %d held, %d with an estimate too small by %g; stated over true %.2f\n", name,
+		      known, pictures, held, planted, fault, stated / own);
+	assert_true(known >= least.known * pictures);
+	assert_true(held >= least.held * known);
 	assert_true(planted < 0.8 * known);
 	assert_true(fabs(stated / own - 1) < bias);
 }
@@ -136,10 +166,11 @@ static void check_interval(const char *name, group_image_value *of, truth_of *tr
 static void intervals_hold(void **state)
 {
 	(void)state;
-	check_interval("grain", grain, brightness, 1, 0.15);
-	check_interval("hits", hits, brightness, 0.25, 0.2);
-	check_interval("seldom", seldom, brightness, 0.05, 0.15);
-	check_interval("checks", checks, strip, 0.2, 0.4);
+	check_interval("grain", grain, brightness, (struct least){1, 0.9}, 0.15, 2);
+	check_interval("hits", hits, brightness, (struct least){0.25, 0.9}, 0.2, 2);
+	check_interval("seldom", seldom, brightness, (struct least){0.05, 0.9}, 0.15, 2);
+	check_interval("checks", checks, strip, (struct least){0.2, 0.9}, 0.4, 4);
+	check_interval("edges", seen, edges, (struct least){0.15, 0.8}, 0.45, 4);
 }
 
 /* ---- colours that cancel */
