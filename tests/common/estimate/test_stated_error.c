@@ -9,8 +9,8 @@
  *   found with 99 %, of 80 % with more than 99.99 %. Seeds are fixed: a run that passes passes always.
  * - At the edges of something bright before a black background, where few pixels are much darker than the others of
  *   their block, 80 % have to: 57 of 67 do, and 45 if no pixel may be darker than its block.
- * - Planted: the same interval with estimates that are too small by 2 (errors of pixels by 1.4) holds less; by 4 where
- *   pixels may be darker than their block, since the interval allows for that.
+ * - Planted: the same interval with estimates that are too small by 2 (errors of pixels by 1.4) holds less; by 8 or 4
+ * where pixels may be darker than their block, since the interval allows for that.
  * - Where one group in one pixel decides, no interval is stated, and no target is met; neither where no pixel's
  *   brightness is known, nor, in 48 of 50 pictures or more, where errors follow a law without a variance; always where
  *   it has one.
@@ -169,7 +169,7 @@ static void intervals_hold(void **state)
 	check_interval("grain", grain, brightness, (struct least){1, 0.9}, 0.15, 2);
 	check_interval("hits", hits, brightness, (struct least){0.25, 0.9}, 0.2, 2);
 	check_interval("seldom", seldom, brightness, (struct least){0.05, 0.9}, 0.15, 2);
-	check_interval("checks", checks, strip, (struct least){0.2, 0.9}, 0.4, 4);
+	check_interval("checks", checks, strip, (struct least){0.2, 0.9}, 0.4, 8);
 	check_interval("edges", seen, edges, (struct least){0.15, 0.8}, 0.45, 4);
 }
 
