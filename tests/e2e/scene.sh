@@ -45,6 +45,8 @@ cat >"$DIR/order.xml" <<'XML'
 XML
 code 1 "$BIN/hslt-scene" check "$DIR/order.xml"
 [ "$(sed -n 's/^\/.*\/order.xml:\([0-9]*\): .*/\1/p' "$DIR/out" | tr '\n' ' ')" = "2 3 4 5 " ] || fail "not in the order of lines: $(cat "$DIR/out")"
+code 1 "$BIN/hslt-render" "$DIR/order.xml" -o "$DIR/bad.exr"
+grep -q "order.xml:3.*and 3 more: hslt-scene check lists them" "$DIR/err.log" || fail "of files that are not there a render says: $(cat "$DIR/err.log")"
 
 # A message begins with a file that can be opened from here; the notes in images do not.
 mkdir "$DIR/parts"

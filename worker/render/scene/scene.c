@@ -235,6 +235,21 @@ int scene_read_all(struct scene *s, const struct asset_source *assets, const cha
 	return r;
 }
 
+/* Files that cannot be opened, which are no problems of the description itself. */
+static uint32_t count_missing(const struct scene *s, const struct asset_source *assets)
+{
+	uint32_t missing = 0;
+	for (uint32_t i = 0; i < s->asset_count; i++) {
+		struct asset a;
+		struct error unused;
+		if (assets->open(assets->user, s->assets[i], &a, &unused))
+			missing++;
+		else
+			assets->close(assets->user, &a);
+	}
+	return missing;
+}
+
 static int read_whole(struct scene *s, const struct asset_source *assets, const char *name,
 		      const struct plugin_decl *decls, const struct scene_define *defines, size_t define_count,
 		      bool lenient, struct error *e)
@@ -244,7 +259,7 @@ static int read_whole(struct scene *s, const struct asset_source *assets, const 
 	int r = read_all(s, assets, name, decls, defines, define_count, lenient, &m);
 	if (!r && s->problem_count > 0) {
 		r = m.report.code;
-		uint32_t more = s->problem_count - 1;
+		uint32_t more = s->problem_count - 1 + count_missing(s, assets);
 		if (more)
 			error_set(e, -r, "%.900s (and %u more: hslt-scene check lists them)", m.report.first.text,
 				  more);

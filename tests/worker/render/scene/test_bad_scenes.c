@@ -522,6 +522,22 @@ static void test_memory_runs_out(void **state)
 	assert_true(n > 5);
 }
 
+/* Files that are not there count, each once; those that are do not. */
+static void test_missing_files_count(void **state)
+{
+	(void)state;
+	const char *xml = "<scene version='3.0.0'>\n<shape type='cone'/>\n"
+			  "<shape type='obj'><string name='filename' value='a.obj'/></shape>\n"
+			  "<shape type='obj'><string name='filename' value='there.obj'/></shape>\n"
+			  "<shape type='obj'><string name='filename' value='b.obj'/></shape>\n"
+			  "<shape type='obj'><string name='filename' value='a.obj'/></shape>\n</scene>";
+	const struct memory_file memory[] = {{"s.xml", xml, strlen(xml)}, {"there.obj", "v 0 0 0\n", 8}, {0}};
+	struct error e;
+	assert_int_equal(read_files(memory, &e), -EINVAL);
+	assert_non_null(strstr(e.text, "s.xml:2: <shape type=\"cone\">"));
+	assert_non_null(strstr(e.text, "(and 2 more: hslt-scene check lists them)"));
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -543,6 +559,7 @@ int main(void)
 		cmocka_unit_test(test_flat_shapes),
 		cmocka_unit_test(test_bad_spectra),
 		cmocka_unit_test(test_bad_includes),
+		cmocka_unit_test(test_missing_files_count),
 		cmocka_unit_test(test_bad_films),
 		cmocka_unit_test(test_memory_runs_out),
 	};
