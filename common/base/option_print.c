@@ -3,6 +3,9 @@
  * Help and manual page have the same sentences in two layouts: describe() builds the text of a row from its help,
  * values, default and environment variable. The completion knows the names, and the possible arguments by their values
  * or the argument's name.
+ *
+ * Nothing here fails: text of a row beyond 4,096 bytes is cut off, without memory there is no usage, and output that
+ * is lost on stdout is reported when the program ends (program.c).
  */
 #include "common/base/option_print.h"
 

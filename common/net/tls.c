@@ -4,8 +4,8 @@
  * connection, between two memory buffers of OpenSSL: received bytes go into one, bytes to send come out of the other.
  * The verification callback checks the peer's role, revocation and expiry.
  *
- * A folder that cannot be read while it changes keeps the old context. explain() puts into words why the other side
- * does not accept a certificate.
+ * A folder that cannot be read while it changes keeps the old context. A link that fails has an error of tls.h and, as
+ * its last output, an alert for the peer; explain() puts into words why either side does not accept a certificate.
  */
 #include "common/net/tls.h"
 

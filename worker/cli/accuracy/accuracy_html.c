@@ -3,6 +3,8 @@
  * The report as one HTML page without scripts: a summary paragraph, facts about machine and scene, tables with an
  * interval in each row, plots as SVG (accuracy_plots.h). All text from scenes is escaped. Unknown numbers are printed
  * as such, never as 0.
+ *
+ * Without memory, for the text or the picture, or if the file cannot be written, there is an error and no page.
  */
 #include "worker/cli/accuracy/accuracy_html.h"
 

@@ -3,6 +3,9 @@
  * The program: the list of settings to compare (accuracy_design.c), their alternating renders (accuracy_run.c), the
  * figures (accuracy_judge.c), and the report as text, CSV, JSON and HTML. First it prints how long it will take and
  * what it will compare. A signal ends the rendering, and what is known is reported.
+ *
+ * Invalid settings end it with 2 before anything is rendered; any other error ends it with 1, with no report unless a
+ * signal came after every setting's first round.
  */
 #include "common/base/mem.h"
 #include "common/base/program.h"

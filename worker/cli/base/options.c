@@ -2,6 +2,9 @@
 /*
  * One table: each option checks its argument at once and says what is expected. What depends on the scene (the film's
  * aspect, the default mixture) is filled in by render_plan_from_scene, which ends with plan_make.
+ *
+ * A wrong argument is -EINVAL with a sentence that names the option; it leaves the arguments half filled, and the
+ * programs exit with it.
  */
 #include "worker/cli/base/options.h"
 

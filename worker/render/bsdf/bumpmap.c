@@ -4,6 +4,8 @@
  * (`normalmap`).
  * The BSDF itself is the inner one: the normals are bent by the geometry (worker/render/geom/relief.h), so that half
  * vectors and their derivatives take it into account.
+ *
+ * Refused when it is created: anything but one texture (for `bumpmap`) and one BSDF inside, and such a map in another.
  */
 #include "common/base/color.h"
 #include "worker/render/bsdf/create.h"

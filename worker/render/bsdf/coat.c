@@ -8,6 +8,9 @@
  *
  * Light that the boundary throws back inside is lost (`plastic` follows it). Specular lobes of boundary and inner BSDF
  * leave in the same direction and are one lobe. Where the inner one has two sides, so has the layer.
+ *
+ * An inner BSDF that transmits is refused. A sample fails where the inner one fails, or where its direction cannot
+ * leave the layer (total reflection).
  */
 #include "worker/render/bsdf/create.h"
 #include "worker/render/bsdf/fresnel.h"

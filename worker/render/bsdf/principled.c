@@ -19,6 +19,9 @@
  * S of an index of 1.5. What lies below loses what the coat reflects, in both directions:
  *
  *   f (1 - k S(wo)) (1 - k S(wi)) + k S D G1 G1 / 4
+ *
+ * Both `eta` and `specular` are refused. A sample fails where the facet's direction is on the wrong side or the lobe
+ * has no density there.
  */
 #include "worker/render/bsdf/principled.h"
 

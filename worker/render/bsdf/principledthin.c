@@ -8,6 +8,8 @@
  *
  * where transmitted light is reflected light mirrored to the other side, by facets D' with the roughness times 0.65 eta
  * - 0.35. Nothing is refracted: both sides have the same index.
+ *
+ * A `diff_trans` outside [0, 2] is refused. A sample fails where the facet's direction is on the wrong side.
  */
 #include "worker/render/bsdf/principled.h"
 

@@ -14,6 +14,8 @@
  * Next event estimation from a point needs the places that shine at it: those around its projection on a plane, within
  * the distance times the tangent; around the nearest point of a sphere; of any other surface they are not looked for,
  * and paths must come from the light.
+ *
+ * A point that is behind the plane or inside of the sphere, or whose place is not on the shape, gets no sample.
  */
 #include "worker/render/emitter/surface_light.h"
 

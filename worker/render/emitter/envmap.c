@@ -13,6 +13,9 @@
  *
  * to_world may stretch: a direction d sees the image where A d points, A the inverse of to_world's matrix with
  * determinant 1. The map from d to A d / |A d| makes |A d|^-3 solid angles of one, which multiplies densities.
+ *
+ * A to_world that is flat is refused, and so is a file that is no image. A map without light has a power of 0 and no
+ * samples.
  */
 #include "worker/render/emitter/envmap.h"
 

@@ -4,6 +4,9 @@
  * x 1024: its disk is three pixels wide, and its total power is preserved. Below the horizon it is black, unless
  * `stretch` or `extend` of 0.6 are given. Up is +y in 0.5/0.6 and +z in 3.x. If time and place determine the sun, south
  * is +z and west -x in 0.5/0.6, and south +x and west +y in 3.x, as in Mitsuba, which so mirrors the compass there.
+ *
+ * Refused: a to_world that does more than rotate, a sun below the horizon or without a direction, a day that the month
+ * has not, an albedo that depends on the place.
  */
 #include "worker/render/emitter/daylight.h"
 #include "worker/render/emitter/envmap.h"

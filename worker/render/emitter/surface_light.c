@@ -2,6 +2,8 @@
 /*
  * Points on a sphere or on triangles that are drawn by their areas, where the surface is now. Most lamps stand still:
  * what those that move need is kept out of their way, in calls of its own.
+ *
+ * A shape without area is refused. A triangle without area is never drawn.
  */
 #include "worker/render/emitter/surface_light.h"
 

@@ -8,6 +8,9 @@
  * An instance of a mesh is one item until a cut would divide it or nothing else is left to divide; then it is replaced
  * by those triangles of its flat parts that meet the box around the others. Most instances are alone by then, or have
  * none, and cost nothing.
+ *
+ * The search is bounded in steps and in pairs. Where a bound ends it, the result holds what was found so far and is
+ * marked `incomplete`, which the user is told. -ENOMEM.
  */
 #include "worker/render/geom/coincide_find.h"
 

@@ -3,6 +3,8 @@
  * Builds a tree for each mesh. Embree's callbacks transform a query of the world into a segment in the mesh's frame.
  * The segment ends where the query does, or where it leaves the mesh's box, so all its numbers are of the order of the
  * mesh's size.
+ *
+ * Only building fails, without memory. A query that does not meet the mesh's box meets nothing.
  */
 #include "worker/render/geom/instances.h"
 

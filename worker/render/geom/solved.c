@@ -4,6 +4,8 @@
  * triangle where the ray crosses its plane, a curve as in curves.h, all in double; what surfaces coincide with, and on
  * which primitives the ray starts and ends, is asked as for the triangles that Embree intersects itself. One that moves
  * is where it is at the query's time, in bounds that hold for all times.
+ *
+ * Nothing fails here: comparisons are such that a root that is NaN is no hit.
  */
 #include "worker/render/geom/solved.h"
 

@@ -3,6 +3,9 @@
  * motion_make takes the keyframes that matter and decomposes each: the orthogonal factor by Newton's iteration, as a
  * quaternion, and what is left, which is symmetric. motion_at finds the two keys around a time and puts them together
  * again. motion_bounds divides the way between two keys into parts and bounds what a point does within one.
+ *
+ * Nothing fails: keyframes without an inverse, or with one that doubles cannot hold, are refused where they are read
+ * (worker/render/scene/animation.c), and the iteration ends after POLAR_STEPS steps at the latest.
  */
 #include "worker/render/math/motion.h"
 

@@ -20,6 +20,9 @@
  * Where media scatter, events are vertices of the light's sub-path like others, and the densities of the edges are
  * those of path/media.h; that both sub-paths agree about the media is assumed. Where they only absorb, what they do to
  * a photon's light is not counted: only the path that it will belong to says which media it was in.
+ *
+ * merging_photons fails without memory, and follows fewer light sub-paths than asked if there is no room for more
+ * photons; m->paths counts them. A camera's sub-path without a rough surface has no place to merge (false).
  */
 #include "worker/render/path/merging.h"
 

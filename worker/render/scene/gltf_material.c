@@ -2,6 +2,9 @@
 /*
  * A metallic-roughness material as a `principled` BSDF, inside a `normalmap` and a `mask` if it has these, and an area
  * emitter if it emits. Clear dispersive glass is a dielectric. Extensions are in gltf_layers.c.
+ *
+ * A wrong value sets g->failed, with its place, and nothing is added after it. What the plug-ins cannot do is left out
+ * with a note.
  */
 #include "worker/render/scene/gltf_material.h"
 #include "worker/render/scene/gltf_layers.h"

@@ -4,6 +4,9 @@
  * (flip_tex_coords), and its bitmaps do not. Reflectances are clamped to [0,1]. Linear rgb is interpolated; trilinear,
  * anisotropic and ewa become bilinear, since there are no footprints: sampling does the filtering. `isotropic` and
  * `none` are names of before 0.5.
+ *
+ * Creation fails if the file is no image, or if `coordinates` names no such attribute of the mesh. Evaluation does
+ * not: outside of [0,1] the wrap mode decides.
  */
 #include "common/base/color.h"
 #include "worker/render/texture/attribute_table.h"

@@ -1,5 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Names of effects, what omitting each saves, and the text with which a plan overrides them. */
+/*
+ * Names of effects, what omitting each saves, and the text with which a plan overrides them.
+ *
+ * Only parsing fails, -EINVAL: an unknown effect (with the nearest name), one that cannot be forced, or a text without
+ * signs and names.
+ */
 #include "worker/render/world/effects_text.h"
 
 #include "common/base/spelling.h"
