@@ -143,8 +143,8 @@ doors() {
 	}' "${TMPDIR:-/tmp}/includes.$$"
 }
 
-# Headers that declare what several sources define: what the renderer and its integrators show to others, and decoders of one kind.
-SHARED="worker/render/render.h worker/render/path/integrator_face.h worker/render/scene/image_decode.h"
+# Headers that declare what several sources define: what the renderer and its integrators show to others.
+SHARED="worker/render/render.h worker/render/path/integrator_face.h"
 
 # Declarations and definitions begin in the first column, and a body with a brace of its own there.
 declared() {

@@ -9,23 +9,14 @@
 #include <math.h>
 #include <string.h>
 
-static const struct format {
-	const char *magic;
-	size_t size;
-	int (*decode)(const struct image_input *in, struct image *out);
-	enum { NOT_READ, READ, OPAQUE } alpha; /* OPAQUE: the format has none */
-} formats[] = {
-	{"\x89PNG\r\n\x1a\n", 8, image_decode_png, READ},
-	{"\xff\xd8\xff", 3, image_decode_jpeg, OPAQUE},
-	{"\x76\x2f\x31\x01", 4, image_decode_exr, NOT_READ},
-	{"#?RADIANCE", 10, image_decode_hdr, NOT_READ},
-	{"#?RGBE", 6, image_decode_hdr, NOT_READ},
-	{"RIFF", 4, image_decode_webp, READ},
-	{"BM", 2, image_decode_bmp, NOT_READ},
-	{"P5", 2, image_decode_pnm, NOT_READ},
-	{"P6", 2, image_decode_pnm, NOT_READ},
-	{"PF", 2, image_decode_pnm, NOT_READ},
-	{"Pf", 2, image_decode_pnm, NOT_READ},
+#define FORMAT(name) extern const struct image_format image_format_##name;
+#include "worker/render/scene/image_formats.h"
+#undef FORMAT
+
+static const struct image_format *const formats[] = {
+#define FORMAT(name) &image_format_##name,
+#include "worker/render/scene/image_formats.h"
+#undef FORMAT
 };
 
 /* A grey value as three equal ones, in place. */
@@ -63,20 +54,27 @@ static void make_opaque(struct image *img)
 	img->channels = 1;
 }
 
+static bool is_of(const struct image_format *f, const struct image_input *in)
+{
+	for (const char *const *b = f->begins; *b; b++)
+		if (in->size >= strlen(*b) && memcmp(in->bytes, *b, strlen(*b)) == 0)
+			return true;
+	return f->is && f->is(in);
+}
+
 static int decode(const struct image_input *in, struct image *out)
 {
 	for (size_t i = 0; i < sizeof formats / sizeof *formats; i++) {
-		if (in->size < formats[i].size || memcmp(in->bytes, formats[i].magic, formats[i].size) != 0)
+		const struct image_format *f = formats[i];
+		if (!is_of(f, in))
 			continue;
-		if (in->alpha && formats[i].alpha == NOT_READ)
+		if (in->alpha && f->alpha == IMAGE_ALPHA_NOT_READ)
 			return error_set(in->error, ENOTSUP, "alpha is only read from PNG, WebP and TGA");
-		int r = formats[i].decode(in, out);
-		if (!r && in->alpha && formats[i].alpha == OPAQUE)
+		int r = f->decode(in, out);
+		if (!r && in->alpha && f->alpha == IMAGE_ALPHA_NONE)
 			make_opaque(out);
 		return r;
 	}
-	if (image_is_tga(in)) /* the only one without a beginning of its own */
-		return image_decode_tga(in, out);
 	return error_set(
 		in->error, EINVAL,
 		"unknown image format (supported: PNG, JPEG, WebP, OpenEXR, Radiance HDR, BMP, TGA, PGM, PPM, PFM)");

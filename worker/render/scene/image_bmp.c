@@ -91,7 +91,7 @@ static bool is_grey(const struct bmp *b)
 	return b->palette != NULL;
 }
 
-int image_decode_bmp(const struct image_input *in, struct image *out)
+static int decode(const struct image_input *in, struct image *out)
 {
 	struct bmp b = {.in = in};
 	float value[256];
@@ -120,3 +120,8 @@ int image_decode_bmp(const struct image_input *in, struct image *out)
 	}
 	return 0;
 }
+
+const struct image_format image_format_bmp = {
+	.begins = {"BM"},
+	.decode = decode,
+};

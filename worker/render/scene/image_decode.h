@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The formats behind image_decode: each decodes bytes in memory, whatever they contain, into an image or an error,
- * which image_decode prefixes with the file's name. */
+/* What the formats behind image_decode have in common: each decodes bytes in memory, whatever they contain, into an
+ * image or an error, which image_decode prefixes with the file's name. */
 #ifndef WORKER_RENDER_SCENE_IMAGE_DECODE_H
 #define WORKER_RENDER_SCENE_IMAGE_DECODE_H
 
@@ -25,16 +25,13 @@ struct image_input {
 	struct error *error;
 };
 
-int image_decode_png(const struct image_input *in, struct image *out);
-int image_decode_jpeg(const struct image_input *in, struct image *out);
-int image_decode_bmp(const struct image_input *in, struct image *out);
-int image_decode_tga(const struct image_input *in, struct image *out);
-int image_decode_pnm(const struct image_input *in, struct image *out);
-int image_decode_hdr(const struct image_input *in, struct image *out);
-int image_decode_webp(const struct image_input *in, struct image *out);
-int image_decode_exr(const struct image_input *in, struct image *out);
-
-bool image_is_tga(const struct image_input *in);
+/* A file format; image_formats.h lists all. */
+struct image_format {
+	const char *begins[5];			  /* first bytes of its files, one of these; ends with NULL */
+	bool (*is)(const struct image_input *in); /* how else its files are told; NULL: not at all */
+	int (*decode)(const struct image_input *in, struct image *out);
+	enum { IMAGE_ALPHA_NOT_READ, IMAGE_ALPHA_READ, IMAGE_ALPHA_NONE } alpha; /* NONE: the format has none */
+};
 
 /* Checks the size, also against the fewest bytes that such an image can take (bytes_least, for the format's best
  * compression), before anything is allocated; then allocates the pixels. */

@@ -56,7 +56,7 @@ static int convert(const struct image_input *in, const struct exr_image *x, stru
 	return 0;
 }
 
-int image_decode_exr(const struct image_input *in, struct image *out)
+static int decode(const struct image_input *in, struct image *out)
 {
 	struct exr_image x = {0};
 	int r = exr_read_within(in->bytes, in->size, IMAGE_BYTES_MAX, &x, in->error);
@@ -70,3 +70,8 @@ int image_decode_exr(const struct image_input *in, struct image *out)
 	exr_image_fini(&x);
 	return r;
 }
+
+const struct image_format image_format_exr = {
+	.begins = {"\x76\x2f\x31\x01"},
+	.decode = decode,
+};

@@ -121,7 +121,7 @@ static int read_row(struct cursor *c, unsigned char *planes, float *out, size_t 
 	return 0;
 }
 
-int image_decode_hdr(const struct image_input *in, struct image *out)
+static int decode(const struct image_input *in, struct image *out)
 {
 	struct cursor c = {in, in->bytes, in->bytes + in->size};
 	int64_t width, height;
@@ -141,3 +141,8 @@ int image_decode_hdr(const struct image_input *in, struct image *out)
 	mem_free(planes);
 	return r;
 }
+
+const struct image_format image_format_hdr = {
+	.begins = {"#?RADIANCE", "#?RGBE"},
+	.decode = decode,
+};

@@ -108,7 +108,7 @@ static void read_guarded(struct state *s)
 		s->failed = read_pixels(s);
 }
 
-int image_decode_jpeg(const struct image_input *in, struct image *out)
+static int decode(const struct image_input *in, struct image *out)
 {
 	struct state *s = mem_alloc(1, sizeof *s);
 	if (!s)
@@ -128,3 +128,9 @@ int image_decode_jpeg(const struct image_input *in, struct image *out)
 	mem_free(s);
 	return r;
 }
+
+const struct image_format image_format_jpeg = {
+	.begins = {"\xff\xd8\xff"},
+	.decode = decode,
+	.alpha = IMAGE_ALPHA_NONE,
+};

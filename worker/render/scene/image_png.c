@@ -124,7 +124,7 @@ static int convert(struct state *s)
 	return 0;
 }
 
-int image_decode_png(const struct image_input *in, struct image *out)
+static int decode(const struct image_input *in, struct image *out)
 {
 	struct state s = {.in = in, .out = out};
 	s.png = png_create_read_struct_2(PNG_LIBPNG_VER_STRING, &s, on_error, on_warning, NULL, png_allocate,
@@ -141,3 +141,9 @@ int image_decode_png(const struct image_input *in, struct image *out)
 	mem_free(s.rows);
 	return s.failed;
 }
+
+const struct image_format image_format_png = {
+	.begins = {"\x89PNG\r\n\x1a\n"},
+	.decode = decode,
+	.alpha = IMAGE_ALPHA_READ,
+};

@@ -122,7 +122,7 @@ static int read_integers(struct pnm *m, struct image *out)
 	return r;
 }
 
-int image_decode_pnm(const struct image_input *in, struct image *out)
+static int decode(const struct image_input *in, struct image *out)
 {
 	struct pnm m = {.in = in};
 	int r = read_header(&m);
@@ -137,3 +137,8 @@ int image_decode_pnm(const struct image_input *in, struct image *out)
 		return r;
 	return m.floats ? read_floats(&m, out) : read_integers(&m, out);
 }
+
+const struct image_format image_format_pnm = {
+	.begins = {"P5", "P6", "PF", "Pf"},
+	.decode = decode,
+};

@@ -27,7 +27,7 @@ struct tga {
 	const unsigned char *repeated; /* NULL: each pixel is stored */
 };
 
-bool image_is_tga(const struct image_input *in)
+static bool is_tga(const struct image_input *in)
 {
 	static const char signature[] = "TRUEVISION-XFILE."; /* with the 0 */
 	const char *format = picture_name_format(in->name);
@@ -115,7 +115,7 @@ static const unsigned char *next_pixel(struct tga *t)
 	return *p >= t->map_first && i < t->map_count ? t->map + (size_t)i * t->map_bytes : NULL;
 }
 
-int image_decode_tga(const struct image_input *in, struct image *out)
+static int decode(const struct image_input *in, struct image *out)
 {
 	struct tga t = {.in = in};
 	float value[256];
@@ -147,3 +147,9 @@ int image_decode_tga(const struct image_input *in, struct image *out)
 		}
 	return 0;
 }
+
+const struct image_format image_format_tga = {
+	.is = is_tga,
+	.decode = decode,
+	.alpha = IMAGE_ALPHA_READ,
+};

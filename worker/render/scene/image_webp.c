@@ -15,7 +15,7 @@ static void store(const struct image_input *in, const uint8_t *rgba, struct imag
 			out->pixels[i * out->channels + k] = value[rgba[4 * i + (in->alpha ? 3 : k)]];
 }
 
-int image_decode_webp(const struct image_input *in, struct image *out)
+static int decode(const struct image_input *in, struct image *out)
 {
 	WebPBitstreamFeatures about;
 	if (in->size < 12 || memcmp(in->bytes + 8, "WEBP", 4) != 0)
@@ -39,3 +39,9 @@ int image_decode_webp(const struct image_input *in, struct image *out)
 	WebPFree(rgba);
 	return r;
 }
+
+const struct image_format image_format_webp = {
+	.begins = {"RIFF"},
+	.decode = decode,
+	.alpha = IMAGE_ALPHA_READ,
+};
