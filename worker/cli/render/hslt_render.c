@@ -156,7 +156,7 @@ static int load(struct session *s, struct error *e)
 	for (uint32_t i = 0; !s->a->quiet && i < scene.note_count; i++)
 		place_print(stderr, "note: ", s->a->render.scene, scene.notes[i]);
 	text_lines(s->scene_notes, sizeof s->scene_notes, scene.notes, scene.note_count);
-	rc = world_new(&s->world, &scene, &assets, &s->a->render.render, e);
+	rc = scene_missing(&scene, &assets, world_new(&s->world, &scene, &assets, &s->a->render.render, e), e);
 	scene_fini(&scene);
 	if (rc)
 		return rc;

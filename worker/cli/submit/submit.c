@@ -89,7 +89,7 @@ int scene_bundle_read(struct scene_bundle *b, const char *path, struct render_ar
 	struct asset_source assets = {.user = &opened, .open = open_remembered, .close = close_remembered};
 	rc = option_scene_read(&scene, &assets, b->scene, a, e);
 	if (!rc) {
-		rc = render_check(&scene, &assets, &a->render, &b->summary, e);
+		rc = scene_missing(&scene, &assets, render_check(&scene, &assets, &a->render, &b->summary, e), e);
 		if (!rc)
 			rc = copy_notes(b, &scene, e);
 		scene_fini(&scene);

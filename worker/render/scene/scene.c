@@ -250,6 +250,22 @@ static uint32_t count_missing(const struct scene *s, const struct asset_source *
 	return missing;
 }
 
+static void say_more(uint32_t more, int code, struct error *e)
+{
+	struct error first;
+	if (!e || more == 0)
+		return;
+	first = *e;
+	error_set(e, -code, "%.900s (and %u more: hslt-scene check lists them)", first.text, more);
+}
+
+int scene_missing(const struct scene *s, const struct asset_source *assets, int code, struct error *e)
+{
+	uint32_t missing = code == -ENOENT ? count_missing(s, assets) : 0;
+	say_more(missing ? missing - 1 : 0, code, e);
+	return code;
+}
+
 static int read_whole(struct scene *s, const struct asset_source *assets, const char *name,
 		      const struct plugin_decl *decls, const struct scene_define *defines, size_t define_count,
 		      bool lenient, struct error *e)
@@ -260,11 +276,9 @@ static int read_whole(struct scene *s, const struct asset_source *assets, const 
 	if (!r && s->problem_count > 0) {
 		r = m.report.code;
 		uint32_t more = s->problem_count - 1 + count_missing(s, assets);
-		if (more)
-			error_set(e, -r, "%.900s (and %u more: hslt-scene check lists them)", m.report.first.text,
-				  more);
-		else if (e)
+		if (e)
 			*e = m.report.first;
+		say_more(more, r, e);
 	}
 	if (r)
 		scene_fini(s);

@@ -46,6 +46,10 @@ int scene_read_lenient(struct scene *s, const struct asset_source *assets, const
 		       const struct plugin_decl *decls, const struct scene_define *defines, size_t define_count,
 		       struct error *e);
 
+/* Returns code, the failure of building a scene that was read. If it is -ENOENT, a file that is not there, adds to *e
+ * how many others cannot be opened either. */
+int scene_missing(const struct scene *s, const struct asset_source *assets, int code, struct error *e);
+
 /* The same, but errors in the scene are not a failure: it is read as far as possible, and s->problems has all of
  * them. If there are any, it must not be rendered. -ENOMEM. */
 int scene_read_all(struct scene *s, const struct asset_source *assets, const char *name,
