@@ -152,7 +152,7 @@ static const struct comparison {
 	const char *mutations, *forced; /* half of them independent, so that blocks agree to 2 % in seconds */
 } comparisons[] = {
 	{"colour", VIEW WALLS LAMP, "+colour", "colour", "path", 1536, 1536, NULL, NULL},
-	{"dispersion", GLASS_UNDER_THE_SKY, "+dispersion", "dispersion", "path", 768, 1536, NULL, NULL},
+	{"dispersion", GLASS_UNDER_THE_SKY, "+dispersion", "dispersion", "path", 256, 512, NULL, NULL},
 	{"all in chains", LIT_PLATE, "all", "half-vectors", "hslt", 16384, 20480, "bidirectional=0.5,rejoin=0.5",
 	 "bidirectional=0.5,hslt=0.2,lens=0.1,light=0.1,wavelength=0.1"},
 	{"dispersion in chains", PANE, "+dispersion", "dispersion", "hslt", 18432, 43008, "bidirectional=0.5,hslt=0.5",

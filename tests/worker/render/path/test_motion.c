@@ -390,7 +390,7 @@ static void test_lights(void **state)
 {
 	(void)state;
 	static const struct agree_side sides[] = {
-		{"path", 4096, 32, 0, 0}, {"bdpt", 4096, 32, 0, 0}, {"hslt", 163840, 32, 0, 0}};
+		{"path", 1280, 32, 0, 0}, {"bdpt", 1280, 32, 0, 0}, {"hslt", 163840, 32, 0, 0}};
 	check_integrators(LIGHTS, sides, test_full() ? 3 : 2);
 }
 
