@@ -7,11 +7,14 @@
 
 /* For renders whose light is rare: the estimate below which most of that light has been found, and the factor by which
  * the true error may then still be larger (tests/image/README.md, "Where the render stops"). Above it, single groups
- * that outweigh all others may be all that has been found: a lamp in a glass shell stated 44 % where 544 % was true. */
+ * that outweigh all others may be all that has been found: a lamp in a glass shell stated 44 % where 544 % was true.
+ * Chains wait until such a doubt is gone. That of few groups in few pixels stays for ever: without its rule, which is
+ * that of single groups, which they may hide, a target error alone would never end the render. */
 static const struct rare_rule {
 	enum error_doubt doubt;
 	double small, factor;
-} rare_rules[] = {{ERROR_ONE_GROUP, 0.1, 5}, {ERROR_TAIL, 0.2, 2.5}};
+	bool chains; /* of them, too */
+} rare_rules[] = {{ERROR_ONE_GROUP, 0.1, 5, false}, {ERROR_FEW_GROUPS, 0.1, 5, true}, {ERROR_TAIL, 0.2, 2.5, false}};
 enum { RARE_RULES = sizeof rare_rules / sizeof *rare_rules };
 
 static const char no_spread[] = "a single group of samples gives no error; use --spp 2 or more, and not --groups 1";
@@ -131,9 +134,9 @@ double stated_error_upper(const struct canvas_image *img, bool *doubtful)
 	*doubtful = img->rel_mse_doubt != ERROR_KNOWN && img->rel_mse_doubt != ERROR_UNSEEN;
 	if (img->rel_mse_doubt == ERROR_UNSEEN)
 		return with_unseen(img, upper);
-	for (size_t i = 0; i < RARE_RULES && samples; i++) {
+	for (size_t i = 0; i < RARE_RULES; i++) {
 		const struct rare_rule *r = &rare_rules[i];
-		if (img->rel_mse_doubt != r->doubt || !(error <= r->small))
+		if (img->rel_mse_doubt != r->doubt || !(samples || r->chains) || !(error <= r->small))
 			continue;
 		*doubtful = false;
 		return with_unseen(img, fmax(upper, r->factor * error));
@@ -152,7 +155,7 @@ double stated_error_rare_factor(double error, double upper)
 double stated_error_rare_stop(double target, double factor)
 {
 	const struct rare_rule *r = rare_rules;
-	while (r < rare_rules + RARE_RULES - 1 && r->factor != factor)
+	while (r < rare_rules + RARE_RULES - 1 && r->factor != factor) /* the last has the smallest factor */
 		r++;
 	return fmin(target / r->factor, r->small);
 }

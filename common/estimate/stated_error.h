@@ -29,15 +29,16 @@ void stated_error(const struct canvas_image *img, char *text, size_t size);
  * What a target error is compared with, relative: the upper end of the 90 % interval. If an image made of samples is in
  * doubt because of rare light, the doubt may last forever, since the variance is infinite: then it is five times the
  * estimate where single groups outweigh all others, once that is 10 % or less, and two and a half times where the tail
- * of the errors is too long, once that is 20 % or less (tests/image/README.md, "Where the render stops"). If light
- * is unseen that may leave either bound, that includes twice what it adds. doubtful: of no use for that.
+ * of the errors is too long, once that is 20 % or less (tests/image/README.md, "Where the render stops"). Few groups in
+ * few pixels may hide single ones that outweigh the others, and count as these do, also of chains. If light is unseen
+ * that may leave either bound, that includes twice what it adds. doubtful: of no use for that.
  */
 double stated_error_upper(const struct canvas_image *img, bool *doubtful);
 /* That is below or at the target: what ends a render. */
 bool stated_error_meets(const struct canvas_image *img, double target);
 /* The factor by which such an `upper` was made of a relative error; 0: it is that of an interval. */
 double stated_error_rare_factor(double error, double upper);
-/* The estimate at which a render of samples stops while its light is rare, by this factor; 0: it is not known yet,
+/* The estimate at which a render stops while its light is rare, by this factor; 0: it is not known yet,
  * and taken to be the smaller one, as it is most often. */
 double stated_error_rare_stop(double target, double factor);
 

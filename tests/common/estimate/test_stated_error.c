@@ -445,10 +445,11 @@ static void words(void **state)
 	static const struct {
 		enum error_doubt doubt;
 		double small, factor;
-	} rare[] = {{ERROR_ONE_GROUP, 0.1, 5}, {ERROR_TAIL, 0.2, 2.5}};
+		bool chains;
+	} rare[] = {{ERROR_ONE_GROUP, 0.1, 5, false}, {ERROR_TAIL, 0.2, 2.5, false}, {ERROR_FEW_GROUPS, 0.1, 5, true}};
 	static const enum error_doubt others[] = {ERROR_DARK, ERROR_WIDE, ERROR_SHORT};
 	float chains = 1;
-	for (int i = 0; i < 2; i++) {
+	for (int i = 0; i < 3; i++) {
 		double small = rare[i].small, least = rare[i].factor * small;
 		img.rel_mse_doubt = rare[i].doubt;
 		img.rel_mse = small * small;
@@ -457,7 +458,7 @@ static void words(void **state)
 		assert_true(fabs(stated_error_rare_stop(0.2, rare[i].factor) * rare[i].factor / 0.2 - 1) < 1e-12);
 		assert_true(stated_error_rare_stop(10, rare[i].factor) == small);
 		img.r_hat = &chains;
-		assert_false(stated_error_meets(&img, 1.001 * least));
+		assert_true(stated_error_meets(&img, 1.001 * least) == rare[i].chains);
 		img.r_hat = NULL;
 		img.rel_mse = 1.01 * small * small;
 		assert_false(stated_error_meets(&img, 10));
