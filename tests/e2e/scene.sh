@@ -116,6 +116,10 @@ for program in "$BIN/hslt-scene check" "$BIN/hslt-render -o $DIR/a.exr" "$BIN/hs
 	code 1 $program "$DIR/nowhere/scene.xml"
 	grep -q "/nowhere/scene.xml: no such file$" "$DIR/err.log" || fail "$program: $(cat "$DIR/err.log")"
 done
+ln -s nothing.xml "$DIR/dangling.xml"
+code 1 "$BIN/hslt-render" -o "$DIR/a.exr" "$DIR/dangling.xml"
+grep -q "/dangling.xml: a link to a file that is not there$" "$DIR/err.log" || fail "a dangling link: $(cat "$DIR/err.log")"
+rm "$DIR/dangling.xml"
 
 # Names of Windows differ in capitals.
 : >"$DIR/stone.png"

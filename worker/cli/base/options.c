@@ -462,6 +462,9 @@ static int no_scene(const char *path, const char *folder, const char *name, stru
 	struct spelling near = {.wanted = name};
 	struct dirent *entry;
 	char hint[512] = "";
+	struct stat link;
+	if (lstat(path, &link) == 0) /* its own name would be the nearest */
+		return error_set(e, ENOENT, "%s: a link to a file that is not there", path);
 	DIR *d = opendir(folder);
 	char best[NAME_MAX + 1] = ""; /* readdir reuses its memory */
 	while (d && (entry = readdir(d))) {
@@ -485,7 +488,8 @@ int scene_path_split(const char *path, const struct render_arguments *a, char **
 	if (!rc && slash)
 		(*folder)[slash == path ? 1 : slash - path] = 0;
 	if (!rc && !**name)
-		rc = error_set(e, EINVAL, "%s is a folder, not a scene file", path);
+		rc = error_set(e, EINVAL,
+			       *path ? "%s is a folder, not a scene file" : "the name of the scene is empty%s", path);
 	if (!rc && !a->path_count && access(path, F_OK) && errno == ENOENT)
 		rc = no_scene(path, *folder, *name, e);
 	if (rc) {
