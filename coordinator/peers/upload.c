@@ -98,7 +98,7 @@ static int check_text(const char *text, int most, const char *option, struct err
 {
 	return envelope_text_ok(text, (size_t)most)
 		       ? 0
-		       : error_set(e, EINVAL, "%s: at most %d bytes, without control characters", option, most);
+		       : error_set(e, EINVAL, "%s: at most %d bytes of UTF-8 without control characters", option, most);
 }
 
 static int check_defines(const Farm__Submit *m, struct error *e)

@@ -18,10 +18,14 @@ for name in "$(printf %0200d 0)" "$(printf 'a\033[2J')"; do
 	grep -q -e '--name takes 1 to 127 bytes of UTF-8 without control characters' "$DIR/err.log" || fail "a name: $(cat "$DIR/err.log")"
 	code 2 "$BIN/hslt-worker" --name "$name" --cache "$DIR/cache"
 done
-long=$DIR/$(printf %0150d 0).xml # without --name, the file's name is the job's
+long=$DIR/$(printf %0150d 0).xml # without --name, the file's name is the job's, cut
 cp "$BOX" "$long"
-code 6 "$BIN/hslt-submit" "$long" --path "$(dirname "$BOX")" -o "$DIR/b.exr" --spp 1
-grep -q -e "--name: at most 127 bytes" "$DIR/err.log" || fail "a long name: $(cat "$DIR/err.log")"
+named=$(submit "$long" --path "$(dirname "$BOX")" -o "$DIR/b.exr" --integrator path --spp 1) || fail "a long name: $named"
+[ "$(value "$named" name)" = "$(printf %0127d 0)" ] || fail "its name: $(value "$named" name)"
+"$BIN/hslt-job" cancel "$named" >/dev/null
+cp "$BOX" "$DIR/$(printf 'a\377.xml')"
+code 6 "$BIN/hslt-submit" "$DIR/$(printf 'a\377.xml')" --path "$(dirname "$BOX")" -o "$DIR/b.exr" --integrator path --spp 1
+grep -q "the scene's file name: at most 1024 bytes of UTF-8" "$DIR/err.log" || fail "a name that is no UTF-8: $(cat "$DIR/err.log")"
 second=$(submit "$BOX" -o "$DIR/b.exr" --integrator path --spp 1)
 "$BIN/hslt-job" cancel "$second" >/dev/null
 code 1 "$BIN/hslt-job" fetch "$second" -o "$DIR/early.exr"

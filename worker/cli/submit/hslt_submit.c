@@ -9,6 +9,7 @@
  */
 #include "common/base/crash.h"
 #include "common/base/program.h"
+#include "common/base/text.h"
 #include "worker/cli/base/interrupt.h"
 #include "worker/cli/render/choice.h"
 #include "worker/cli/render/estimate.h"
@@ -23,6 +24,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+enum { NAME_MOST = 127 }; /* bytes of a job's displayed name */
 
 struct arguments {
 	struct render_arguments render;
@@ -56,7 +59,7 @@ static const struct option_row rows[] = {
 	{"output", 'o', "FILE", "The image; -: stdout, and the job's id goes to stderr", OPTION_TAKE(option_image)},
 	{"priority", 0, "P", "-100 to 100, higher first", OPTION_TAKE(take_priority), .standard = "0"},
 	{"name", 0, "NAME", "Displayed name of the job (the scene's file name)",
-	 OPTION_NAME(struct arguments, name, 127)},
+	 OPTION_NAME(struct arguments, name, NAME_MOST)},
 	{"wait", 0, NULL, "Show progress and fetch the image", OPTION_FLAG(struct arguments, wait)},
 	{"patience", 0, "SECONDS", "With --wait: how long to try to reconnect to the coordinator",
 	 OPTION_SECONDS(struct arguments, patience, 0, 1e9), .above = true, .below = true, .standard = "600"},
@@ -247,6 +250,14 @@ static int knock(const struct arguments *a, struct error *e)
 	return 0;
 }
 
+/* The name of a job without --name: the scene's file's, which may be longer, or no UTF-8. */
+static const char *name_of_file(const char *file, char name[NAME_MOST + 1])
+{
+	text_copy(name, NAME_MOST + 1, file);
+	text_clean(name);
+	return name;
+}
+
 int main(int argc, char **argv)
 {
 	static struct arguments a; /* large */
@@ -275,11 +286,11 @@ int main(int argc, char **argv)
 		scene_bundle_fini(&b);
 		return rc == -EINVAL ? 2 : 1;
 	}
-	char note[512];
+	char note[512], name[NAME_MOST + 1];
 	for (size_t i = 0; render_scene_note(&b.summary, i, note, sizeof note); i++)
 		place_print(stderr, "hslt-submit: note: ", a.render.scene, note);
 	a.request.output = a.estimate ? "" : last_part(a.render.output);
-	a.request.name = a.name ? a.name : b.scene;
+	a.request.name = a.name ? a.name : name_of_file(b.scene, name);
 	if ((rc = knock(&a, &e))) {
 		fprintf(stderr, "hslt-submit: %s\n", e.text);
 		scene_bundle_fini(&b);
