@@ -268,9 +268,6 @@ static bool stays_away(struct run *r, const struct move *move)
 	back.v[c] = x->v[c];
 	back.wl = x->wl;
 	back.wavelength = x->wavelength;
-	struct walk_limits limits = r->m->limits;
-	/* Much nearer than walks there end, so that where this one ends is not the tolerance's doing. */
-	limits.scale *= 0.1;
 	double farthest = 0;
 	for (unsigned j = c + 1; j < b; j++) {
 		farthest = fmax(farthest, vec3_length(vec3_sub(y->v[j].x.p, x->v[j].x.p)));
@@ -280,7 +277,7 @@ static bool stays_away(struct run *r, const struct move *move)
 		target[j].tolerance =
 			delta ? 1e-9 : 1e-3 * fmin(fmin(x->v[j].bsdf->alpha, 1), fmin(sigma[0], sigma[1]));
 	}
-	if (halfvec_walk(r->c, &back, b, c, target, true, &limits, WALK_STALE, &scratch) != WALK_OK)
+	if (halfvec_walk(r->c, &back, b, c, target, true, &r->m->limits, WALK_STALE, &scratch) != WALK_OK)
 		return true;
 	for (unsigned j = c + 1; j < b; j++)
 		if (vec3_length(vec3_sub(back.v[j].x.p, x->v[j].x.p)) > 0.01 * farthest + 1e-9)

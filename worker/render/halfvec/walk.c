@@ -27,7 +27,8 @@ struct walk {
 	unsigned b, end;
 	const struct walk_target *target;
 	const struct constraint_solver *solver;
-	double scale;
+	double scale; /* of the tolerances of a forward walk */
+	bool back;
 	struct walk_scratch *s;
 	uint64_t above;			   /* by vertex: light leaves on the side of the geometric normal */
 	uint64_t seen;			   /* by edge: a ray of this trial has hit the next vertex along it */
@@ -119,22 +120,28 @@ static enum walk_end trial(struct walk *m, double step)
 	}
 }
 
-/* The distance of the half vectors s->k[].h from the targets, used for step control only. within: all are within
- * tolerance. */
-static double residuals(struct walk *m, bool *within)
+/* How near the half vectors s->k[].h are to the targets. */
+struct nearness {
+	double error; /* the largest distance, for step control */
+	bool forward; /* all are within the tolerances of a forward walk */
+	bool within;  /* ... of this one */
+};
+
+static struct nearness residuals(struct walk *m)
 {
-	double error = 0;
-	*within = true;
+	struct nearness n = {0, true, true};
 	for (unsigned j = m->end + 1; j < m->b; j++) {
 		vec2 h = m->s->k[j].h, r = vec2_sub(m->target[j].h, h);
 		double tolerance = m->scale * m->target[j].tolerance, r2 = vec2_dot(r, r);
+		double tighter = m->back ? WALK_BACK_SCALE * tolerance : tolerance;
 		m->s->residual[j] = r;
-		*within = *within && r2 <= tolerance * tolerance;
 		if (!isfinite(r2))
-			return INFINITY;
-		error = fmax(error, r2 / (1 + vec2_dot(h, h)));
+			return (struct nearness){INFINITY, false, false};
+		n.forward = n.forward && r2 <= tolerance * tolerance;
+		n.within = n.within && r2 <= tighter * tighter;
+		n.error = fmax(n.error, r2 / (1 + vec2_dot(h, h)));
 	}
-	return error;
+	return n;
 }
 
 /* The trial becomes the kept state: Newton's step from there, by the system of s->k. */
@@ -200,34 +207,36 @@ static void refresh(struct walk *m, unsigned stale)
 
 /* Evaluates the trial: half vectors alone are cheap, derivatives are only computed if the walk continues or the
  * caller needs them. */
-static double evaluate_trial(struct walk *m, bool *within)
+static struct nearness evaluate_trial(struct walk *m)
 {
 	for (unsigned j = m->end + 1; j < m->b; j++)
 		m->s->k[j].h = halfvec_of(m->y, j);
-	return residuals(m, within);
+	return residuals(m);
 }
 
 /* Iterates until the residuals are small enough, or returns the reason for failing. */
-static enum walk_end iterate(struct walk *m, const struct walk_limits *limits, unsigned stale, bool back)
+static enum walk_end iterate(struct walk *m, const struct walk_limits *limits, unsigned stale)
 {
 	struct walk_scratch *s = m->s;
-	bool within;
 	refresh(m, stale);
-	double error = residuals(m, &within), step = 1;
+	double error = residuals(m).error, step = 1;
+	unsigned most = limits->iterations;
 	enum walk_end last = isfinite(error) ? accept_trial(m, !stale) : WALK_SINGULAR;
 	if (last != WALK_OK)
 		return last;
-	while (s->iterations < limits->iterations) {
+	while (s->iterations < most) {
 		s->iterations++;
 		last = trial(m, step);
 		if (last == WALK_OK) {
-			double now = evaluate_trial(m, &within);
-			if (within ? !back : now < error)
+			struct nearness now = evaluate_trial(m);
+			if (now.within ? !m->back : now.error < error)
 				constrain(m, m->b, m->end);
-			if (within)
+			if (now.within)
 				return WALK_OK;
-			if (now < error) {
-				error = now;
+			if (now.forward)
+				most = 2 * limits->iterations;
+			if (now.error < error) {
+				error = now.error;
 				last = accept_trial(m, false);
 				if (last != WALK_OK)
 					return last;
@@ -255,12 +264,13 @@ enum walk_end halfvec_walk(struct path_context *c, struct full_path *y, unsigned
 			 .target = target,
 			 .solver = limits->solver,
 			 .scale = limits->scale,
+			 .back = visible,
 			 .s = s};
 	s->iterations = 0;
 	full_path_forget(y, c_end + 1, b - 1);
 	enum walk_end end = start(&m);
 	if (end == WALK_OK)
-		end = iterate(&m, limits, stale, visible);
+		end = iterate(&m, limits, stale);
 	if (end != WALK_OK || visible)
 		return end;
 	if (!all_visible(&m))

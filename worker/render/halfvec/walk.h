@@ -26,6 +26,9 @@ enum walk_end {
 
 /* Of a half vector whose target is 0, at the end of a walk. */
 #define WALK_SPECULAR_TOLERANCE 1e-9
+/* The tolerances of a reverse walk: with those of a forward walk, 2 to 11 % of the reverse walks miss the path where
+ * that began only because of them. */
+#define WALK_BACK_SCALE 0.1
 
 struct walk_limits {
 	unsigned iterations;
@@ -59,9 +62,11 @@ enum walk_stale { WALK_STALE_B = 1, WALK_STALE_C = 2, WALK_STALE = 4 };
 
 /* y: vertices b and c stay; b-1..c+1 are where the walk starts, and on WALK_OK where it ended, with edges c..b-1
  * joined. Wavelengths (indices of refraction) are y's. On WALK_OK s->k has the constraints there, except after a
- * reverse walk. visible: a reverse walk, whose edges the caller knows to be unoccluded. On failure y's vertices
- * c+1..b-1 are undefined. Cached values of f there are dropped. A reverse walk decides reliably whether it finds the
- * path again if its tolerances are tighter than those of the forward walk (scale 0.1: 0.2 more iterations, no rays). */
+ * reverse walk. visible: a reverse walk, whose edges the caller knows to be unoccluded, to WALK_BACK_SCALE of the
+ * tolerances: this decides reliably whether it finds the path again, and takes 0.2 more iterations and no rays. Its
+ * iterations are limited as a forward walk's until it is where that would end, as detailed balance requires: what can
+ * be proposed from y can then be found from there, however few iterations there may be. On failure y's vertices
+ * c+1..b-1 are undefined. Cached values of f there are dropped. */
 enum walk_end halfvec_walk(struct path_context *c, struct full_path *y, unsigned b, unsigned c_end,
 			   const struct walk_target *target, bool visible, const struct walk_limits *limits,
 			   unsigned stale, struct walk_scratch *s);

@@ -23,9 +23,6 @@
 
 #include <string.h>
 
-/* The reverse walk has a tighter tolerance by this factor: with the same one, 2 to 11 % of the reverse walks fail
- * only because of it. */
-#define BACK_SCALE 0.1
 /* Positions are rounded to this fraction of the adjacent edges. */
 #define ROUNDING 0x1p-40
 /* Steps of x_0, in the numbers that make it. */
@@ -176,11 +173,9 @@ static bool leads_back(struct mutation_ctx *m, const struct breakup *how, const 
 		s->target[j].h = x->v[j].delta ? (vec2){0, 0} : s->k[j].h;
 		s->target[j].tolerance = tolerance_of(m, &x->v[j], &s->step[X_TO_Y][j]);
 	}
-	struct walk_limits limits = m->limits;
-	limits.scale *= BACK_SCALE;
 	m->count[STRATEGY_REVERSE_WALKS]++;
 	enum walk_end end =
-		halfvec_walk(m->path, back, b, c, s->target, true, &limits, stale_of(m, how, x, y), &s->walk);
+		halfvec_walk(m->path, back, b, c, s->target, true, &m->limits, stale_of(m, how, x, y), &s->walk);
 	m->count[STRATEGY_WALKS]++;
 	m->count[STRATEGY_ITERATIONS] += s->walk.iterations;
 	if (end != WALK_OK)

@@ -258,7 +258,6 @@ static void walk_back(struct path_context *c, const struct full_path *x, struct 
 	for (unsigned j = end + 1; j < b; j++)
 		target[j].h = x->v[j].delta ? (vec2){0, 0} : k[j].h;
 	struct walk_limits limits = walk_limits_of(&accuracy);
-	limits.scale = 0.1; /* tighter than the way there: where x lies is known, only its own residual is to tell */
 	enum walk_end back = halfvec_walk(c, &z, b, end, target, true, &limits, WALK_STALE, &s);
 	t->back_ends[back]++;
 	if (back != WALK_OK)

@@ -2,7 +2,8 @@
 /*
  * Walks whose end is known beforehand: every failure by its name, an occluder of the same material that a walk which
  * looked only where its last ray ends would mistake for the light, foci where a pivot block or the whole matrix is
- * singular. Paths are laid by rays through given points of the scene. Deterministic.
+ * singular. And limits of iterations that hold for both directions alike. Paths are laid by rays through given points
+ * of the scene. Deterministic.
  */
 #include "tests/support/dice.h"
 #include "tests/support/worlds.h"
@@ -155,6 +156,34 @@ static void test_names(void **state)
 	world_free(w);
 }
 
+/* What a forward walk can propose must be found by the reverse walk of the other direction, which starts at the same
+ * place, with the same limit of iterations, though its tolerances take more of them; and nothing else. */
+static void test_few_iterations(void **state)
+{
+	(void)state;
+	enum { WALKS = 200 };
+	struct dice d = dice_of("few iterations");
+	struct world *w = world_of_text(32, 32, SENSOR("0,1,3", "0,0,0") MATERIAL("metal") FLOOR);
+	lay_path(w, (vec3[]){{0, 1, 1}, {0, 0, 0}, {0, 1, -1}}, 3);
+	unsigned later = 0;
+	for (int i = 0; i < WALKS; i++) {
+		vec2 h[3];
+		struct walk_limits few = normal;
+		ask_move(w, (vec3){dice_throw(&d) - 0.5, 0, dice_throw(&d) - 0.5}, h);
+		assert_int_equal(walk_by(h, false, normal), WALK_OK);
+		few.iterations = s.iterations;
+		assert_int_equal(walk_by(h, true, few), WALK_OK);
+		later += s.iterations > few.iterations;
+		if (few.iterations == 1)
+			continue;
+		few.iterations--;
+		assert_int_equal(walk_by(h, false, few), WALK_ITERATIONS);
+		assert_int_equal(walk_by(h, true, few), WALK_ITERATIONS);
+	}
+	assert_in_range(later, 1, WALKS - 1);
+	world_free(w);
+}
+
 /* Beyond the silhouette of a ball there is another material. */
 static void test_other_material(void **state)
 {
@@ -252,8 +281,9 @@ int main(void)
 {
 	normal = walk_limits_of(&accuracy_settings_default);
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_occluder), cmocka_unit_test(test_names),	  cmocka_unit_test(test_other_material),
-		cmocka_unit_test(test_focus),	 cmocka_unit_test(test_singular),
+		cmocka_unit_test(test_occluder),       cmocka_unit_test(test_names),
+		cmocka_unit_test(test_few_iterations), cmocka_unit_test(test_other_material),
+		cmocka_unit_test(test_focus),	       cmocka_unit_test(test_singular),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
