@@ -176,10 +176,10 @@ const char *disk_list_next(struct disk_list *l)
 	return f ? f->d_name : NULL;
 }
 
-int disk_list_end(struct disk_list *l, struct error *e)
+int disk_list_end(struct disk_list *l, int rc, struct error *e)
 {
 	if (l->d)
 		closedir(l->d);
 	l->d = NULL;
-	return l->fault ? error_file(e, l->fault, l->path) : 0;
+	return !rc && l->fault ? error_file(e, l->fault, l->path) : rc;
 }

@@ -106,7 +106,8 @@ struct disk_list {
 };
 void disk_list_begin(struct disk_list *l, const char *path);
 const char *disk_list_next(struct disk_list *l); /* valid until the next call; NULL: the end, or an error */
-/* 0: each name was seen, or the caller stopped before; -errno of the first error. */
-int disk_list_end(struct disk_list *l, struct error *e);
+/* rc: what the caller met, which comes before an error of the folder. 0: each name was seen, or the caller stopped
+ * before; otherwise rc, or -errno of the folder's first error. */
+int disk_list_end(struct disk_list *l, int rc, struct error *e);
 
 #endif

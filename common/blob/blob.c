@@ -153,8 +153,7 @@ static int read_folder(struct blob_store *s, struct error *e)
 		all = grown;
 		all[count++] = (struct found){h, (uint64_t)st.st_size, st.st_mtim};
 	}
-	int listed = disk_list_end(&l, rc ? NULL : e);
-	rc = rc ? rc : listed;
+	rc = disk_list_end(&l, rc, e);
 	if (count)
 		qsort(all, count, sizeof *all, by_age);
 	if (!rc)

@@ -491,8 +491,7 @@ static int for_each_issued(const char *folder,
 			*damage = wrong;
 		X509_free(cert);
 	}
-	int listed = disk_list_end(&l, rc ? NULL : e);
-	return rc ? rc : listed;
+	return disk_list_end(&l, rc, e);
 }
 
 struct revocation {

@@ -101,7 +101,7 @@ static int has_results(const struct spool *spool, uint64_t id, bool started, str
 			any = !journal || started || st.st_size > (off_t)JOURNAL_HEAD;
 	}
 	struct error fault;
-	int rc = disk_list_end(&l, &fault);
+	int rc = disk_list_end(&l, 0, &fault);
 	if (any || !rc || rc == -ENOTDIR)
 		return any;
 	*e = fault;

@@ -308,7 +308,7 @@ void journal_clear(const char *folder, uint64_t keep)
 		snprintf(path, sizeof path, "%s/%s", folder, name);
 		disk_unlink(path);
 	}
-	int rc = disk_list_end(&l, &e);
+	int rc = disk_list_end(&l, 0, &e);
 	if (rc && rc != -ENOENT)
 		log_event(LOG_SPOOL_FAULT, "text=%s action=\"journals of no more use may be left there\"",
 			  log_quote(e.text).text);
@@ -327,5 +327,5 @@ int journal_put_aside(const char *folder, struct error *e)
 		snprintf(to, sizeof to, "%s.damaged", from);
 		disk_rename(from, to);
 	}
-	return disk_list_end(&l, e);
+	return disk_list_end(&l, 0, e);
 }

@@ -89,8 +89,7 @@ int spool_jobs(const struct spool *s, uint64_t **ids, size_t *count, struct erro
 		else
 			rc = error_set(e, ENOMEM, "%s: no memory for its list", path);
 	}
-	int listed = disk_list_end(&l, rc ? NULL : e);
-	rc = rc ? rc : listed;
+	rc = disk_list_end(&l, rc, e);
 	if (rc) {
 		mem_free(*ids);
 		*ids = NULL;
@@ -250,8 +249,8 @@ int spool_film_bytes(const struct spool *s, uint64_t id, unsigned checkpoints, u
 		else if (errno != ENOENT) /* which was deleted meanwhile */
 			rc = error_file(e, errno, path);
 	}
-	int listed = disk_list_end(&l, rc ? NULL : e);
-	return rc || listed == -ENOENT ? rc : listed;
+	rc = disk_list_end(&l, rc, e);
+	return rc == -ENOENT ? 0 : rc; /* without a folder there are no films */
 }
 
 int spool_drop_job(const struct spool *s, uint64_t id, struct error *e)
@@ -264,7 +263,7 @@ int spool_drop_job(const struct spool *s, uint64_t id, struct error *e)
 		spool_job_path(s, id, name, path);
 		disk_unlink(path);
 	}
-	int rc = disk_list_end(&l, e);
+	int rc = disk_list_end(&l, 0, e);
 	if (!rc && disk_rmdir(folder))
 		rc = error_file(e, errno, folder);
 	return rc == -ENOENT ? 0 : rc;

@@ -137,7 +137,7 @@ static void a_list_that_fails_midway(void **state)
 			seen++;
 		}
 		assert_true(most > FILES || !disk_list_next(&l)); /* and never goes on */
-		assert_int_equal(disk_list_end(&l, &e), most > FILES ? 0 : -ESTALE);
+		assert_int_equal(disk_list_end(&l, 0, &e), most > FILES ? 0 : -ESTALE);
 		assert_int_equal(seen, most > FILES ? FILES : most);
 		assert_true(most > FILES || strstr(e.text, folder));
 		failing_list_end();
@@ -145,7 +145,7 @@ static void a_list_that_fails_midway(void **state)
 	snprintf(inside, sizeof inside, "%s/none", folder);
 	disk_list_begin(&l, inside);
 	assert_null(disk_list_next(&l));
-	assert_int_equal(disk_list_end(&l, NULL), -ENOENT);
+	assert_int_equal(disk_list_end(&l, 0, NULL), -ENOENT);
 }
 
 int main(void)
