@@ -460,10 +460,16 @@ static int listen_on(struct status_socket *t, int fd, struct error *e)
 	return fault ? error_set(e, -fault, "%s: %s", what, uv_strerror(fault)) : 0;
 }
 
-static void report(struct status_socket *t, const char *text)
+static void report(const struct status_socket *t, const char *text)
+{
+	log_event(LOG_STATUS_SOCKET, "path=%s text=%s", log_quote(t->path).text, log_quote(text).text);
+}
+
+/* A fault that lasts is found again at every look. */
+static void report_once(struct status_socket *t, const char *text)
 {
 	if (!t->reported)
-		log_event(LOG_STATUS_SOCKET, "path=%s text=%s", log_quote(t->path).text, log_quote(text).text);
+		report(t, text);
 	t->reported = true;
 }
 
@@ -478,7 +484,7 @@ static void look_for_file(struct status_socket *t)
 	t->looked = jobs_now(t->jobs);
 	enum socket_file_state state = socket_file_look(&t->file);
 	if (state == SOCKET_FILE_OTHERS)
-		report(t, "another file is where the status socket was: nobody can ask for the status");
+		report_once(t, "another file is where the status socket was: nobody can ask for the status");
 	if (state == SOCKET_FILE_OURS)
 		t->reported = false;
 	if (state != SOCKET_FILE_GONE)
@@ -487,10 +493,9 @@ static void look_for_file(struct status_socket *t)
 	if (rc) {
 		socket_file_remove(&t->file); /* it may be there, with nobody behind it */
 		error_prefix(&e, rc, "the status socket's file was removed, and cannot be made anew yet");
-		report(t, e.text);
+		report_once(t, e.text);
 		return;
 	}
-	t->reported = false;
 	report(t, "the status socket's file was removed, and has been made anew");
 	t->reported = false;
 }
