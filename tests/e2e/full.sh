@@ -1,13 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # A spool without room: nothing is acknowledged that is not stored, the job is held and says why, no new one is taken, the
 # coordinator answers. With room again the job goes on by itself, to the same bits. Cancelling a job needs no room.
-if [ -z "${HSLT_OWN_MOUNTS:-}" ]; then
-	if ! unshare -rm true 2>/dev/null; then
-		echo "skipped: no name spaces for mounts here"
-		exit 77
-	fi
-	HSLT_OWN_MOUNTS=1 exec unshare -rm sh "$0" "$@"
-fi
+OWN_MOUNTS=needed
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-compare
 

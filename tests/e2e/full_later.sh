@@ -2,13 +2,7 @@
 # A disk that somebody else fills while jobs run that had room when they began: jobs that end at a time, at an error, at a number of
 # samples, and one that is extended. They wait, and say for what; nothing of them is lost; they go on when there is room, and their
 # images have the bits that they have without it.
-if [ -z "${HSLT_OWN_MOUNTS:-}" ]; then
-	if ! unshare -rm true 2>/dev/null; then
-		echo "skipped: no name spaces for mounts here"
-		exit 77
-	fi
-	HSLT_OWN_MOUNTS=1 exec unshare -rm sh "$0" "$@"
-fi
+OWN_MOUNTS=needed
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-compare hslt-render
 

@@ -1,13 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Workers whose cache's disk is full, three of them before any other comes: no job ends by it. It waits, its status names them, the
 # first worker that has room renders it.
-if [ -z "${HSLT_OWN_MOUNTS:-}" ]; then
-	if ! unshare -rm true 2>/dev/null; then
-		echo "skipped: no name spaces for mounts here"
-		exit 77
-	fi
-	HSLT_OWN_MOUNTS=1 exec unshare -rm sh "$0" "$@"
-fi
+OWN_MOUNTS=needed
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job
 

@@ -2,6 +2,18 @@
 # For end-to-end tests with real processes on loopback: sourced by tests/e2e/*.sh, which are called with the build folder.
 # Each test has a folder of its own and ends what it started; HSLT_KEEP=FOLDER copies it there. Exit codes: 0 passed, 77 skipped, else failed.
 set -eu
+
+# A test that mounts sets OWN_MOUNTS before it sources this, and begins again in a name space of its own, with HSLT_OWN_MOUNTS=1. Where
+# none can be had it is skipped if OWN_MOUNTS is "needed", and goes on without if it is "wanted".
+if [ -n "${OWN_MOUNTS:-}" ] && [ -z "${HSLT_OWN_MOUNTS:-}" ]; then
+	if unshare -rm true 2>/dev/null; then
+		HSLT_OWN_MOUNTS=1 exec unshare -rm sh "$0" "$@"
+	elif [ "$OWN_MOUNTS" = needed ]; then
+		echo "skipped: no name spaces for mounts here"
+		exit 77
+	fi
+fi
+
 BUILD=${1:-build}
 BIN=$BUILD/bin
 HERE=$(dirname "$0")

@@ -1,13 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # A disk that is smaller than the limits of journals and scene files: checkpoints replace journals early, files of no job are deleted, and jobs
 # that do not fit together wait for each other.
-if [ -z "${HSLT_OWN_MOUNTS:-}" ]; then
-	if ! unshare -rm true 2>/dev/null; then
-		echo "skipped: no name spaces for mounts here"
-		exit 77
-	fi
-	HSLT_OWN_MOUNTS=1 exec unshare -rm sh "$0" "$@"
-fi
+OWN_MOUNTS=needed
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-compare hslt-render
 
