@@ -235,7 +235,7 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 		rgb[k] *= scale_of(n, "sun_scale", build->dialect_3);
 	if (has_sun)
 		bake_sun(&b, rgb);
-	return envmap_make(em, &(struct raster){.image = b.image}, false, 1, &axes, n, build, e);
+	return envmap_make(em, &(struct raster){.image = indexed_image_of(&b.image)}, false, 1, &axes, n, build, e);
 }
 
 #define NUMBER(name_, min_, max_)                                                         \

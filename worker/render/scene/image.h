@@ -26,8 +26,8 @@ enum image_channel {
 
 /* "r", "g", "b" or "a"; all of each pixel for any other name. */
 enum image_channel image_channel_named(const char *name);
-/* raw: integers are not decoded from sRGB. At most 2^27 pixels and 1 GiB of floats, and 4 GiB together with what the
- * arena holds: -EFBIG, with the file and its size, before it is decoded. name: for messages, and for TGA. */
+/* raw: integers are not decoded from sRGB. At most 2^27 pixels and 1 GiB of floats: -EFBIG, with the file and its size,
+ * before it is decoded. name: for messages, and for TGA. */
 int image_decode(const unsigned char *bytes, size_t size, const char *name, bool raw, enum image_channel channel,
 		 struct arena *arena, struct image *out, struct error *e);
 /* One number of each pixel, its luminance or the mean of red, green and blue. */

@@ -15,12 +15,6 @@ int image_allocate(const struct image_input *in, struct image *out, uint64_t wid
 		return error_set(in->error, EFBIG, "%llu x %llu pixels take %llu MB decoded; at most %d MB",
 				 (unsigned long long)width, (unsigned long long)height, (unsigned long long)need >> 20,
 				 IMAGE_BYTES_MAX >> 20);
-	if (need + in->arena->used > IMAGE_SCENE_BYTES_MAX)
-		return error_set(
-			in->error, EFBIG,
-			"%llu x %llu pixels take %llu MB decoded, the scene before it %zu MB; at most %zu MB together",
-			(unsigned long long)width, (unsigned long long)height, (unsigned long long)need >> 20,
-			in->arena->used >> 20, IMAGE_SCENE_BYTES_MAX >> 20);
 	if (in->size < bytes_least)
 		return error_set(in->error, EBADMSG, "too short for %llu x %llu pixels", (unsigned long long)width,
 				 (unsigned long long)height);

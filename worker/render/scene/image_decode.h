@@ -14,7 +14,6 @@
 /* Limits checked before decoding, because a small file may promise a large image. A mask may have 11,585 x 11,585
  * pixels, a colour image 9,459 x 9,459. */
 enum { IMAGE_PIXELS_MAX = 1 << 27, IMAGE_BYTES_MAX = 1 << 30 };
-#define IMAGE_SCENE_BYTES_MAX ((size_t)4 << 30) /* of everything in an arena */
 
 struct image_input {
 	const char *name;

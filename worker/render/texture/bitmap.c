@@ -176,7 +176,7 @@ static double bitmap_max(const struct texture *t)
 
 static double bitmap_aspect(const struct texture *t)
 {
-	const struct image *i = &((const struct bitmap *)t->data)->raster.image;
+	const struct indexed_image *i = &((const struct bitmap *)t->data)->raster.image;
 	return (double)i->width / i->height;
 }
 

@@ -46,19 +46,19 @@ struct picture *picture_find(const struct picture_cache *c, const struct picture
 	return NULL;
 }
 
-static void own_range(const struct image *i, double *least, double *largest)
+static void own_range(const struct indexed_image *i, double *least, double *largest)
 {
-	size_t count = (size_t)i->width * i->height * i->channels;
-	float low = i->pixels[0], high = low;
+	size_t count = indexed_image_numbers(i);
+	float low = i->number[0], high = low;
 	for (size_t k = 1; k < count; k++) {
-		low = i->pixels[k] < low ? i->pixels[k] : low;
-		high = i->pixels[k] > high ? i->pixels[k] : high;
+		low = i->number[k] < low ? i->number[k] : low;
+		high = i->number[k] > high ? i->number[k] : high;
 	}
 	*least = (double)low;
 	*largest = (double)high;
 }
 
-struct picture *picture_add(struct picture_cache *c, const struct picture_key *k, const struct image *image,
+struct picture *picture_add(struct picture_cache *c, const struct picture_key *k, const struct indexed_image *image,
 			    double least, double largest, bool cut, struct arena *arena)
 {
 	struct picture_entry *p = arena_alloc(arena, 1, sizeof *p), **first = &c->first[list_of(k)];

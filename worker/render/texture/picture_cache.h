@@ -7,6 +7,7 @@
 #define WORKER_RENDER_TEXTURE_PICTURE_CACHE_H
 
 #include "worker/render/scene/image.h"
+#include "worker/render/texture/indexed_image.h"
 
 struct picture_entry;
 
@@ -27,7 +28,7 @@ struct picture_key {
 };
 
 struct picture {
-	struct image image;
+	struct indexed_image image;
 	/* Space for users; negative: not known yet. */
 	double largest; /* of all numbers, at least 0 */
 	double bound;	/* of the spectra of all pixels */
@@ -37,7 +38,7 @@ struct picture {
 struct picture *picture_find(const struct picture_cache *c, const struct picture_key *k, double least, double largest);
 /* image: was clamped to [least, largest], and `cut` says whether that changed anything. If memory is out, it is not
  * shared. */
-struct picture *picture_add(struct picture_cache *c, const struct picture_key *k, const struct image *image,
+struct picture *picture_add(struct picture_cache *c, const struct picture_key *k, const struct indexed_image *image,
 			    double least, double largest, bool cut, struct arena *arena);
 
 #endif

@@ -10,36 +10,41 @@
 static int decode(struct raster *r, const struct scene_node *n, const struct asset_source *assets,
 		  const struct picture_key *k, struct arena *arena, struct error *e)
 {
+	struct arena decoded = {0};
+	struct image image;
 	struct asset_range part;
 	struct error reason;
 	int code = asset_part_open(&part, n, assets, e);
 	if (code)
 		return code;
 	bool grey = k->channel == IMAGE_LUMINANCE || k->channel == IMAGE_MEAN;
-	code = image_decode(part.bytes, part.size, k->name, k->linear, grey ? IMAGE_ALL : k->channel, arena, &r->image,
+	code = image_decode(part.bytes, part.size, k->name, k->linear, grey ? IMAGE_ALL : k->channel, &decoded, &image,
 			    &reason);
 	asset_range_close(&part, assets);
 	if (!code)
-		code = image_power(&r->image, k->power, &reason);
+		code = image_power(&image, k->power, &reason);
 	if (!code && grey)
-		image_grey(&r->image, k->channel);
+		image_grey(&image, k->channel);
+	if (!code)
+		code = error_prefix(&reason, indexed_image_make(&image, arena, &r->image, &reason), "%s", k->name);
+	arena_fini(&decoded);
 	return code ? node_error(n, e, -code, "%s", reason.text) : 0;
 }
 
 /* Whether a pixel was outside the range. */
-static bool cut_to(struct image *i, double threshold, const struct raster_range *range)
+static bool cut_to(struct indexed_image *i, double threshold, const struct raster_range *range)
 {
-	size_t count = (size_t)i->width * i->height * i->channels;
+	size_t count = indexed_image_numbers(i);
 	bool cut = false;
 	for (size_t k = 0; k < count; k++) {
-		float x = i->pixels[k];
+		float x = i->number[k];
 		if (threshold >= 0)
 			x = (double)x >= threshold ? 1 : 0;
 		float y = (double)x < range->least     ? (float)range->least
 			  : (double)x > range->largest ? (float)range->largest
 						       : x;
 		cut |= y != x;
-		i->pixels[k] = y;
+		i->number[k] = y;
 	}
 	return cut;
 }
@@ -83,9 +88,9 @@ int raster_read(struct raster *r, const struct scene_node *n, const struct asset
 
 void raster_pixel(const struct raster *r, uint32_t x, uint32_t y, double rgb[3])
 {
-	const float *p = r->image.pixels + ((size_t)y * r->image.width + x) * r->image.channels;
-	for (int k = 0; k < 3; k++)
-		rgb[k] = (double)p[r->image.channels == 3 ? k : 0];
+	size_t at = ((size_t)y * r->image.width + x) * r->image.channels;
+	for (size_t k = 0; k < 3; k++)
+		rgb[k] = (double)indexed_image_at(&r->image, r->image.channels == 3 ? at + k : at);
 }
 
 enum { OUTSIDE = UINT32_MAX }; /* a column or row in a border of one colour */
@@ -206,21 +211,22 @@ void raster_patch(const struct raster *r, double u, double v, struct raster_patc
 bool raster_is_grey(const struct raster *r)
 {
 	size_t count = (size_t)r->image.width * r->image.height;
-	const float *p = r->image.pixels;
-	for (size_t i = 0; r->image.channels == 3 && i < count; i++)
-		if (p[3 * i] != p[3 * i + 1] || p[3 * i] != p[3 * i + 2])
+	for (size_t i = 0; r->image.channels == 3 && i < count; i++) {
+		float x = indexed_image_at(&r->image, 3 * i);
+		if (x != indexed_image_at(&r->image, 3 * i + 1) || x != indexed_image_at(&r->image, 3 * i + 2))
 			return false;
+	}
 	return true;
 }
 
 double raster_max(const struct raster *r)
 {
-	size_t count = (size_t)r->image.width * r->image.height * r->image.channels;
+	size_t count = indexed_image_numbers(&r->image);
 	float m = 0;
 	if (r->shared && r->shared->largest >= 0)
 		return r->shared->largest;
 	for (size_t i = 0; i < count; i++)
-		m = r->image.pixels[i] > m ? r->image.pixels[i] : m;
+		m = r->image.number[i] > m ? r->image.number[i] : m;
 	if (r->shared)
 		r->shared->largest = (double)m;
 	return (double)m;

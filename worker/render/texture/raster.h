@@ -9,13 +9,14 @@
 #include "worker/render/scene/asset_part.h"
 #include "worker/render/scene/image.h"
 #include "worker/render/scene/scene.h"
+#include "worker/render/texture/indexed_image.h"
 #include "worker/render/texture/picture_cache.h"
 
 /* BLACK, WHITE: around the image all is 0, or 1. */
 enum raster_wrap { RASTER_REPEAT, RASTER_MIRROR, RASTER_CLAMP, RASTER_BLACK, RASTER_WHITE };
 
 struct raster {
-	struct image image;
+	struct indexed_image image;
 	enum raster_wrap wrap_u, wrap_v;
 	bool nearest;		/* else bilinear */
 	struct picture *shared; /* NULL: the pixels are not shared */

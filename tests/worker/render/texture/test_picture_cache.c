@@ -37,12 +37,12 @@ static void check_maximum(const struct raster *r)
 {
 	double m = 0;
 	for (uint32_t i = 0; i < r->image.width * r->image.height * r->image.channels; i++)
-		m = r->image.pixels[i] > (float)m ? (double)r->image.pixels[i] : m;
+		m = fmax(m, (double)indexed_image_at(&r->image, i));
 	assert_true(raster_max(r) == m && raster_max(r) == m);
 }
 
-static const float *pixels(const struct asset_source *s, const char *text, const struct raster_range *range,
-			   struct arena *a)
+static struct indexed_image image_of(const struct asset_source *s, const char *text, const struct raster_range *range,
+				     struct arena *a)
 {
 	struct raster r = {.nearest = false};
 	struct error e;
@@ -51,7 +51,7 @@ static const float *pixels(const struct asset_source *s, const char *text, const
 	if (raster_read(&r, node_make(a, PLUGIN_TEXTURE, plugin), s, range, a, &e))
 		fail_msg("%s: %s", text, e.text);
 	check_maximum(&r);
-	return r.image.pixels;
+	return r.image;
 }
 
 static void test_shared(void **state)
@@ -65,24 +65,25 @@ static void test_shared(void **state)
 	pictures_add(&p, 2, 1, (const double[]){0.5, 0.25, 4, 0.75, 0.5, 0.5});
 	struct counted c = {.inner = pictures_source(&p)};
 	const struct asset_source s = {.user = &c, .open = open_counted, .close = close_counted, .decoded = &cache};
-	const float *first = pixels(&s, "filename=p0", &reflectance, &a);
-	assert_ptr_equal(pixels(&s, "filename=p0 wrap_mode=clamp", &reflectance, &a), first);
-	assert_ptr_equal(pixels(&s, "filename=p0", &light, &a), first);
+	const uint8_t *first = image_of(&s, "filename=p0", &reflectance, &a).index8;
+	assert_ptr_equal(image_of(&s, "filename=p0 wrap_mode=clamp", &reflectance, &a).index8, first);
+	assert_ptr_equal(image_of(&s, "filename=p0", &light, &a).index8, first);
 	assert_int_equal(c.opened, 1);
-	assert_ptr_not_equal(pixels(&s, "filename=p0 channel=r", &reflectance, &a), first);
-	assert_ptr_not_equal(pixels(&s, "filename=p0 threshold=0.5", &reflectance, &a), first);
-	assert_ptr_not_equal(pixels(&s, "filename=p0", &height, &a), first); /* not decoded as sRGB */
-	assert_ptr_not_equal(pixels(&s, "filename=p0 gamma=1", &reflectance, &a),
-			     pixels(&s, "filename=p0 gamma=2", &reflectance, &a));
+	assert_ptr_not_equal(image_of(&s, "filename=p0 channel=r", &reflectance, &a).index8, first);
+	assert_ptr_not_equal(image_of(&s, "filename=p0 threshold=0.5", &reflectance, &a).index8, first);
+	assert_ptr_not_equal(image_of(&s, "filename=p0", &height, &a).index8, first); /* not decoded as sRGB */
+	assert_ptr_not_equal(image_of(&s, "filename=p0 gamma=1", &reflectance, &a).index8,
+			     image_of(&s, "filename=p0 gamma=2", &reflectance, &a).index8);
 	assert_int_equal(c.opened, 5); /* gamma=1 reads the same numbers as a height */
-	const float *bright = pixels(&s, "filename=p1", &light, &a), *cut = pixels(&s, "filename=p1", &reflectance, &a);
-	assert_true(bright[2] == 4 && cut[2] == 1);
-	assert_ptr_equal(pixels(&s, "filename=p1", &reflectance, &a), cut);
-	assert_ptr_equal(pixels(&s, "filename=p1", &light, &a), bright);
+	const struct indexed_image bright = image_of(&s, "filename=p1", &light, &a),
+				   cut = image_of(&s, "filename=p1", &reflectance, &a);
+	assert_true(indexed_image_at(&bright, 2) == 4 && indexed_image_at(&cut, 2) == 1);
+	assert_ptr_equal(image_of(&s, "filename=p1", &reflectance, &a).index8, cut.index8);
+	assert_ptr_equal(image_of(&s, "filename=p1", &light, &a).index8, bright.index8);
 	assert_int_equal(c.opened, 7);
 	/* Memory that ends sooner or later is not shared. */
-	assert_ptr_not_equal(pixels(&s, "filename=p0", &reflectance, &other), first);
-	assert_ptr_equal(pixels(&s, "filename=p0", &reflectance, &a), first);
+	assert_ptr_not_equal(image_of(&s, "filename=p0", &reflectance, &other).index8, first);
+	assert_ptr_equal(image_of(&s, "filename=p0", &reflectance, &a).index8, first);
 	arena_fini(&other);
 	arena_fini(&a);
 	pictures_fini(&p);
