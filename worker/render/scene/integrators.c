@@ -22,6 +22,15 @@ bool integrators_show_other(const struct scene_node *n)
 	return text_is_among(n->type, others, sizeof others / sizeof *others);
 }
 
+bool integrators_are_known(const struct scene_node *n)
+{
+	static const char *const lights[] = {"path", "volpath", "volpath_simple", "volpathmis", "prbvolpath", "ptracer",
+					     "bdpt", "mlt",	"pssmlt",	  "erpt",	"adaptive",   "motion",
+					     "hslt"};
+	return text_is_among(n->type, lights, sizeof lights / sizeof *lights) || integrators_show_other(n) ||
+	       depth_is_direct(n->type) || depth_is_prb(n->type);
+}
+
 const struct scene_node *integrators_inner(const struct scene_node *n)
 {
 	const struct scene_node *inner;

@@ -11,6 +11,9 @@ const struct scene_node *integrators_inner(const struct scene_node *n);
 /* Whether its image is of something other than all light: a part of it, or normals, depths and the like. */
 bool integrators_show_other(const struct scene_node *n);
 
+/* Whether its type is one of Mitsuba's, or of one of the integrators here. */
+bool integrators_are_known(const struct scene_node *n);
+
 /* Edges of the longest path, by the innermost that states them; -1: no limit. */
 int64_t integrators_depth(const struct scene_node *n);
 

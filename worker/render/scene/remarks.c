@@ -43,10 +43,13 @@ static int on_integrator(struct report *r, const struct scene_node *n, struct er
 	int rc = 0;
 	while (inner && integrators_show_other(inner))
 		inner = integrators_inner(inner);
+	const char *how = strcmp(n->type, "stokes") == 0 ? ", without its polarization" : "";
 	if (integrators_show_other(n) && inner)
-		rc = remark(r, n, e, "the image shows the light that the `%s` inside it asks for", inner->type);
+		rc = remark(r, n, e, "the image shows the light that the `%s` inside it asks for%s", inner->type, how);
 	else if (integrators_show_other(n))
-		rc = remark(r, n, e, "the image shows all light, on surfaces and in media");
+		rc = remark(r, n, e, "the image shows all light, on surfaces and in media%s", how);
+	else if (!integrators_are_known(n))
+		rc = remark(r, n, e, "is not known: the image shows all light, on surfaces and in media");
 	if (!rc && depth_is_direct(n->type) && !node_find(n, "max_depth"))
 		rc = remark(r, n, e, "the image shows light that is scattered once; --max-depth shows more");
 	if (!rc && depth_is_prb(n->type) && !node_find(n, "max_depth"))
@@ -164,9 +167,27 @@ static int on_sensor(struct report *r, const struct scene_node *n, struct error 
 		"does by these names; it was not compared with Mitsuba");
 }
 
+/* Filters that depend on how much of the texture a pixel sees: once for all textures. `ewa` is what Mitsuba 0.6 does
+ * without being asked, and not noted either. */
+static int on_filter(struct report *r, const struct scene_node *n, struct error *e)
+{
+	static const char *const wide[] = {"trilinear", "anisotropic"};
+	const char *filter = node_string(n, "filter_type", "");
+	char text[REPORT_TEXT_MAX];
+	if (!text_is_among(filter, wide, sizeof wide / sizeof *wide))
+		return 0;
+	snprintf(text, sizeof text,
+		 "%s:%d: <texture type=\"bitmap\">: filter_type `%s` is read as `bilinear`: the samples of a pixel are "
+		 "averaged instead, which blurs less",
+		 n->file, n->line, filter);
+	return report_text(r, n->file, filter, text, e);
+}
+
 /* Mitsuba 0.6 takes both for what is to be scaled, and the last one read is the texture inside. */
 static int on_texture(struct report *r, const struct scene_node *n, struct error *e)
 {
+	if (strcmp(n->type, "bitmap") == 0)
+		return on_filter(r, n, e);
 	if (strcmp(n->type, "scale") != 0 || !node_find(n, "value") || !node_child(n, PLUGIN_TEXTURE, 0))
 		return 0;
 	return remark(r, n, e, "`value` has no effect: the texture inside is scaled, as in Mitsuba 0.6");

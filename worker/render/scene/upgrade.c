@@ -111,6 +111,20 @@ static struct xml_element *put_first(struct xml_element *in, const char *name, c
 	return el;
 }
 
+/* What another element says from now on. */
+static void take_out(struct xml_element *in, const struct xml_element *el)
+{
+	struct xml_element *before = NULL;
+	for (struct xml_element *c = in->first; c && c != el; c = c->next)
+		before = c;
+	if (before)
+		before->next = el->next;
+	else
+		in->first = el->next;
+	if (in->last == el)
+		in->last = before;
+}
+
 /* Cameras before 0.4 were mirrored horizontally, and their angle of view was that of the smaller side. */
 static bool turn_camera(struct xml_element *camera, struct arena *arena)
 {
@@ -124,7 +138,7 @@ static bool turn_camera(struct xml_element *camera, struct arena *arena)
 			return false;
 		if (is_named(c, "boolean") && strcmp(name, "mapSmallerSide") == 0) {
 			axis = value && strcasecmp(value, "false") == 0 ? "larger" : axis;
-			c->ignored = true;
+			take_out(camera, c);
 		}
 	}
 	return !is_of_type(camera, "perspective") ||
@@ -184,7 +198,7 @@ static bool scale_colour(struct xml_element *bsdf, const char *name, const char 
 	double x;
 	bool scaled = factor && (!number_parse(factor, &x) || x != 1);
 	if (given)
-		given->ignored = true;
+		take_out(bsdf, given);
 	if (!colour)
 		colour = put_first(bsdf, "spectrum", "name", name, "value", fallback, arena);
 	return colour && (!scaled || wrap(colour, factor, arena));

@@ -223,7 +223,7 @@ static void test_unknown_names(void **state)
 	struct scene s = read_old("<bsdf type='diffuse'><string name='guidingFile' value='x'/></bsdf>",
 				  "s.xml:1: <bsdf type=\"diffuse\">: `guidingFile` is not known and is ignored");
 	scene_fini(&s);
-	s = read_old("<integer name='maxDepth' value='10'/>", "<integer> is ignored with its contents");
+	s = read_old("<integer name='maxDepth' value='10'/>", "<integer>: `maxDepth` is ignored");
 	scene_fini(&s);
 	refuses("0.6.0", "<bsdf type='diffuse'><rgb name='reflectence' value='1'/></bsdf>",
 		"did you mean `reflectance`?");

@@ -433,13 +433,14 @@ static void test_ignored_is_noted_once(void **state)
 			"<bsdf type='roughdielectric'><boolean name='sampleVisible' value='?'/></bsdf>\n"
 			"<bsdf type='roughdielectric'><boolean name='sampleVisible' value='?'/></bsdf>\n"
 			"<dpt/></scene>");
-	assert_int_equal(s.note_count, 4);
+	assert_int_equal(s.note_count, 5);
 	assert_string_equal(s.notes[0], "s.xml:2: <mode> is ignored with its contents");
 	assert_string_equal(
 		s.notes[1],
 		"s.xml:3: <integrator type=\"unheard\"> is ignored except for: max_depth, rr_depth, hide_emitters");
 	assert_non_null(strstr(s.notes[2], "s.xml:4: <bsdf type=\"roughdielectric\">: `sampleVisible`"));
 	assert_non_null(strstr(s.notes[3], "s.xml:6: <dpt>"));
+	assert_non_null(strstr(s.notes[4], "s.xml:3: <integrator type=\"unheard\">: is not known"));
 	assert_int_equal(node_int(s.objects[0], "max_depth", 0), 7);
 	assert_int_equal(s.objects[0]->property_count, 1);
 	scene_fini(&s);

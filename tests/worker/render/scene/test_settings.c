@@ -259,7 +259,9 @@ static void test_notes_on_the_whole(void **state)
 		{"<integrator type='moment'><integrator type='aov'><integrator type='direct'/></integrator></integrator>",
 		 "s.xml:1: <integrator type=\"moment\">: the image shows the light that the `direct` inside it asks for"},
 		{"<integrator type='stokes'><integrator type='aov'/></integrator>",
-		 "<integrator type=\"stokes\">: the image shows all light, on surfaces and"},
+		 "<integrator type=\"stokes\">: the image shows all light, on surfaces and in media, without its polarization"},
+		{"<integrator type='stokes'><integrator type='path'/></integrator>",
+		 "the image shows the light that the `path` inside it asks for, without its polarization"},
 		{"<integrator type='multichannel'/>", "the image shows all light, on surfaces and"},
 		{"<integrator type='volprim_rf_basic'/>", "the image shows all light, on surfaces and"},
 	};
@@ -338,17 +340,18 @@ static void test_values_of_the_scene(void **state)
 {
 	(void)state;
 	static const struct {
-		const char *value;
+		const char *element, *name;
 		bool known;
 	} cases[] = {
-		{"<boolean name='embree_use_robust_intersection' value='true'/>", true},
-		{"<boolean name='allow_thread_reordering' value='false'/>", true},
-		{"<boolean name='spectral' value='true'/>", false},
-		{"<string name='compact_accel' value='true'/>", false},
+		{"boolean", "embree_use_robust_intersection", true},
+		{"boolean", "allow_thread_reordering", true},
+		{"boolean", "spectral", false},
+		{"string", "compact_accel", false},
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		char xml[128];
-		snprintf(xml, sizeof xml, "<scene version='3.0.0'>\n%s</scene>", cases[i].value);
+		snprintf(xml, sizeof xml, "<scene version='3.0.0'>\n<%s name='%s' value='true'/></scene>",
+			 cases[i].element, cases[i].name);
 		const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {0}};
 		struct asset_source assets = memory_assets(files);
 		struct scene s;
@@ -358,7 +361,9 @@ static void test_values_of_the_scene(void **state)
 			fail_msg("%s: %s", xml, e.text);
 		if (!read)
 			continue;
-		assert_true(scene_has_note(&s, "s.xml:2: <boolean> is ignored"));
+		char note[128];
+		snprintf(note, sizeof note, "s.xml:2: <boolean>: `%s` is ignored", cases[i].name);
+		assert_true(scene_has_note(&s, note));
 		scene_fini(&s);
 	}
 }

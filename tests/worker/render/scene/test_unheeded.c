@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Parameters that change light a little and are not supported: a note by name, none where the file says that it is off.
+ * And what is unknown, or read as something else.
  */
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_parts.h"
@@ -26,11 +27,11 @@ static void check(const char *inside, const char *note)
 	struct scene s;
 	struct error e;
 	snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s</scene>", inside);
-	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {0}};
+	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"e.png", "", 0}, {0}};
 	struct asset_source assets = memory_assets(files);
 	if (scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e))
 		fail_msg("%s: %s", inside, e.text);
-	static const char *const unwanted[] = {"not supported", "limits paths", "not known"};
+	static const char *const unwanted[] = {"not supported", "limits paths", "not known", "is read as"};
 	if (note && !scene_has_note(&s, note))
 		fail_msg("%s: %s", inside, note);
 	for (size_t i = 0; !note && i < sizeof unwanted / sizeof *unwanted; i++)
@@ -86,9 +87,62 @@ static void test_names_of_integrators(void **state)
 	      NULL);
 }
 
+/* Of Mitsuba's integrators that show all light none is unknown, nor are those here. */
+static void test_known_integrators(void **state)
+{
+	(void)state;
+	static const char *const types[] = {"path",
+					    "volpath",
+					    "volpathmis",
+					    "volpath_simple",
+					    "prb",
+					    "prbvolpath",
+					    "ptracer",
+					    "bdpt",
+					    "mlt",
+					    "pssmlt",
+					    "erpt",
+					    "adaptive",
+					    "motion",
+					    "hslt",
+					    "direct",
+					    "prb_basic",
+					    "prb_projective",
+					    "moment",
+					    "depth",
+					    "direct_projective",
+					    "photonmapper",
+					    "sppm"};
+	for (size_t i = 0; i < sizeof types / sizeof *types; i++) {
+		char xml[128];
+		snprintf(xml, sizeof xml, "<integrator type='%s'/>", types[i]);
+		check(xml, NULL);
+	}
+	check("<integrator type='my_direct'/>",
+	      "<integrator type=\"my_direct\">: is not known: the image shows all light, on surfaces and in media");
+}
+
+/* What a filter over a pixel's footprint becomes. */
+static void test_wide_filters(void **state)
+{
+	(void)state;
+#define MAP(filter)                                                                                               \
+	"<texture type='bitmap'><string name='filename' value='e.png'/><string name='filter_type' value='" filter \
+	"'/></texture>"
+	check(MAP("bilinear") MAP("nearest") MAP("ewa"), NULL);
+	check(MAP("trilinear"), "s.xml:1: <texture type=\"bitmap\">: filter_type `trilinear` is read as `bilinear`");
+	check(MAP("anisotropic"), "filter_type `anisotropic` is read as `bilinear`");
+#undef MAP
+}
+
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_notes), cmocka_unit_test(test_depths),
-					   cmocka_unit_test(test_names_of_integrators)};
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_notes),
+		cmocka_unit_test(test_depths),
+		cmocka_unit_test(test_names_of_integrators),
+		cmocka_unit_test(test_known_integrators),
+		cmocka_unit_test(test_wide_filters),
+	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

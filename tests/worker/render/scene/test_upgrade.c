@@ -229,6 +229,20 @@ static void test_each_file_for_itself(void **state)
 	}
 }
 
+/* What another element says from then on has its effect: no note calls it ignored. */
+static void test_nothing_is_called_ignored(void **state)
+{
+	(void)state;
+	struct scene s = read_ok("0.2.0",
+				 "<camera type='perspective'><boolean name='mapSmallerSide' value='true'/>" TO(
+					 LOOK) "<boolean name='mapSmallerSide' value='false'/></camera>"
+					       "<bsdf type='phong'><float name='specularAmount' value='.5'/></bsdf>",
+				 "");
+	assert_false(scene_has_note(&s, "is ignored"));
+	assert_string_equal(node_string(s.objects[0], "fov_axis", ""), "larger");
+	scene_fini(&s);
+}
+
 /* The same text as of 0.3 and as of 0.4, which read it without turning anything. */
 static void test_left_is_right(void **state)
 {
@@ -327,6 +341,7 @@ int main(void)
 		cmocka_unit_test(test_materials_of_version_2),
 		cmocka_unit_test(test_first_lookat),
 		cmocka_unit_test(test_each_file_for_itself),
+		cmocka_unit_test(test_nothing_is_called_ignored),
 		cmocka_unit_test(test_left_is_right),
 		cmocka_unit_test(test_refused),
 		cmocka_unit_test(test_no_version),
