@@ -26,6 +26,7 @@
 #include "worker/render/scene/report.h"
 #include "worker/render/scene/subsurface.h"
 #include "worker/render/scene/texture_names.h"
+#include "worker/render/scene/upgrade.h"
 #include "worker/render/scene/value.h"
 #include "worker/render/scene/xml.h"
 
@@ -153,6 +154,7 @@ static int make_scene(struct maker *m)
 	s->black_backs = m->tree->black_backs;
 	s->objects = objects;
 	texture_names_settle(m->decls, m->tree->root);
+	upgrade_unreleased(m->tree->root);
 	int r = relief_files_settle(m->tree->root, m->arena, m->error);
 	if (!r)
 		r = id_table_make(&m->ids, m->tree, m->arena, &m->report, m->error);

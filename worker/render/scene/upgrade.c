@@ -4,7 +4,8 @@
  * names. Rules are rows of tables, like Mitsuba's own; those that need more than a new name are functions.
  *
  * What differs in more than names before 0.3: `phong`, `ward` and `microfacet` had two factors besides their colours,
- * and other defaults; `mirror` was smooth chrome; and <lookAt ox="..." ...> was mirrored.
+ * and other defaults; `mirror` was smooth chrome; and <lookAt ox="..." ...> was mirrored. In files of 2.x and 3.x only
+ * `disney` has another name since, as which Mitsuba's `principled` was known before its release.
  *
  * Failure: out of memory.
  */
@@ -307,4 +308,24 @@ bool upgrade_is_unmarked(const struct xml_element *scene)
 int upgrade_file(struct xml_element *scene, int minor, struct arena *arena, struct error *e)
 {
 	return upgrade(scene, minor, arena, e);
+}
+
+/* `thin` chose between what are two plug-ins since. */
+static void rename_disney(struct xml_element *bsdf, struct xml_attribute *type)
+{
+	struct xml_element *thin = named_child(bsdf, "thin");
+	const char *value = thin && is_named(thin, "boolean") ? xml_attribute(thin, "value") : NULL;
+	bool yes = value && strcasecmp(value, "true") == 0;
+	type->value = yes ? "principledthin" : "principled";
+	if (yes || (value && strcasecmp(value, "false") == 0))
+		take_out(bsdf, thin);
+}
+
+void upgrade_unreleased(struct xml_element *root)
+{
+	struct xml_attribute *type = is_named(root, "bsdf") && !root->snake ? attribute_of(root, "type") : NULL;
+	if (type && strcasecmp(type->value, "disney") == 0)
+		rename_disney(root, type);
+	for (struct xml_element *c = root->first; c; c = c->next)
+		upgrade_unreleased(c);
 }

@@ -16,4 +16,7 @@ bool upgrade_is_unmarked(const struct xml_element *scene);
 /* scene: the root of the file, of version 0.MINOR, minor < 5. Included files are upgraded separately. */
 int upgrade_file(struct xml_element *scene, int minor, struct arena *arena, struct error *e);
 
+/* The same for 2.x and 3.x, whose plug-ins have been renamed before a release only; in the whole tree. */
+void upgrade_unreleased(struct xml_element *root);
+
 #endif

@@ -243,6 +243,36 @@ static void test_nothing_is_called_ignored(void **state)
 	scene_fini(&s);
 }
 
+/* The name that `principled` and `principledthin` had before their release, in files of 2.x and 3.x only. */
+static void test_disney(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *inside, *type;
+	} cases[] = {
+		{"<float name='metallic' value='1'/>", "principled"},
+		{"<boolean name='thin' value='false'/><float name='clearcoat' value='1'/>", "principled"},
+		{"<float name='diff_trans' value='1'/><boolean name='thin' value='True'/>", "principledthin"},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		char body[256];
+		snprintf(body, sizeof body, "<bsdf type='twosided'><bsdf type='Disney'>%s</bsdf></bsdf>",
+			 cases[i].inside);
+		struct scene s = read_ok("2.0.0", body, "");
+		const struct scene_node *n = node_child(s.objects[0], PLUGIN_BSDF, 0);
+		assert_string_equal(n->type, cases[i].type);
+		assert_int_equal(n->property_count, 1);
+		assert_int_equal(s.note_count, 0);
+		scene_fini(&s);
+	}
+	struct scene s;
+	struct error e;
+	assert_true(read_as(&s, "0.6.0", "<bsdf type='disney'/>", "", &e));
+	assert_non_null(strstr(e.text, "there is no bsdf of this type"));
+	assert_true(read_as(&s, "3.0.0", "<bsdf type='disney'><boolean name='thin' value='x'/></bsdf>", "", &e));
+	assert_non_null(strstr(e.text, "has no `thin`"));
+}
+
 /* The same text as of 0.3 and as of 0.4, which read it without turning anything. */
 static void test_left_is_right(void **state)
 {
@@ -342,6 +372,7 @@ int main(void)
 		cmocka_unit_test(test_first_lookat),
 		cmocka_unit_test(test_each_file_for_itself),
 		cmocka_unit_test(test_nothing_is_called_ignored),
+		cmocka_unit_test(test_disney),
 		cmocka_unit_test(test_left_is_right),
 		cmocka_unit_test(test_refused),
 		cmocka_unit_test(test_no_version),
