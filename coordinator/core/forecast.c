@@ -59,13 +59,12 @@ static bool has_time(const struct job *j)
 	return j->plan.seconds > 0 && !isnan(j->started);
 }
 
-/* Until its time ends it; NAN: its time is over, and nothing is known of the round that has to be completed. The rate
- * of the bootstrap does not tell that of rounds. */
+/* Until its time ends it; NAN: its time is over, and nothing is known of the round that has to be completed. */
 static double time_left(const struct job *j, double rate, double now)
 {
 	double round = (double)plan_round_mutations(&j->plan);
 	return merge_seconds_left(&j->plan, job_elapsed(j, now), (work_done(j) - bootstrap_total(j)) / round,
-				  j->leases_merged ? rate / round : 0);
+				  rate / round);
 }
 
 double job_progress(const struct job *j, double now)
@@ -78,9 +77,11 @@ double job_progress(const struct job *j, double now)
 	return fmin(1, fmax(j->progress_floor, p));
 }
 
+/* The rate of the bootstrap does not tell that of rounds: that of `path` is so short that its leases are mostly waits.
+ */
 static double seconds_left(const struct job *j, double total, bool idle, double now)
 {
-	double left = INFINITY, rate = idle ? 0 : rate_value(&j->rate, now);
+	double left = INFINITY, rate = idle || !j->leases_merged ? 0 : rate_value(&j->rate, now);
 	if (rate > 0)
 		left = fmax(0, total - work_done(j)) / rate;
 	if (has_time(j))

@@ -297,6 +297,23 @@ static void no_eta_without_leases(void **state)
 	farm_free(f);
 }
 
+/* Nor does its bootstrap, which may be so short that its rate is that of waiting. */
+static void no_eta_by_bootstrap(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+				   "[0] submit groups=2 rounds=10 -> j1 submitted, j1 is queued",
+				   "[0] w1 joins A threads=1 -> -",
+				   "[0] w1 wants 2 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot",
+				   "[5] w1 batch j1 g0 p0 boot -> merge, merged",
+				   NULL,
+			   });
+	struct job_status s = job_status_of(f, 5);
+	assert_true(s.rate > 0 && s.progress > 0 && isnan(s.eta) && isnan(s.eta_low) && isnan(s.eta_high));
+	farm_free(f);
+}
+
 static void progress_of_errors(void **state)
 {
 	(void)state;
@@ -425,6 +442,7 @@ int main(void)
 		cmocka_unit_test(broken),
 		cmocka_unit_test(progress_and_rate),
 		cmocka_unit_test(no_eta_without_leases),
+		cmocka_unit_test(no_eta_by_bootstrap),
 		cmocka_unit_test(progress_of_errors),
 		cmocka_unit_test(doubtful_looks_end_nothing),
 		cmocka_unit_test(looks_give_a_forecast),
