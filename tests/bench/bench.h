@@ -46,6 +46,8 @@ void bench_equal_time(const char *bin); /* most of an hour: only when named */
 void bench_tiles(const char *bin);
 void bench_parts(const char *bin);
 void bench_loading(const char *bin);
+void bench_sharing(const char *bin);
+void bench_sending(const char *bin);
 void bench_farm(const char *bin);
 void bench_memory(const char *bin);
 void bench_effects(const char *bin); /* minutes of valgrind: only when named */

@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* The farm's processes against hslt-render on the same plan, and their memory. */
+#include "common/base/mem.h"
 #include "common/plan/plan.h"
 #include "tests/bench/bench.h"
 #include "tests/bench/process.h"
+#include "tests/bench/relay.h"
 #include "tests/bench/scenes.h"
 #include "worker/render/world/world.h"
 
@@ -42,10 +44,7 @@ static void start_coordinator(struct farm *f)
 static void farm_start(struct farm *f, const char *bin, int workers)
 {
 	*f = (struct farm){.bin = bin, .folder = "/tmp/hslt-bench.XXXXXX"};
-	if (!mkdtemp(f->folder)) {
-		perror("bench: mkdtemp");
-		exit(1);
-	}
+	process_make_folder(f->folder);
 	snprintf(f->log, sizeof f->log, "%s/log", f->folder);
 	start_coordinator(f);
 	for (int i = 0; i < workers; i++)
@@ -60,10 +59,7 @@ static void farm_stop(struct farm *f)
 		if (f->worker[i].pid)
 			process_stop(&f->worker[i]);
 	process_stop(&f->coordinator);
-	char command[128];
-	snprintf(command, sizeof command, "rm -rf %s", f->folder);
-	if (system(command) != 0)
-		fprintf(stderr, "bench: %s is left behind\n", f->folder);
+	process_remove_folder(f->folder);
 }
 
 static void start_submit(const struct farm *f, struct process *p, const char *scene, const char *options)
@@ -207,6 +203,47 @@ static void worker_memory(const char *bin)
 	farm_stop(&f);
 }
 
+enum { SENT_CELLS = 930 };
+
+/* The seconds of a submission; *bytes: what it sent. */
+static double send_scene(const struct farm *f, const struct relay *r, uint16_t port, unsigned seed, double *bytes)
+{
+	struct process p;
+	uint64_t before = relay_sent(r);
+	process_start(
+		&p, f->bin, f->log,
+		"hslt-submit --coordinator 127.0.0.1:%u %s/wavy.xml -o %s/sent.exr --integrator path --spp 1 --seed %u",
+		port, f->folder, f->folder, seed);
+	process_wait(&p);
+	*bytes = (double)(relay_sent(r) - before);
+	return p.cpu_seconds;
+}
+
+/* Nobody renders what is submitted. */
+static void send_once(const char *bin)
+{
+	static const char xml[] =
+		"<scene version='3.0.0'><sensor type='perspective'/><emitter type='constant'/><shape type='ply'>"
+		"<string name='filename' value='wavy.ply'/></shape></scene>";
+	struct farm f;
+	uint16_t port;
+	farm_start(&f, bin, 0);
+	struct bench_file ply = bench_wavy_ply(SENT_CELLS);
+	double size = (double)(ply.size + sizeof xml - 1), first, second;
+	bench_write_file(f.folder, "wavy.ply", ply.bytes, ply.size);
+	bench_write_file(f.folder, "wavy.xml", xml, sizeof xml - 1);
+	mem_free(ply.bytes);
+	struct relay *r = relay_start((uint16_t)atoi(strchr(f.address, ':') + 1), &port);
+	double cpu_first = send_scene(&f, r, port, 1, &first), cpu_second = send_scene(&f, r, port, 2, &second);
+	relay_stop(r);
+	bench_single("scene with a mesh: its files", 1e-6 * size, "MB", BENCH_INFORMS, 0);
+	bench_single("first submission: bytes sent / bytes of files", first / size, "", BENCH_AT_MOST, 1.01);
+	bench_single("second submission: bytes sent", second, "bytes", BENCH_AT_MOST, 10000);
+	bench_single("second / first", second / first, "", BENCH_INFORMS, 0);
+	bench_single("CPU of hslt-submit: second / first", cpu_second / cpu_first, "", BENCH_INFORMS, 0);
+	farm_stop(&f);
+}
+
 /* All programs are there; says which is missing. */
 static bool ready(const char *bin)
 {
@@ -219,6 +256,13 @@ static bool ready(const char *bin)
 			return false;
 		}
 	return true;
+}
+
+void bench_sending(const char *bin)
+{
+	bench_group("sending", "hslt-submit and hslt-coordinator on loopback: a scene submitted twice");
+	if (ready(bin))
+		send_once(bin);
 }
 
 void bench_farm(const char *bin)

@@ -111,9 +111,10 @@ static const struct {
 	void (*run)(const char *bin);
 	bool when_named; /* not with all */
 } benches[] = {
-	{"rays", bench_rays, false},	 {"hslt", bench_hslt, false},	   {"equal-time", bench_equal_time, true},
-	{"tiles", bench_tiles, false},	 {"parts", bench_parts, false},	   {"farm", bench_farm, false},
-	{"memory", bench_memory, false}, {"effects", bench_effects, true}, {"loading", bench_loading, false},
+	{"rays", bench_rays, false},	   {"hslt", bench_hslt, false},	      {"equal-time", bench_equal_time, true},
+	{"tiles", bench_tiles, false},	   {"parts", bench_parts, false},     {"farm", bench_farm, false},
+	{"memory", bench_memory, false},   {"effects", bench_effects, true},  {"loading", bench_loading, false},
+	{"sharing", bench_sharing, false}, {"sending", bench_sending, false},
 };
 
 static bool chosen(const char *name, bool when_named, char **names, int count)

@@ -81,7 +81,6 @@ static void reap(struct process *p)
 	p->pid = 0;
 	p->cpu_seconds = (double)(r.ru_utime.tv_sec + r.ru_stime.tv_sec) +
 			 1e-6 * (double)(r.ru_utime.tv_usec + r.ru_stime.tv_usec);
-	p->peak_bytes = 1024 * (double)r.ru_maxrss;
 	p->code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
@@ -160,9 +159,38 @@ double process_peak_bytes(const struct process *p, double *now)
 	return 1024 * peak;
 }
 
+double process_wait_peak(struct process *p)
+{
+	double peak = 0;
+	while (process_is_running(p)) {
+		/* Not the largest: before it runs the program, it is a copy of this process. */
+		double bytes = process_peak_bytes(p, NULL);
+		peak = bytes > 0 ? bytes : peak;
+		usleep(1000);
+	}
+	process_wait(p);
+	return peak;
+}
+
 double wall_seconds(void)
 {
 	struct timespec t;
 	clock_gettime(CLOCK_MONOTONIC, &t);
 	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+void process_make_folder(char *folder)
+{
+	if (!mkdtemp(folder)) {
+		perror("bench: mkdtemp");
+		exit(1);
+	}
+}
+
+void process_remove_folder(const char *folder)
+{
+	char command[128];
+	snprintf(command, sizeof command, "rm -rf %s", folder);
+	if (system(command) != 0)
+		fprintf(stderr, "bench: %s is left behind\n", folder);
 }

@@ -1,7 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Scenes of the benchmarks: meshes are made in memory, as OBJ or PLY files, and read from there or written into a
+ * folder; the others are files of the project, or of the folder that HSLT_SCENES names. Any failure ends the bench.
+ */
 #include "worker/render/render.h"
 #include "tests/bench/scenes.h"
 
+#include "common/base/bytes.h"
 #include "common/base/mem.h"
 #include "tests/bench/bench.h"
 #include "tests/support/memory_assets.h"
@@ -14,6 +19,7 @@
 #include <unistd.h>
 
 enum { FLOOR_CELLS = 500, BALL_CELLS = 500, LINE = 96 };
+enum { VERTEX_FLOATS = 8, FACE_BYTES = 1 + 3 * 4, HEADER_MAX = 512 };
 
 struct text {
 	char *bytes;
@@ -123,7 +129,7 @@ struct world *bench_world_million(void)
 	return w;
 }
 
-static void write_file(const char *folder, const char *name, const void *bytes, size_t size)
+void bench_write_file(const char *folder, const char *name, const void *bytes, size_t size)
 {
 	char path[4096];
 	snprintf(path, sizeof path, "%s/%s", folder, name);
@@ -137,13 +143,49 @@ static void write_file(const char *folder, const char *name, const void *bytes, 
 void bench_write_million(const char *folder)
 {
 	struct text t;
-	write_file(folder, "million.xml", million_xml, sizeof million_xml - 1);
+	bench_write_file(folder, "million.xml", million_xml, sizeof million_xml - 1);
 	grid(&t, FLOOR_CELLS, hills);
-	write_file(folder, "hills.obj", t.bytes, t.size);
+	bench_write_file(folder, "hills.obj", t.bytes, t.size);
 	mem_free(t.bytes);
 	grid(&t, BALL_CELLS, ball);
-	write_file(folder, "ball.obj", t.bytes, t.size);
+	bench_write_file(folder, "ball.obj", t.bytes, t.size);
 	mem_free(t.bytes);
+}
+
+static void put_face(struct bench_file *f, uint32_t a, uint32_t b, uint32_t c)
+{
+	const uint32_t corner[3] = {a, b, c};
+	f->bytes[f->size++] = 3;
+	for (int k = 0; k < 3; k++, f->size += 4)
+		put32(f->bytes + f->size, corner[k]);
+}
+
+struct bench_file bench_wavy_ply(uint32_t cells)
+{
+	uint32_t side = cells + 1;
+	size_t vertices = (size_t)side * side, faces = 2 * (size_t)cells * cells;
+	struct bench_file f = {bench_alloc(HEADER_MAX + vertices * VERTEX_FLOATS * 4 + faces * FACE_BYTES, 1), 0};
+	f.size = (size_t)snprintf((char *)f.bytes, HEADER_MAX,
+				  "ply\nformat binary_little_endian 1.0\nelement vertex %zu\n"
+				  "property float x\nproperty float y\nproperty float z\n"
+				  "property float nx\nproperty float ny\nproperty float nz\n"
+				  "property float u\nproperty float v\nelement face %zu\n"
+				  "property list uchar int vertex_indices\nend_header\n",
+				  vertices, faces);
+	for (size_t i = 0; i < vertices; i++) {
+		double u = (double)(i % side) / cells, v = (double)(i / side) / cells;
+		const double vertex[VERTEX_FLOATS] = {2 * u - 1, 2 * v - 1, 0.05 * sin(40 * u) * sin(40 * v), 0, 0, 1,
+						      u,	 v};
+		for (int k = 0; k < VERTEX_FLOATS; k++, f.size += 4)
+			put_float(f.bytes + f.size, (float)vertex[k]);
+	}
+	for (uint32_t j = 0; j < cells; j++)
+		for (uint32_t i = 0; i < cells; i++) {
+			uint32_t a = j * side + i;
+			put_face(&f, a, a + 1, a + side + 1);
+			put_face(&f, a, a + side + 1, a + side);
+		}
+	return f;
 }
 
 const char *bench_box_file(void)

@@ -10,6 +10,14 @@
 struct world *bench_world_million(void);
 /* The same as files: FOLDER/million.xml and its meshes. */
 void bench_write_million(const char *folder);
+void bench_write_file(const char *folder, const char *name, const void *bytes, size_t size);
+/* Binary PLY of a wavy square of cells x cells x 2 triangles with normals and texture coordinates, as exporters write
+ * them. The caller's mem_free. */
+struct bench_file {
+	unsigned char *bytes;
+	size_t size;
+};
+struct bench_file bench_wavy_ply(uint32_t cells);
 /* `cornell-box` from the folder that HSLT_SCENES names, else the box of tests/scenes. */
 struct world *bench_world_box(const char **name);
 /* Folder and file of that scene. */
