@@ -22,17 +22,16 @@
 _Static_assert(sizeof(struct job_counts) / sizeof(uint64_t) * 12 <= STORED_NOTE_MOST,
 	       "a number takes at most 12 bytes");
 
-/* stored_unpack_NAME: the message, then take_NAME. */
-#define UNPACK(name, type, message, descriptor)                                                                 \
-	int stored_unpack_##name(const unsigned char *bytes, size_t size, type *out, struct error *e)           \
-	{                                                                                                       \
+/* The body of stored_unpack_NAME: unpacks `bytes` as the message and hands it to take_NAME. */
+#define UNPACK(name, message, descriptor, out)                                                                  \
+	do {                                                                                                    \
 		int rc;                                                                                         \
 		ProtobufCMessage *m = message_unpack(&stored__##descriptor##__descriptor, bytes, size, &rc, e); \
 		if (m)                                                                                          \
 			rc = take_##name((const message *)m, out, e);                                           \
 		message_free(m);                                                                                \
 		return rc;                                                                                      \
-	}
+	} while (0)
 
 /* ---- counters ---- */
 
@@ -59,7 +58,10 @@ size_t stored_pack_counts(const struct job_counts *c, unsigned char bytes[STORED
 	return stored__counts__pack(&m, bytes);
 }
 
-UNPACK(counts, struct job_counts, Stored__Counts, counts)
+int stored_unpack_counts(const unsigned char *bytes, size_t size, struct job_counts *c, struct error *e)
+{
+	UNPACK(counts, Stored__Counts, counts, c);
+}
 
 /* ---- looks ---- */
 
@@ -84,7 +86,10 @@ size_t stored_pack_look(const struct forecast_look *l, unsigned char bytes[STORE
 	return stored__look__pack(&m, bytes);
 }
 
-UNPACK(look, struct forecast_look, Stored__Look, look)
+int stored_unpack_look(const unsigned char *bytes, size_t size, struct forecast_look *l, struct error *e)
+{
+	UNPACK(look, Stored__Look, look, l);
+}
 
 /* ---- heads of checkpoints ---- */
 
@@ -149,7 +154,10 @@ static int take_head(const Stored__CheckpointHead *m, struct checkpoint_head *h,
 	return rc ? rc : take_counts(m->counts, &h->counts, e);
 }
 
-UNPACK(head, struct checkpoint_head, Stored__CheckpointHead, checkpoint_head)
+int stored_unpack_head(const unsigned char *bytes, size_t size, struct checkpoint_head *h, struct error *e)
+{
+	UNPACK(head, Stored__CheckpointHead, checkpoint_head, h);
+}
 
 /* ---- what earlier versions stored: numbers at the offsets of stored.h ---- */
 

@@ -143,16 +143,25 @@ doors() {
 	}' "${TMPDIR:-/tmp}/includes.$$"
 }
 
-# Headers that declare what several sources define: what the renderer and its integrators show to others.
-SHARED="worker/render/render.h worker/render/path/integrator_face.h"
-
-# Declarations and definitions begin in the first column, and a body with a brace of its own there.
+# Functions and variables alike. Declarations and definitions begin in the first column, and a body with a brace of its own there; names
+# in capitals are those of lists (header_list.h) and of the compiler.
 declared() {
-	awk -v shared=" $(echo $SHARED) " '
+	awk '
 	function name_of(text) {
 		gsub(/__attribute__\(\([^)]*\([^)]*\)\)\)/, "", text)
 		return match(text, /[A-Za-z_0-9]+\(/) ? substr(text, RSTART, RLENGTH - 1) : ""
 	}
+	# The names of variables: what is before [, =, a comma or the end.
+	function variables(text, names,   part, k, count, n) {
+		sub(/ = .*/, "", text); gsub(/\[[^]]*\]/, "", text); sub(/;.*/, "", text)
+		count = split(text, part, ","); n = 0
+		for (k = 1; k <= count; k++)
+			if (match(part[k], /[A-Za-z_0-9]+ *$/)) {
+				names[++n] = substr(part[k], RSTART); sub(/ *$/, "", names[n])
+			}
+		return n
+	}
+	function declare(name) { n++; declares[n] = name; where[n] = FILENAME ":" line; file[n] = FILENAME }
 	FNR == 1 { text = ""; comment = 0; header = FILENAME ~ /\.h$/ }
 	comment { comment = !/\*\//; next }
 	/^\/\*/ { comment = !/\*\//; next }
@@ -161,9 +170,21 @@ declared() {
 	/^\{/ && !header && text != "" && text !~ /^static|=/ { name = name_of(text); if (name) defined[name] = FILENAME }
 	/^\{/ { text = "" }
 	/;/ && text != "" {
-		if (header && text !~ /^(static|typedef|struct [a-z_0-9]+ \{|enum|union)/ && text !~ /\{/) {
+		if (header && text ~ /^extern/) {
+			count = variables(text, names)
+			for (k = 1; k <= count; k++)
+				declare(names[k])
+		} else if (header && text !~ /^(static|typedef|struct [a-z_0-9]+ \{|enum|union)/ && text !~ /\{/) {
 			name = name_of(text)
-			if (name) { n++; declares[n] = name; where[n] = FILENAME ":" line; file[n] = FILENAME }
+			if (name && name !~ /^[A-Z_]/)
+				declare(name)
+		} else if (!header && text !~ /^(static|typedef|extern|enum|union|struct [a-z_0-9]+ (\{|;))/) {
+			head = text; sub(/ = .*/, "", head)
+			if (head !~ /\(/) {
+				count = variables(text, names)
+				for (k = 1; k <= count; k++)
+					defined[names[k]] = FILENAME
+			}
 		}
 		text = ""
 	}
@@ -171,7 +192,9 @@ declared() {
 		for (k = 1; k <= n; k++) {
 			source = defined[declares[k]]
 			own = source; sub(/\.c$/, ".h", own)
-			if (source && own != file[k] && !index(shared, " " file[k] " "))
+			if (!source)
+				print where[k] ": " declares[k] " is defined nowhere"
+			else if (own != file[k])
 				print where[k] ": " declares[k] " is defined in " source
 		}
 		if (n < 900)

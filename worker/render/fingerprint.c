@@ -3,7 +3,7 @@
 
 #include "common/base/fnv.h"
 #include "common/base/version.h"
-#include "worker/render/render.h"
+#include "worker/render/world/world.h"
 
 #include <elf.h>
 #include <gnu/libc-version.h>
@@ -93,6 +93,11 @@ static int has_fma(void)
 #endif
 }
 
+const char *fingerprint_embree(void)
+{
+	return accel_version();
+}
+
 void fingerprint_make(char text[FINGERPRINT_MAX])
 {
 	struct build_id id = {.size = 0};
@@ -100,6 +105,6 @@ void fingerprint_make(char text[FINGERPRINT_MAX])
 	dl_iterate_phdr(look_at_program, &id);
 	for (size_t i = 0; i < id.size; i++)
 		snprintf(build + 2 * i, 3, "%02x", id.bytes[i]);
-	snprintf(text, FINGERPRINT_MAX, "build=%s %s libc=%s fma=%d self=%016llx", build, render_numeric_version(),
+	snprintf(text, FINGERPRINT_MAX, "build=%s %s libc=%s fma=%d self=%016llx", build, fingerprint_embree(),
 		 gnu_get_libc_version(), has_fma(), (unsigned long long)fingerprint_self_test());
 }

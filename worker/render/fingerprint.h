@@ -14,6 +14,9 @@ enum { FINGERPRINT_MAX = 256 };
  * version, and a hash of what it computes here. */
 void fingerprint_make(char text[FINGERPRINT_MAX]);
 
+/* The part of Embree: "embree 3.13.5 avx2". */
+const char *fingerprint_embree(void);
+
 /* FNV-1a over the results of libm's functions on fixed inputs; takes about a millisecond. */
 uint64_t fingerprint_self_test(void);
 

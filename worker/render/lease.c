@@ -7,9 +7,7 @@
  * Failures: -EINVAL where things do not fit, -EILSEQ for states that are none, -EDOM where an invalid operation was
  * trapped (the place in the sentence); nothing of the batch is kept.
  */
-#include "worker/render/halfvec/refract.h"
-#include "worker/render/path/longer.h"
-#include "worker/render/render.h"
+#include "worker/render/lease.h"
 
 #include "common/base/clock.h"
 #include "common/base/crash.h"
@@ -17,10 +15,14 @@
 #include "common/base/liveness.h"
 #include "worker/render/chain/chain.h"
 #include "worker/render/chain/redistribution.h"
+#include "worker/render/halfvec/refract.h"
+#include "worker/render/map.h"
 #include "worker/render/math/fptrap.h"
 #include "worker/render/mutation/mixture.h"
+#include "worker/render/path/longer.h"
 #include "worker/render/path/sobol.h"
 #include "worker/render/film/sums.h"
+#include "worker/render/world/build.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -44,11 +46,6 @@ struct job {
 
 enum { STOP_INTERVAL = 16 };   /* samples between looks at the stop flag; one may take 10 ms */
 enum { BEYOND_INTERVAL = 16 }; /* one bootstrap sample in so many also estimates paths that are too long to simulate */
-
-const char *render_numeric_version(void)
-{
-	return accel_version();
-}
 
 static bool stopped(const struct job *j)
 {

@@ -7,12 +7,13 @@
  *
  * -ENOMEM; -EDOM after an invalid floating-point operation. Nothing is left allocated then.
  */
+#include "worker/render/map.h"
+
 #include "worker/render/chain/redistribution.h"
 #include "worker/render/halfvec/refract.h"
 #include "worker/render/path/brightness.h"
 #include "worker/render/path/integrate_bdpt.h"
 #include "worker/render/path/integrator.h"
-#include "worker/render/render.h"
 
 #include "common/base/liveness.h"
 #include "common/base/mem.h"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "worker/render/render.h"
+#include "worker/render/mutations.h"
 
 #include "worker/render/mutation/mixture.h"
 

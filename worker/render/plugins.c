@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* All plug-ins that a scene may name, collected from the registries for the scene reader. */
-#include "worker/render/render.h"
+#include "worker/render/plugins.h"
 
 #include "worker/render/bsdf/bsdf.h"
 #include "worker/render/emitter/emitter.h"

@@ -14,6 +14,7 @@
 #include "worker/cli/accuracy/accuracy_csv.h"
 #include "worker/cli/accuracy/accuracy_plots.h"
 #include "worker/cli/image/tonemap.h"
+#include "worker/render/fingerprint.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -167,7 +168,7 @@ static void machine(char *text, size_t size, unsigned threads)
 			break;
 	if (f)
 		fclose(f);
-	snprintf(text, size, "%s, %u thread%s; %s", model, threads, threads == 1 ? "" : "s", render_numeric_version());
+	snprintf(text, size, "%s, %u thread%s; %s", model, threads, threads == 1 ? "" : "s", fingerprint_embree());
 }
 
 static void put_facts(struct text_file *p, const struct accuracy_context *x)

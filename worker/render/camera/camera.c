@@ -57,9 +57,7 @@ int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_cen
 	c->height = s->height;
 	c->center_x = s->width * (0.5 - s->principal_x);
 	c->center_y = s->height * (0.5 - s->principal_y);
-	c->projection = s->projection == PROJECTION_SPHERE	? &camera_projection_spherical
-			: s->projection == PROJECTION_DISTORTED ? &camera_projection_rdist
-								: NULL;
+	c->projection = camera_projection_of(s->projection);
 	c->scale = s->half_width > 0 || s->projection == PROJECTION_SPHERE ? 0 : pixels_per_slope(s);
 	c->near_clip = s->near_clip * world_scale;
 	c->far_clip = s->far_clip * world_scale;

@@ -23,6 +23,7 @@ struct camera_projection {
 	void (*pixel)(const struct camera *c, vec3 l, vec3 tangent[2], double rate[2]);
 };
 
-extern const struct camera_projection camera_projection_spherical, camera_projection_rdist;
+/* NULL: onto a plane, without one. */
+const struct camera_projection *camera_projection_of(enum scene_projection p);
 
 #endif

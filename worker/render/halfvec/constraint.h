@@ -20,7 +20,6 @@
 
 #include "worker/render/math/mat2.h"
 #include "worker/render/path/full_path.h"
-#include "worker/render/settings/accuracy_settings.h"
 
 struct constraint {
 	vec2 h;
@@ -84,11 +83,5 @@ struct constraint_solver {
 	 * available. */
 	enum constraint_end (*differentials)(const struct constraint *k, unsigned b, unsigned c, mat2 *d);
 };
-extern const struct constraint_solver constraint_double, constraint_single;
-
-static inline const struct constraint_solver *constraint_solver_of(const struct accuracy_settings *k)
-{
-	return k->precision == SETTING_SINGLE ? &constraint_single : &constraint_double;
-}
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "worker/render/halfvec/constraint.h"
+#include "worker/render/halfvec/constraint_system.h"
 
 #include <string.h>
 

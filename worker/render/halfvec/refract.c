@@ -11,6 +11,7 @@
  */
 #include "worker/render/halfvec/refract.h"
 
+#include "worker/render/halfvec/constraint_system.h"
 #include "worker/render/halfvec/walk.h"
 #include "worker/render/path/visible.h"
 #include "worker/render/world/refracting.h"

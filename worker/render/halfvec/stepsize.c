@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/halfvec/stepsize.h"
 
+#include "worker/render/halfvec/constraint_system.h"
 /* Standard deviation on the film, of its smaller side. */
 #define FILM_STEP 0.02
 /* Minimum of sigma over the limit: a pixel that sees less than this of a lobe leaves no room for a walk in double. */

@@ -12,6 +12,7 @@
  */
 #include "worker/render/halfvec/walk.h"
 
+#include "worker/render/halfvec/constraint_system.h"
 #include "worker/render/path/media.h"
 
 struct walk_limits walk_limits_of(const struct accuracy_settings *k)

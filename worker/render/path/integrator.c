@@ -21,17 +21,3 @@ const struct integrator *integrator_find(const char *name)
 			return integrator_registry[i];
 	return NULL;
 }
-
-const struct render_integrator *render_integrator_find(const char *name)
-{
-	const struct integrator *i = integrator_find(name);
-	return i ? &i->face : NULL;
-}
-
-const struct render_integrator *render_integrator_at(size_t index)
-{
-	for (size_t i = 0; i <= index; i++)
-		if (!integrator_registry[i])
-			return NULL;
-	return &integrator_registry[index]->face;
-}

@@ -28,8 +28,4 @@ struct render_integrator {
 	"the integrator %s finds no light of `volumelight`, that of media: its chains move the ends of paths on " \
 	"surfaces; path, bdpt, bdpt8, erpt, erpt4 and pssmlt find it"
 
-/* NULL when there is none of that name; index from 0, NULL at the end. */
-const struct render_integrator *render_integrator_find(const char *name);
-const struct render_integrator *render_integrator_at(size_t index);
-
 #endif

@@ -9,6 +9,7 @@
  * h_j|.
  */
 #include "tests/worker/render/halfvec/quad.h"
+#include "worker/render/halfvec/constraint_system.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -7,6 +7,7 @@
  */
 #include "tests/worker/render/halfvec/dense.h"
 #include "tests/worker/render/halfvec/quad.h"
+#include "worker/render/halfvec/constraint_system.h"
 
 #include <fenv.h>
 #include <setjmp.h>

@@ -7,6 +7,7 @@
  */
 #include "tests/support/dice.h"
 #include "tests/support/worlds.h"
+#include "worker/render/halfvec/constraint_system.h"
 #include "worker/render/halfvec/walk.h"
 #include "worker/render/render.h"
 

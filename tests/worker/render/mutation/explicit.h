@@ -7,6 +7,7 @@
 #ifndef TESTS_WORKER_MUTATION_EXPLICIT_H
 #define TESTS_WORKER_MUTATION_EXPLICIT_H
 
+#include "worker/render/halfvec/constraint_system.h"
 #include "worker/render/mutation/heuristic.h"
 #include "worker/render/mutation/mutation.h"
 

@@ -1,0 +1,18 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/integrator_lookup.h"
+
+#include "worker/render/path/integrator.h"
+
+const struct render_integrator *render_integrator_find(const char *name)
+{
+	const struct integrator *i = integrator_find(name);
+	return i ? &i->face : NULL;
+}
+
+const struct render_integrator *render_integrator_at(size_t index)
+{
+	for (size_t i = 0; i <= index; i++)
+		if (!integrator_registry[i])
+			return NULL;
+	return &integrator_registry[index]->face;
+}
