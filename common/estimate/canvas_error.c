@@ -374,7 +374,7 @@ static void add_row(struct tile_error *t, size_t first)
 			t->sum.gram[i][j] += (double)gram[i][j];
 }
 
-static void error_tile(struct making *m, struct tile_error *t, uint32_t x, uint32_t y)
+static void error_tile(struct image_builder *m, struct tile_error *t, uint32_t x, uint32_t y)
 {
 	t->x = x;
 	t->y = y;
@@ -428,7 +428,7 @@ static void free_tile(struct tile_error *t)
 	mem_free(t);
 }
 
-int canvas_error(struct making *m, struct error *e)
+int canvas_error(struct image_builder *m, struct error *e)
 {
 	assert(m->c->plan.groups > 1 && !m->open_rounds);
 	struct tile_error *t = mem_alloc(1, sizeof *t);

@@ -4,9 +4,9 @@
 #define COMMON_ESTIMATE_CANVAS_ERROR_H
 
 #include "common/base/error.h"
-#include "common/estimate/making.h"
+#include "common/estimate/image_builder.h"
 
 /* Fills in error and relMSE of an image whose rgb is complete; needs two or more groups and no open rounds. -ENOMEM */
-int canvas_error(struct making *m, struct error *e);
+int canvas_error(struct image_builder *m, struct error *e);
 
 #endif

@@ -40,7 +40,7 @@ static double ratio(double a, double b)
 }
 
 /* b of each group and of all, and its standard error from the spread of the groups. */
-static void find_b(struct making *m)
+static void find_b(struct image_builder *m)
 {
 	uint32_t groups = m->c->plan.groups;
 	struct exact_sum sum = {0}, beyond = {0}, bootstrap = {0};
@@ -63,7 +63,7 @@ static void find_b(struct making *m)
 	m->img->beyond_share = ratio(outside, outside + exact_sum_value(&bootstrap));
 }
 
-static void find_factors(struct making *m)
+static void find_factors(struct image_builder *m)
 {
 	const struct plan *p = &m->c->plan;
 	uint64_t samples = 0;
@@ -95,7 +95,7 @@ static double preview_leases(const struct canvas *c, uint32_t row)
 }
 
 /* The used slots of a tile, of all groups: the prefix's, and for a preview the open rounds'. */
-static uint32_t tile_slots(const struct making *m, size_t tile, const int64_t *slots[PLAN_MAX_GROUPS * FILMS])
+static uint32_t tile_slots(const struct image_builder *m, size_t tile, const int64_t *slots[PLAN_MAX_GROUPS * FILMS])
 {
 	uint32_t n = 0;
 	for (uint32_t g = 0; g < m->c->plan.groups; g++)
@@ -114,7 +114,7 @@ static void pool_row(const int64_t *const *slots, uint32_t count, size_t at, siz
 			sums[k] += (double)slots[i][at + k];
 }
 
-static void pool_tile(struct making *m, uint32_t tx, uint32_t ty)
+static void pool_tile(struct image_builder *m, uint32_t tx, uint32_t ty)
 {
 	const struct plan *p = &m->c->plan;
 	const int64_t *slots[PLAN_MAX_GROUPS * FILMS];
@@ -136,7 +136,7 @@ static void pool_tile(struct making *m, uint32_t tx, uint32_t ty)
 	}
 }
 
-static int find_moments(const struct making *m, struct error *e)
+static int find_moments(const struct image_builder *m, struct error *e)
 {
 	struct moments_group groups[PLAN_MAX_GROUPS];
 	for (uint32_t g = 0; g < m->c->plan.groups; g++)
@@ -152,7 +152,7 @@ static void state_no_interval(struct canvas_image *img, enum error_doubt why)
 }
 
 /* Chains are flagged but too short to be judged: the extent of their errors is not known. */
-static void doubt_short_chains(struct making *m)
+static void doubt_short_chains(struct image_builder *m)
 {
 	struct convergence a;
 	convergence_judge(&m->c->plan, m->img, &a);
@@ -163,7 +163,7 @@ static void doubt_short_chains(struct making *m)
 
 /* Samples per pixel that may have found light before anything else could: of chains, the independent proposals and the
  * bootstrap. */
-static double finding_samples(const struct making *m)
+static double finding_samples(const struct image_builder *m)
 {
 	const struct plan *p = &m->c->plan;
 	double independent = 0;
@@ -175,7 +175,7 @@ static double finding_samples(const struct making *m)
 
 /* If what no sample has found were in the image, its error would leave the interval. Once samples find such light, it
  * is in the spread between groups. */
-static void doubt_unseen_light(struct making *m)
+static void doubt_unseen_light(struct image_builder *m)
 {
 	struct canvas_image *img = m->img;
 	if (!(img->rel_mse > 0))
@@ -197,7 +197,7 @@ int canvas_image(const struct canvas *c, bool open_rounds, struct canvas_image *
 				     .rel_mse_degrees = NAN,
 				     .rel_mse_95 = {NAN, NAN},
 				     .rounds = c->rounds};
-	struct making m = {.c = c, .img = img, .open_rounds = open_rounds, .all = mem_alloc(1, sizeof *m.all)};
+	struct image_builder m = {.c = c, .img = img, .open_rounds = open_rounds, .all = mem_alloc(1, sizeof *m.all)};
 	bool errors = p->groups > 1 && !open_rounds;
 	img->rgb = mem_alloc((size_t)img->width * img->height * 3, sizeof *img->rgb);
 	img->error = errors ? mem_alloc((size_t)img->width * img->height * 3, sizeof *img->error) : NULL;

@@ -16,7 +16,8 @@
 enum { RARE = 16, RARE_BRIGHTER = 3 };
 
 /* The inner loops run over groups and are independent, so the compiler vectorises them. */
-static void pixel_error(struct making *m, struct tile_error *t, const int64_t *const *slot, size_t at, size_t pixel)
+static void pixel_error(struct image_builder *m, struct tile_error *t, const int64_t *const *slot, size_t at,
+			size_t pixel)
 {
 	uint32_t groups = t->groups;
 	double rgb[3][PLAN_MAX_GROUPS];
@@ -85,7 +86,7 @@ static bool is_dark(const struct tile_error *t, size_t pixel)
 	return t->square[pixel][0] + t->square[pixel][1] + t->square[pixel][2] == 0;
 }
 
-void tile_error_load(struct making *m, struct tile_error *t)
+void tile_error_load(struct image_builder *m, struct tile_error *t)
 {
 	bool chains = m->c->plan.kind == PLAN_CHAINS;
 	t->lit = false;
@@ -170,7 +171,7 @@ static void find_rare(const struct tile_error *t, double rare[3][TILE_SIZE * TIL
  * light around it. A pixel that no chain visited would have a variance of 0, a false claim; it gets the variance of its
  * neighbours, of its tile, or (tile_error_fill_unvisited) of the image.
  */
-void tile_error_write(struct making *m, const struct tile_error *t, bool have_bases)
+void tile_error_write(struct image_builder *m, const struct tile_error *t, bool have_bases)
 {
 	double rare[3][TILE_SIZE * TILE_SIZE];
 	memset(rare, 0, sizeof rare);

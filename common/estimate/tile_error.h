@@ -7,7 +7,7 @@
 #define COMMON_ESTIMATE_TILE_ERROR_H
 
 #include "common/estimate/canvas_interval.h"
-#include "common/estimate/making.h"
+#include "common/estimate/image_builder.h"
 #include "common/estimate/tail.h"
 
 /* With fewer groups there is no trimmed mean, and no colours cancel. */
@@ -52,7 +52,7 @@ static inline float *tile_error_apart(const struct tile_error *t, size_t pixel)
 
 /* Fills in what follows from the film of the tile at (x, y): apart, brightness, square, kurtosis, mean_square, lit.
  * Counts the image's unvisited pixels. */
-void tile_error_load(struct making *m, struct tile_error *t);
+void tile_error_load(struct image_builder *m, struct tile_error *t);
 
 /* base, base_square and base_power of all pixels: mean and its variance without the eighth of the groups that are
  * farthest from the others, which is the brightness without fireflies. `apart` must still be as tile_error_load made
@@ -61,7 +61,7 @@ void tile_error_find_bases(struct tile_error *t);
 
 /* Writes the standard errors of the tile's pixels into the image; `settled` must be known. Rare light is
  * looked for if the bases are known: it is where not all pixels are settled. */
-void tile_error_write(struct making *m, const struct tile_error *t, bool have_bases);
+void tile_error_write(struct image_builder *m, const struct tile_error *t, bool have_bases);
 
 /* Gives the mean variance of the image to tiles that no chain visited, which have none of their own. */
 void tile_error_fill_unvisited(struct canvas_image *img);

@@ -19,7 +19,7 @@
 #include "coordinator/core/failure_quorum.h"
 #include "coordinator/core/forecast.h"
 #include "coordinator/core/lease.h"
-#include "coordinator/core/lost.h"
+#include "coordinator/core/lost_holders.h"
 #include "coordinator/core/owner.h"
 #include "coordinator/core/peer.h"
 #include "coordinator/core/quarantine.h"
@@ -303,7 +303,7 @@ void answer_failed(struct farm *f, const struct event *ev)
 	struct peer *p = farm_find_peer(f, ev->peer);
 	struct lease *l = s ? lease_of(s, p) : NULL;
 	/* It may report a lease of an earlier process, which that lease ended. */
-	bool was_lost = s && lost_take(&s->lost, p->who);
+	bool was_lost = s && lost_holders_remove(&s->lost, p->who);
 	if (!l && !was_lost)
 		return;
 	if (is_files_fault(l, ev)) {
@@ -358,7 +358,7 @@ bool answer_counts(const struct farm *f, uint64_t peer, const struct lease_key *
 	const struct event ev = {.peer = peer, .lease = {.key = *k}};
 	const struct slot *s = next_slot(f, &ev);
 	const struct peer *p = farm_find_peer(f, peer);
-	return s && (lease_of(s, p) || lost_has(&s->lost, p->who));
+	return s && (lease_of(s, p) || lost_holders_have(&s->lost, p->who));
 }
 
 enum farm_delivery answer_awaits(const struct farm *f, uint64_t peer, const struct lease_key *k)

@@ -4,7 +4,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "coordinator/core/lease.h"
-#include "coordinator/core/lost.h"
+#include "coordinator/core/lost_holders.h"
 #include "coordinator/core/worker_registry.h"
 
 #include <string.h>
@@ -109,7 +109,7 @@ void connection_lose_leases(struct farm *f, struct peer *p)
 {
 	for (uint32_t i = 0; i < p->lease_limit; i++)
 		if (p->leases[i].used)
-			lost_lease(f, &p->leases[i]);
+			lost_holders_add(f, &p->leases[i]);
 }
 
 void connection_lose(struct farm *f, struct peer *p)

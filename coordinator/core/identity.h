@@ -16,7 +16,7 @@ enum {
 enum { PEER_WINDOW = 8 /* leases that a new worker may hold */ };
 
 /* After a failed lease the worker pauses with that job for a while. */
-struct avoid {
+struct backoff {
 	uint64_t job; /* 0: free */
 	uint32_t failures;
 	double until;
@@ -42,7 +42,7 @@ struct identity {
 	double seen;
 	double full_until; /* its memory is full: till then it gets only leases of jobs of which it holds some */
 	bool full_held;	   /* it held leases then: when it has none any more, full_until counts no longer */
-	struct avoid avoid[IDENTITY_AVOIDED];
+	struct backoff avoid[IDENTITY_AVOIDED];
 	char text[256]; /* its last fault */
 };
 

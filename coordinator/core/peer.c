@@ -44,7 +44,7 @@ void peer_requeue(struct farm *f, struct peer *p)
 	}
 }
 
-static struct avoid *avoid_of(const struct peer *p, uint64_t job)
+static struct backoff *avoid_of(const struct peer *p, uint64_t job)
 {
 	for (int i = 0; i < IDENTITY_AVOIDED; i++)
 		if (p->who->avoid[i].job == job)
@@ -53,11 +53,11 @@ static struct avoid *avoid_of(const struct peer *p, uint64_t job)
 }
 
 /* A free entry, one of a job that is over, or the one that ends first. */
-static struct avoid *room_to_avoid(const struct farm *f, struct identity *who)
+static struct backoff *room_to_avoid(const struct farm *f, struct identity *who)
 {
-	struct avoid *first = &who->avoid[0];
+	struct backoff *first = &who->avoid[0];
 	for (int i = 0; i < IDENTITY_AVOIDED; i++) {
-		struct avoid *a = &who->avoid[i];
+		struct backoff *a = &who->avoid[i];
 		const struct job *j = a->job ? farm_find_job(f, a->job) : NULL;
 		if (!j || !job_is_live(j))
 			return a;
@@ -67,10 +67,10 @@ static struct avoid *room_to_avoid(const struct farm *f, struct identity *who)
 	return first;
 }
 
-static struct avoid *begin_to_avoid(const struct farm *f, struct peer *p, uint64_t job)
+static struct backoff *begin_to_avoid(const struct farm *f, struct peer *p, uint64_t job)
 {
-	struct avoid *a = room_to_avoid(f, p->who);
-	*a = (struct avoid){.job = job};
+	struct backoff *a = room_to_avoid(f, p->who);
+	*a = (struct backoff){.job = job};
 	return a;
 }
 
@@ -91,7 +91,7 @@ static bool holds_lease_of(const struct peer *p, uint64_t job)
  * worker is asked once in a pause. */
 void peer_has_no_room(const struct farm *f, struct peer *p, uint64_t job)
 {
-	struct avoid *a = avoid_of(p, job);
+	struct backoff *a = avoid_of(p, job);
 	bool held = is_holding(p);
 	p->who->full_until = f->now + f->config.first_pause;
 	p->who->full_held = held;
@@ -105,7 +105,7 @@ void peer_has_no_room(const struct farm *f, struct peer *p, uint64_t job)
 
 void peer_failed(const struct farm *f, struct peer *p, uint64_t job, bool own)
 {
-	struct avoid *a = avoid_of(p, job);
+	struct backoff *a = avoid_of(p, job);
 	p->failures++;
 	if (a && a->until > f->now) {
 		a->own = a->own && own;
@@ -138,24 +138,24 @@ void peer_was_late(struct farm *f, struct peer *p)
 
 void peer_succeeded(struct farm *f, struct peer *p, uint64_t job)
 {
-	struct avoid *a = avoid_of(p, job);
+	struct backoff *a = avoid_of(p, job);
 	p->merged++;
 	p->who->faults_in_row = 0;
 	if (a)
-		*a = (struct avoid){0};
+		*a = (struct backoff){0};
 	if (p->who->window < f->config.max_peer_leases)
 		set_window(f, p, 2 * p->who->window);
 }
 
 double peer_avoids_until(const struct peer *p, uint64_t job)
 {
-	const struct avoid *a = avoid_of(p, job);
+	const struct backoff *a = avoid_of(p, job);
 	return a ? a->until : -INFINITY;
 }
 
 double peer_pauses_until(const struct peer *p, const struct job *j)
 {
-	const struct avoid *a = avoid_of(p, j->id);
+	const struct backoff *a = avoid_of(p, j->id);
 	bool free = !is_holding(p), in = holds_lease_of(p, j->id);
 	double until = a && !(a->later && a->held && (free || in)) ? a->until : -INFINITY, full = p->who->full_until;
 	return full > until && !(free && p->who->full_held) && !in ? full : until;
@@ -163,12 +163,12 @@ double peer_pauses_until(const struct peer *p, const struct job *j)
 
 bool peer_lacks(const struct peer *p, uint64_t job)
 {
-	const struct avoid *a = avoid_of(p, job);
+	const struct backoff *a = avoid_of(p, job);
 	return a && a->own;
 }
 
 bool peer_waits_for_room(const struct peer *p, uint64_t job)
 {
-	const struct avoid *a = avoid_of(p, job);
+	const struct backoff *a = avoid_of(p, job);
 	return a && a->later;
 }

@@ -45,10 +45,10 @@ struct doubt {
 	bool anew;	  /* its chains start the next epoch from their seeds */
 };
 
-/* See lost.h. */
+/* See lost_holders.h. */
 enum { LOST_FATAL = 8 };
 
-struct lost {
+struct lost_holders {
 	uint32_t count;
 	struct lost_worker {
 		const struct identity *who;	 /* valid as long as its id is this one */
@@ -62,7 +62,7 @@ struct slot {
 	uint64_t next;	      /* the first epoch that is not merged */
 	double since;	      /* when the current lease was sent */
 	struct failure_quorum failure_quorum; /* at the next epoch */
-	struct lost lost;		      /* while they held it */
+	struct lost_holders lost;	      /* while they held it */
 	struct doubt doubt;		      /* about the states that it starts from */
 	uint32_t holders, timeouts;
 };

@@ -12,7 +12,7 @@
 #include "common/plan/plan.h"
 #include "common/wire/envelope.h"
 
-struct back;
+struct rollback;
 
 /* A submitted job, and the outcome. */
 struct submission {
@@ -26,7 +26,7 @@ struct submission {
 
 struct incoming {
 	struct submission *submission; /* EVENT_SUBMIT */
-	struct back *back;	       /* EVENT_LEASE_FAILED: what can be taken back; NULL: nothing */
+	struct rollback *back;	       /* EVENT_LEASE_FAILED: what can be taken back; NULL: nothing */
 	/* EVENT_BATCH, EVENT_STORED */
 	struct batch *batch; /* if merged, its states are taken over by the job */
 	const Farm__LeaseResult *result;

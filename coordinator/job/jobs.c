@@ -20,7 +20,7 @@ double jobs_now(const struct jobs *jobs)
 
 bool jobs_is_read(const struct jobs *jobs, uint64_t job)
 {
-	for (const struct found *f = jobs->found; f; f = f->next)
+	for (const struct recovering_job *f = jobs->found; f; f = f->next)
 		if (f->record.id == job)
 			return true;
 	return jobs->reading && jobs->reading->id == job;
@@ -29,7 +29,7 @@ bool jobs_is_read(const struct jobs *jobs, uint64_t job)
 static uint64_t found_film_bytes(const struct jobs *jobs)
 {
 	uint64_t sum = 0;
-	for (const struct found *f = jobs->found; f; f = f->next)
+	for (const struct recovering_job *f = jobs->found; f; f = f->next)
 		if (f->job && f->job->canvas && !canvas_is_mapped(f->job->canvas))
 			sum += canvas_bytes(&f->job->plan);
 	return sum;

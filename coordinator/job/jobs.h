@@ -14,7 +14,7 @@
 #include "coordinator/job/peer_calls.h"
 #include "coordinator/job/replay.h"
 #include "coordinator/store/ledger.h"
-#include "coordinator/store/seen.h"
+#include "coordinator/store/age_clock.h"
 #include "coordinator/store/spool.h"
 
 #include <sys/queue.h>
@@ -39,8 +39,8 @@ struct deferred {
 enum { TICK_MS = 200, ENDED_MAX = 200 /* ended jobs in the lists; older ones can still be fetched */ };
 
 /* A job of the last run that is being read (coordinator/jobs/recovery.c). */
-struct found {
-	struct found *next;
+struct recovering_job {
+	struct recovering_job *next;
 	struct live_job *job;	  /* while it is read, everything but its id belongs to the pool */
 	struct job_record record; /* how it is displayed meanwhile */
 	uint64_t bytes;
@@ -68,10 +68,10 @@ struct jobs {
 	struct job_record *ended;	  /* at most ENDED_MAX, oldest first */
 	size_t ended_count;
 	STAILQ_HEAD(, deferred) deferred;
-	char refusal[256];	   /* why the core refused the last event */
-	struct found *found;	   /* sorted by id */
-	struct recovery *recovery; /* jobs of an earlier run that are being read; NULL: none left */
-	int fault;		   /* why it stops by itself; 0: it does not */
+	char refusal[256];	      /* why the core refused the last event */
+	struct recovering_job *found; /* sorted by id */
+	struct recovery *recovery;    /* jobs of an earlier run that are being read; NULL: none left */
+	int fault;		      /* why it stops by itself; 0: it does not */
 	struct error fault_error;
 	uint64_t *restored; /* ids of the jobs that continued when this run started */
 	size_t restored_count;
@@ -79,7 +79,7 @@ struct jobs {
 	struct ack_list parked;			 /* ... for a new journal to replace one that failed */
 	struct ending *endings;			 /* jobs that ended and whose records could not be written yet */
 	double endings_again, ledger_again;	 /* next attempts */
-	struct seen seen;			 /* when this run started */
+	struct age_clock seen;			 /* when this run started */
 	double folders_next;			 /* next check of jobs' folders */
 	double clear_next;			 /* next check of finished jobs */
 	struct clearing *clearing;		 /* that check is running */

@@ -14,7 +14,7 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "coordinator/job/back.h"
+#include "coordinator/job/rollback.h"
 #include "coordinator/job/checkpoint_file.h"
 #include "coordinator/job/late.h"
 #include "coordinator/job/stored.h"
@@ -96,10 +96,10 @@ static int take_batch(struct replay *r, const struct journal_item *item, struct 
 	if (rc == -EBADMSG)
 		rc = strange(r, "a result", item->size, e);
 	if (!rc && item->kind == JOURNAL_AGAIN)
-		rc = back_replay(r->job, item->journal, &batch.key, e);
+		rc = rollback_replay(r->job, item->journal, &batch.key, e);
 	if (!rc && item->kind == JOURNAL_KEPT) {
 		r->job->kept_bytes += item->size;
-		back_note(r->job, &batch.key, item->at, env.message->lease_result->maker);
+		rollback_note(r->job, &batch.key, item->at, env.message->lease_result->maker);
 		batch_fini(&batch);
 		envelope_fini(&env);
 		return 0;
@@ -108,7 +108,7 @@ static int take_batch(struct replay *r, const struct journal_item *item, struct 
 	if (place == REPLAY_FITS)
 		rc = merge(r, &batch, e);
 	if (place == REPLAY_FITS && !rc)
-		back_note(r->job, &batch.key, item->at, env.message->lease_result->maker);
+		rollback_note(r->job, &batch.key, item->at, env.message->lease_result->maker);
 	else if (place == REPLAY_LATE)
 		rc = late_add(r->job, &batch.key, item->at, e);
 	batch_fini(&batch);
@@ -143,7 +143,7 @@ static int take_record(void *user, const struct journal_item *item, struct error
 		return rc;
 	if (item->missing) {
 		note_damage(r, item);
-		return item->kind == JOURNAL_AGAIN ? back_replay(job, item->journal, &item->lease, e) : 0;
+		return item->kind == JOURNAL_AGAIN ? rollback_replay(job, item->journal, &item->lease, e) : 0;
 	}
 	r->elapsed = item->elapsed;
 	switch (item->kind) {

@@ -16,7 +16,7 @@
 
 #include "common/base/disk.h"
 #include "common/base/mem.h"
-#include "coordinator/job/back.h"
+#include "coordinator/job/rollback.h"
 #include "coordinator/job/checkpoint_file.h"
 #include "coordinator/jobs/durable.h"
 #include "coordinator/jobs/room.h"
@@ -52,7 +52,7 @@ static void write_checkpoint(uv_work_t *work)
 	snprintf(temporary, sizeof temporary, "%s/checkpoint.tmp", w->folder);
 	w->rc = journal_create(&w->journal, w->folder, w->head.job, w->head.generation, &w->error);
 	if (!w->rc)
-		back_copy(w->job, w->journal, w->kept_most, &w->merged, &w->merged_count);
+		rollback_copy(w->job, w->journal, w->kept_most, &w->merged, &w->merged_count);
 	if (!w->rc)
 		w->rc = checked_file_create(&out, temporary, &w->error);
 	if (!w->rc)

@@ -15,7 +15,7 @@
 #include "common/base/disk.h"
 #include "common/base/text.h"
 #include "common/plan/plan_text.h"
-#include "coordinator/job/back.h"
+#include "coordinator/job/rollback.h"
 #include "coordinator/job/incoming.h"
 #include "coordinator/job/late.h"
 #include "coordinator/jobs/durable.h"
@@ -156,7 +156,7 @@ static void merge(struct jobs *jobs, const struct action *a, const struct incomi
 	if (!rc)
 		rc = live_job_merge(job, in->batch, &e);
 	if (!rc)
-		back_note(job, &a->key, at, in->result->maker);
+		rollback_note(job, &a->key, at, in->result->maker);
 	if (rc == -ENOMEM) { /* half merged, and not acknowledged */
 		log_event(LOG_STOP,
 			  "text=\"no memory to merge a result: to be started again, all goes on from the disk\"");
@@ -175,7 +175,7 @@ static void take_back(struct jobs *jobs, const struct action *a, const struct in
 {
 	struct live_job *job = jobs_find(jobs, a->job);
 	assert(job && !job->busy && in->back);
-	back_take(job, in->back);
+	rollback_take(job, in->back);
 	trust_taken_back(job, a->who);
 	live_job_log(job, LOG_BATCH_TAKEN_BACK, LEASE_FORMAT " text=%s", LEASE_VALUES(&a->key),
 		     log_quote(a->text).text);

@@ -28,8 +28,8 @@
 struct recovery {
 	uv_work_t work;
 	struct jobs *jobs;
-	struct found **last, *at; /* of jobs.found. at: the one being read; NULL: none */
-	uint64_t bytes, read;	  /* of all jobs; of finished ones */
+	struct recovering_job **last, *at; /* of jobs.found. at: the one being read; NULL: none */
+	uint64_t bytes, read;		   /* of all jobs; of finished ones */
 	bool under_way;
 	int rc; /* of the job just read */
 	struct error error;
@@ -49,13 +49,13 @@ double recovery_share(const struct jobs *jobs)
 	return r->bytes > 0 && read < r->bytes ? (double)read / (double)r->bytes : 1;
 }
 
-static double share_of(const struct found *f)
+static double share_of(const struct recovering_job *f)
 {
 	uint64_t read = atomic_load(&f->progress.read);
 	return read < f->bytes ? (double)read / (double)f->bytes : 1;
 }
 
-static void view(const struct found *f, struct job_view *v)
+static void view(const struct recovering_job *f, struct job_view *v)
 {
 	view_of_record(v, &f->record);
 	v->reading = share_of(f);
@@ -67,7 +67,7 @@ static void view(const struct found *f, struct job_view *v)
 
 bool recovery_view(const struct jobs *jobs, uint64_t job, struct job_view *v)
 {
-	const struct found *f = jobs->found;
+	const struct recovering_job *f = jobs->found;
 	while (f && f->record.id != job)
 		f = f->next;
 	if (f)
@@ -78,7 +78,7 @@ bool recovery_view(const struct jobs *jobs, uint64_t job, struct job_view *v)
 size_t recovery_views(const struct jobs *jobs, struct job_view *v)
 {
 	size_t n = 0;
-	for (const struct found *f = jobs->found; f; f = f->next, n++)
+	for (const struct recovering_job *f = jobs->found; f; f = f->next, n++)
 		if (v)
 			view(f, &v[n]);
 	return n;
@@ -167,7 +167,7 @@ static int finish(struct jobs *jobs, struct error *e)
 {
 	struct recovery *r = jobs->recovery;
 	int rc = 0;
-	for (struct found *f; !rc && (f = jobs->found);) {
+	for (struct recovering_job *f; !rc && (f = jobs->found);) {
 		struct ledger_job j;
 		struct job_counts known;
 		struct live_job *job = f->job;
@@ -218,9 +218,9 @@ static int read_next(struct jobs *jobs, struct error *e)
 	return 0;
 }
 
-static void remove_found(struct recovery *r, struct found *f)
+static void remove_found(struct recovery *r, struct recovering_job *f)
 {
-	struct found **at = &r->jobs->found;
+	struct recovering_job **at = &r->jobs->found;
 	while (*at != f)
 		at = &(*at)->next;
 	*at = f->next;
@@ -231,7 +231,7 @@ static void remove_found(struct recovery *r, struct found *f)
 static int take_failure(struct jobs *jobs, struct error *e)
 {
 	struct recovery *r = jobs->recovery;
-	struct found *f = r->at;
+	struct recovering_job *f = r->at;
 	struct ledger_job j;
 	uint64_t id = f->record.id, extended = f->job->record.extended;
 	int rc = r->rc;
@@ -285,7 +285,7 @@ static void films_read(uv_work_t *work, int status)
 static int add_found(struct jobs *jobs, const struct ledger_job *j, struct error *e)
 {
 	struct recovery *r = jobs->recovery;
-	struct found *f = mem_alloc(1, sizeof *f);
+	struct recovering_job *f = mem_alloc(1, sizeof *f);
 	if (!f)
 		return error_set(e, ENOMEM, "no memory for the jobs");
 	uint64_t id = j->id, extended = j->extended;
@@ -324,7 +324,7 @@ int recovery_begin(struct jobs *jobs, struct error *e)
 
 void recovery_stop(struct jobs *jobs)
 {
-	for (struct found *f = jobs->found; f; f = f->next)
+	for (struct recovering_job *f = jobs->found; f; f = f->next)
 		atomic_store(&f->progress.stop, true);
 }
 
@@ -335,7 +335,7 @@ void recovery_close(struct jobs *jobs)
 		return;
 	assert(!r->under_way);
 	while (jobs->found) {
-		struct found *next = jobs->found->next;
+		struct recovering_job *next = jobs->found->next;
 		if (jobs->found->job)
 			live_job_free(jobs->found->job);
 		mem_free(jobs->found);

@@ -17,7 +17,7 @@
 #include "common/base/text.h"
 #include "coordinator/core/answer.h"
 #include "coordinator/core/doubt.h"
-#include "coordinator/job/back.h"
+#include "coordinator/job/rollback.h"
 #include "coordinator/job/digest.h"
 #include "coordinator/job/incoming.h"
 #include "coordinator/jobs/durable.h"
@@ -159,7 +159,7 @@ static void fail_lease(struct jobs *jobs, uint64_t peer, const Farm__LeaseFailed
 		ev.kind = EVENT_LEASE_RETURNED;
 		text[0] = 0;
 	}
-	struct back back = {0};
+	struct rollback back = {0};
 	bool holds = answer_awaits(jobs->farm, peer, &ev.lease.key) == DELIVERY_AWAITED &&
 		     !ev.lease.other_states; /* otherwise nothing is read for it */
 	/* `later` may come every few seconds: the status shows it, and the log stays short. */
@@ -167,12 +167,12 @@ static void fail_lease(struct jobs *jobs, uint64_t peer, const Farm__LeaseFailed
 		log_failure(jobs, jobs->peers.name(jobs->peers.user, peer), job, f, &ev.lease.key, text, holds);
 	if (job && *text && f->bad_states && holds && !job->busy && !jobs->stepping &&
 	    journal_write(job->journal, &e) == 0)
-		ev.lease.can_take_back = back_read(job, job->journal, &ev.lease.key, &back, &e) == 0;
+		ev.lease.can_take_back = rollback_read(job, job->journal, &ev.lease.key, &back, &e) == 0;
 	if (ev.lease.can_take_back)
 		jobs_step_with(jobs, &ev, &(struct incoming){.back = &back});
 	else
 		jobs_step(jobs, &ev);
-	back_fini(&back);
+	rollback_fini(&back);
 }
 
 /* A failure that may be the spool's fault: its job's files are read first, once. false: they have been. */

@@ -10,9 +10,9 @@
 
 static const char note[] = "clock"; /* in the ledger */
 
-static struct seen clocks(void)
+static struct age_clock clocks(void)
 {
-	struct seen now = {.up = clock_seconds_of(CLOCK_BOOTTIME), .wall = clock_wall_seconds()};
+	struct age_clock now = {.up = clock_seconds_of(CLOCK_BOOTTIME), .wall = clock_wall_seconds()};
 	int fd = disk_open("/proc/sys/kernel/random/boot_id", O_RDONLY | O_CLOEXEC, 0);
 	ssize_t n = fd < 0 ? 0 : disk_read(fd, now.boot, sizeof now.boot - 1);
 	if (fd >= 0)
@@ -24,12 +24,12 @@ static struct seen clocks(void)
 
 void ages_open(struct jobs *jobs)
 {
-	struct seen last;
+	struct age_clock last;
 	struct error e = {""};
 	char *text;
 	int rc = ledger_note(jobs->ledger, note, &text, &e);
 	if (!rc) {
-		if ((rc = seen_from_text(text, strlen(text), &last)))
+		if ((rc = age_clock_from_text(text, strlen(text), &last)))
 			error_set(&e, EBADMSG,
 				  "the note %s in jobs.db is damaged: finished jobs count as if they had just ended",
 				  note);
@@ -38,7 +38,7 @@ void ages_open(struct jobs *jobs)
 	if (rc && rc != -ENOENT)
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 	jobs->seen = clocks();
-	seen_go_on(&jobs->seen, rc ? NULL : &last, seen_credit(jobs->config.clear_seconds));
+	age_clock_advance(&jobs->seen, rc ? NULL : &last, age_clock_credit(jobs->config.clear_seconds));
 	ages_keep(jobs);
 }
 
@@ -50,11 +50,11 @@ double ages_now(const struct jobs *jobs)
 
 void ages_keep(const struct jobs *jobs)
 {
-	char text[SEEN_TEXT];
+	char text[AGE_CLOCK_TEXT];
 	struct error e;
-	struct seen now = clocks();
+	struct age_clock now = clocks();
 	now.seconds = ages_now(jobs);
-	seen_to_text(&now, text);
+	age_clock_to_text(&now, text);
 	if (ledger_set(jobs->ledger, note, text, &e))
 		log_event(LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(e.text).text);
 }

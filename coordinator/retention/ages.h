@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The age of finished jobs, in observed time (store/seen.h), which a note in the ledger carries from one run to the
- * next. A jump of the wall clock ages nothing. The loop's thread.
+ * The age of finished jobs, in observed time (store/age_clock.h), which a note in the ledger carries from one run to
+ * the next. A jump of the wall clock ages nothing. The loop's thread.
  */
 #ifndef COORDINATOR_RETENTION_AGES_H
 #define COORDINATOR_RETENTION_AGES_H

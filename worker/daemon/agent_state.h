@@ -13,7 +13,7 @@
 enum { WORLDS_KEPT = 2 /* worlds kept of jobs without leases here */ };
 
 /* Whose scene is in memory while only one may be there: see scenes_kept_admit. Times are those of clock_seconds. */
-struct turn {
+struct scene_turn {
 	uint64_t job;
 	bool waits;   /* another job waits for its turn */
 	double since; /* when that began */
@@ -40,7 +40,7 @@ struct agent {
 	struct job_cache *job_caches;
 	struct fetch *fetches;
 	struct lease_task *leases;
-	struct turn turn;
+	struct scene_turn turn;
 	uint64_t clock;	  /* counter of uses of job_caches */
 	bool backlog;	  /* too many results wait to be acknowledged: no new leases */
 	uint64_t busy_at; /* ms of the loop: when it last had a lease */

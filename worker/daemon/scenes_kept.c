@@ -111,7 +111,7 @@ static const double turn_seconds = 300, asked_seconds = 60;
 
 static int wait_for(struct agent *a, uint64_t job, double now, struct error *e)
 {
-	struct turn *t = &a->turn;
+	struct scene_turn *t = &a->turn;
 	if (!t->waits)
 		log_event(
 			LOG_JOB_NOTE,
@@ -126,17 +126,17 @@ static int wait_for(struct agent *a, uint64_t job, double now, struct error *e)
 
 int scenes_kept_admit(struct agent *a, uint64_t job, struct error *e)
 {
-	struct turn *t = &a->turn;
+	struct scene_turn *t = &a->turn;
 	double now = clock_seconds();
 	if (!work_memory_was_short(now))
 		return 0;
 	const struct job_cache *first = keep_one(a, job_cache_find(a->job_caches, job));
 	if (first && first->job != t->job)
-		*t = (struct turn){.job = first->job};
+		*t = (struct scene_turn){.job = first->job};
 	if (first && first->job != job)
 		return wait_for(a, job, now, e);
 	if (t->job != job)
-		*t = (struct turn){.job = job};
+		*t = (struct scene_turn){.job = job};
 	t->waits = t->waits && now - t->asked < asked_seconds;
 	if (t->waits && now - t->since >= turn_seconds)
 		return error_set(

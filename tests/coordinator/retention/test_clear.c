@@ -92,17 +92,17 @@ static void open_jobs(void)
 	jobs.config.clear_seconds = DAY;
 	struct timespec up;
 	clock_gettime(CLOCK_BOOTTIME, &up);
-	jobs.seen = (struct seen){.seconds = 100.0 * DAY, .up = (double)up.tv_sec};
+	jobs.seen = (struct age_clock){.seconds = 100.0 * DAY, .up = (double)up.tv_sec};
 }
 
 /* As a coordinator starts after a reboot that has set the wall clock ahead by so many seconds. */
 static void reboot(double ahead)
 {
-	struct seen last = {
+	struct age_clock last = {
 		.seconds = 100.0 * DAY, .up = 1e9, .wall = (double)time(NULL) - ahead, .boot = "the-one-before"};
 	struct error e;
-	char text[SEEN_TEXT];
-	seen_to_text(&last, text);
+	char text[AGE_CLOCK_TEXT];
+	age_clock_to_text(&last, text);
 	assert_int_equal(ledger_set(jobs.ledger, "clock", text, &e), 0);
 	ages_open(&jobs);
 	jobs.clear_next = 0;

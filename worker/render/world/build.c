@@ -316,9 +316,9 @@ static void bound_shadows(struct builder *b)
 static int find_effects(struct builder *b, uint32_t max_depth)
 {
 	struct world *w = b->w;
-	enum visibility_bounds *reached = arena_alloc(&b->scratch, w->shape_count, sizeof *reached);
-	struct weighed *room = arena_alloc(&b->scratch, w->shape_count, sizeof *room);
-	struct bsdf_reach *of_bsdf = arena_alloc(&b->scratch, w->bsdf_count, sizeof *of_bsdf);
+	enum visibility *reached = arena_alloc(&b->scratch, w->shape_count, sizeof *reached);
+	struct weighted_value *room = arena_alloc(&b->scratch, w->shape_count, sizeof *room);
+	struct bsdf_visibility *of_bsdf = arena_alloc(&b->scratch, w->bsdf_count, sizeof *of_bsdf);
 	if (!reached || !room || !of_bsdf)
 		return build_out_of_memory(b->e);
 	const struct effects_source src = {.scene = b->scene,
@@ -329,7 +329,7 @@ static int find_effects(struct builder *b, uint32_t max_depth)
 					   .max_depth = max_depth,
 					   .box = b->boxes,
 					   .room = room,
-					   .reach = of_bsdf};
+					   .visibility = of_bsdf};
 	effects_analyse(w, &src, &b->forced, reached);
 	int rc = effects_apply(w, &b->forced, reached, b->e);
 	if (rc)

@@ -84,7 +84,7 @@ struct effects {
 _Static_assert((int)EFFECTS <= (int)RENDER_EFFECTS_MAX, "each has its line");
 
 /* Whether a path between camera and light can meet a shape, or why not. */
-enum visibility_bounds {
+enum visibility {
 	VISIBILITY_YES,
 	VISIBILITY_ENCLOSED, /* inside a closed opaque shape that the camera is outside of */
 	VISIBILITY_DARK,     /* nothing emits in the scene, or all emitters are enclosed */

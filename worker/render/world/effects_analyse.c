@@ -59,7 +59,7 @@ struct census {
 	struct tally absorbing, scattering, shining;
 	struct tally straight, refracting;
 	struct tally environment, area, delta, textured_light, coloured_light;
-	enum visibility_bounds why_hidden;
+	enum visibility why_hidden;
 	size_t shape[3];
 };
 
@@ -89,7 +89,7 @@ static void add_material(struct census *c, const struct bsdf *b, const struct sc
 		count(&c->constant_eta, n, nameless);
 }
 
-static void add_hidden(struct census *c, const struct bsdf *b, const struct scene_node *n, enum visibility_bounds why)
+static void add_hidden(struct census *c, const struct bsdf *b, const struct scene_node *n, enum visibility why)
 {
 	c->why_hidden = why;
 	if (b->has_delta)
@@ -100,14 +100,14 @@ static void add_hidden(struct census *c, const struct bsdf *b, const struct scen
 
 /* For each BSDF: whether one of its shapes is reached, otherwise the reason for its last one; YES if it has no
  * shape. One pass over the shapes, however many BSDFs there are. */
-static void find_reach(const struct world *w, const enum visibility_bounds *shape, struct bsdf_reach *of)
+static void find_bsdf_visibility(const struct world *w, const enum visibility *shape, struct bsdf_visibility *of)
 {
 	for (uint32_t k = 0; k < w->bsdf_count; k++)
-		of[k] = (struct bsdf_reach){VISIBILITY_YES, false};
+		of[k] = (struct bsdf_visibility){VISIBILITY_YES, false};
 	for (uint32_t i = 0; i < w->shape_count; i++) {
-		struct bsdf_reach *r = &of[w->parts[i].bsdf];
-		if (!r->met || r->reach != VISIBILITY_YES)
-			*r = (struct bsdf_reach){shape[i], true};
+		struct bsdf_visibility *r = &of[w->parts[i].bsdf];
+		if (!r->has_shape || r->shapes != VISIBILITY_YES)
+			*r = (struct bsdf_visibility){shape[i], true};
 	}
 }
 
@@ -155,13 +155,12 @@ static void add_medium(struct census *c, const struct world *w, uint32_t number,
 	c->shape[emission_shape(&m->emission)]++;
 }
 
-static struct census take_census(const struct world *w, const struct effects_source *src,
-				 const enum visibility_bounds *shape)
+static struct census take_census(const struct world *w, const struct effects_source *src, const enum visibility *shape)
 {
 	struct census c = {.why_hidden = VISIBILITY_YES};
-	find_reach(w, shape, src->reach);
+	find_bsdf_visibility(w, shape, src->visibility);
 	for (uint32_t i = 0; i < w->bsdf_count; i++) {
-		enum visibility_bounds r = src->reach[i].reach;
+		enum visibility r = src->visibility[i].shapes;
 		if (r == VISIBILITY_YES)
 			add_material(&c, &w->bsdfs[i], src->bsdf[i]);
 		else
@@ -207,7 +206,7 @@ __attribute__((format(printf, 4, 5))) static bool line(struct report *r, enum ef
 	return l->on;
 }
 
-static const char *hidden_because(enum visibility_bounds r)
+static const char *hidden_because(enum visibility r)
 {
 	switch (r) {
 	case VISIBILITY_ENCLOSED:
@@ -435,7 +434,7 @@ static bool shadows(struct report *r, enum effect effect, const struct tally *t,
 }
 
 static void depth(struct report *r, const struct world *w, const struct effects_source *src,
-		  const enum visibility_bounds *shape)
+		  const enum visibility *shape)
 {
 	uint32_t asked = src->max_depth ? src->max_depth : w->settings.max_depth,
 		 bound = w->effects.scattering ? UINT32_MAX : visibility_bounds_depth(w, shape);
@@ -450,7 +449,7 @@ static void depth(struct report *r, const struct world *w, const struct effects_
 }
 
 void effects_analyse(struct world *w, const struct effects_source *src, const struct effects_choice *forced,
-		     enum visibility_bounds *shape)
+		     enum visibility *shape)
 {
 	struct effects *fx = &w->effects;
 	*fx = (struct effects){.line_count = 0};

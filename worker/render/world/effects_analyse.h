@@ -10,6 +10,6 @@ struct world;
 
 /* Sets w->effects from shapes, BSDFs and emitters, and shape[] (one per shape, see visibility_bounds.h). */
 void effects_analyse(struct world *w, const struct effects_source *src, const struct effects_choice *forced,
-		     enum visibility_bounds *shape);
+		     enum visibility *shape);
 
 #endif

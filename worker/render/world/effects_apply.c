@@ -22,7 +22,7 @@ static bool is_switched_off(const struct emitter *em, const struct effects_choic
 }
 
 /* Shapes that no path meets become black and need nothing; not if something is forced on that may belong to them. */
-static void leave_out(struct world *w, const enum visibility_bounds *shape)
+static void leave_out(struct world *w, const enum visibility *shape)
 {
 	uint32_t black = w->bsdf_count++; /* there is room for one more than there are shapes */
 	bsdf_black(&w->bsdfs[black]);
@@ -64,8 +64,7 @@ static int apply_to_medium(struct medium *m, const struct effects *fx, const str
 		       : 0;
 }
 
-int effects_apply(struct world *w, const struct effects_choice *forced, const enum visibility_bounds *shape,
-		  struct error *e)
+int effects_apply(struct world *w, const struct effects_choice *forced, const enum visibility *shape, struct error *e)
 {
 	if (!forced->any_on)
 		leave_out(w, shape);

@@ -8,7 +8,6 @@
 struct world;
 
 /* Removes what no path meets and what was switched off. */
-int effects_apply(struct world *w, const struct effects_choice *forced, const enum visibility_bounds *shape,
-		  struct error *e);
+int effects_apply(struct world *w, const struct effects_choice *forced, const enum visibility *shape, struct error *e);
 
 #endif

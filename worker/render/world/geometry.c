@@ -226,7 +226,7 @@ static void note_scales(struct builder *b)
 int build_rescale(struct builder *b)
 {
 	struct world *w = b->w;
-	struct weighed *room = arena_alloc(&b->scratch, w->shape_count, sizeof *room);
+	struct weighted_value *room = arena_alloc(&b->scratch, w->shape_count, sizeof *room);
 	if (!room)
 		return build_out_of_memory(b->e);
 	if (!isfinite(vec3_length(vec3_sub(b->all.high, b->all.low))))

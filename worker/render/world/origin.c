@@ -16,16 +16,16 @@ static double middle(const struct box *b, int axis)
 	return 0.5 * (along(b->low, axis) + along(b->high, axis));
 }
 
-int weighed_compare(const void *a, const void *b)
+int weighted_value_compare(const void *a, const void *b)
 {
-	const struct weighed *x = a, *y = b;
+	const struct weighted_value *x = a, *y = b;
 	return (x->at > y->at) - (x->at < y->at);
 }
 
-static double median(struct weighed *w, uint32_t count)
+static double median(struct weighted_value *w, uint32_t count)
 {
 	double total = 0, passed = 0;
-	qsort(w, count, sizeof *w, weighed_compare);
+	qsort(w, count, sizeof *w, weighted_value_compare);
 	for (uint32_t i = 0; i < count; i++)
 		total += w[i].weight;
 	for (uint32_t i = 0; i < count; i++) {
@@ -56,7 +56,7 @@ double origin_wide_from(const struct box *all, const struct box *shapes, uint32_
 	return is_mixed(least, all) ? WIDE * least : INFINITY;
 }
 
-vec3 origin_choose(const struct box *all, const struct box *shapes, uint32_t count, struct weighed *room)
+vec3 origin_choose(const struct box *all, const struct box *shapes, uint32_t count, struct weighted_value *room)
 {
 	double at[3], least = least_extent(shapes, count);
 	for (int axis = 0; axis < 3; axis++) {
@@ -64,7 +64,7 @@ vec3 origin_choose(const struct box *all, const struct box *shapes, uint32_t cou
 		if (!is_mixed(least, all))
 			continue;
 		for (uint32_t i = 0; i < count; i++)
-			room[i] = (struct weighed){middle(&shapes[i], axis), least / box_extent(&shapes[i])};
+			room[i] = (struct weighted_value){middle(&shapes[i], axis), least / box_extent(&shapes[i])};
 		at[axis] = median(room, count);
 	}
 	return (vec3){at[0], at[1], at[2]};

@@ -10,14 +10,14 @@
 
 #include <stdint.h>
 
-struct weighed { /* a number, and its weight */
+struct weighted_value { /* a number, and its weight */
 	double at, weight;
 };
-int weighed_compare(const void *a, const void *b); /* for qsort, by the number */
+int weighted_value_compare(const void *a, const void *b); /* for qsort, by the number */
 
 /* The centre of the bounding box; in a scene of mixed scales, whose smallest shape is less than 2^-12 of it, the
  * median along each axis of the shapes' centres, weighted by 1 / extent: among small things. `room` is for `count`. */
-vec3 origin_choose(const struct box *all, const struct box *shapes, uint32_t count, struct weighed *room);
+vec3 origin_choose(const struct box *all, const struct box *shapes, uint32_t count, struct weighted_value *room);
 
 /* The extent from which triangles of such a scene are too large for floats, in the scene's lengths, as in
  * worker/render/geom/accel.c; INFINITY: the scene does not have mixed scales. */

@@ -119,7 +119,7 @@ static bool box_holds(const struct box *outer, const struct box *inner)
 }
 
 /* The first of n sorted numbers that is not below x. */
-static uint32_t first_from(const struct weighed *sorted, uint32_t n, double x)
+static uint32_t first_from(const struct weighted_value *sorted, uint32_t n, double x)
 {
 	uint32_t low = 0, high = n;
 	while (low < high) {
@@ -133,14 +133,14 @@ static uint32_t first_from(const struct weighed *sorted, uint32_t n, double x)
 }
 
 /* Only shapes that start between a container's ends along x, and whose box is inside its box, are checked closely. */
-static void find_enclosed(const struct world *w, const struct effects_source *src, enum visibility_bounds *shape)
+static void find_enclosed(const struct world *w, const struct effects_source *src, enum visibility *shape)
 {
-	struct weighed *by_x = src->room;
+	struct weighted_value *by_x = src->room;
 	uint32_t n = w->shape_count;
 	for (uint32_t i = 0; i < n; i++)
-		by_x[i] = (struct weighed){src->box[i].low.x, i};
+		by_x[i] = (struct weighted_value){src->box[i].low.x, i};
 	if (n > 0)
-		qsort(by_x, n, sizeof *by_x, weighed_compare);
+		qsort(by_x, n, sizeof *by_x, weighted_value_compare);
 	for (uint32_t o = 0; o < n; o++) {
 		const struct box *outer = &src->box[o];
 		if (!is_container(w, src->shape[o], o) || !camera_is_outside(w, &w->shapes[o]))
@@ -154,14 +154,14 @@ static void find_enclosed(const struct world *w, const struct effects_source *sr
 	}
 }
 
-bool visibility_bounds_emitter(const struct world *w, const enum visibility_bounds *shape, uint32_t emitter)
+bool visibility_bounds_emitter(const struct world *w, const enum visibility *shape, uint32_t emitter)
 {
 	uint32_t on = w->emitter_shape[emitter];
 	return w->emitters[emitter].power > 0 && (on == UINT32_MAX || shape[on] != VISIBILITY_ENCLOSED);
 }
 
 void visibility_bounds_shapes(const struct world *w, const struct effects_source *src, uint32_t max_depth,
-			      enum visibility_bounds *shape)
+			      enum visibility *shape)
 {
 	for (uint32_t i = 0; i < w->shape_count; i++)
 		shape[i] = VISIBILITY_YES;
@@ -194,7 +194,7 @@ static bool lies_in(const struct triangle *plane, const struct geom_shape *g)
 	return true;
 }
 
-uint32_t visibility_bounds_depth(const struct world *w, const enum visibility_bounds *shape)
+uint32_t visibility_bounds_depth(const struct world *w, const enum visibility *shape)
 {
 	bool any = false;
 	struct triangle plane;

@@ -10,11 +10,11 @@
 #include "worker/render/world/world.h"
 
 struct box;
-struct weighed;
+struct weighted_value;
 
-struct bsdf_reach {
-	enum visibility_bounds reach; /* of its shapes */
-	bool met;		      /* it has one */
+struct bsdf_visibility {
+	enum visibility shapes; /* of those that have it */
+	bool has_shape;
 };
 
 /* The nodes from which the world's parts were made. */
@@ -25,17 +25,17 @@ struct effects_source {
 	const struct scene_node *sensor;		     /* NULL: there is none */
 	uint32_t max_depth;				     /* as requested; 0: the scene's */
 	const struct box *box;				     /* one per shape, in any unit */
-	struct weighed *room;				     /* space for one per shape */
-	struct bsdf_reach *reach;			     /* space for one per BSDF */
+	struct weighted_value *room;			     /* space for one per shape */
+	struct bsdf_visibility *visibility;		     /* space for one per BSDF */
 };
 
 /* Whether an emitter emits and is not enclosed. */
-bool visibility_bounds_emitter(const struct world *w, const enum visibility_bounds *shape, uint32_t emitter);
+bool visibility_bounds_emitter(const struct world *w, const enum visibility *shape, uint32_t emitter);
 /* shape[]: one per shape of w. max_depth: edges. */
 void visibility_bounds_shapes(const struct world *w, const struct effects_source *src, uint32_t max_depth,
-			      enum visibility_bounds *shape);
+			      enum visibility *shape);
 /* Edges of the longest path that can carry light: 1 if nothing scatters, 2 if everything that does is in one plane,
  * whose points do not see each other; otherwise UINT32_MAX. */
-uint32_t visibility_bounds_depth(const struct world *w, const enum visibility_bounds *shape);
+uint32_t visibility_bounds_depth(const struct world *w, const enum visibility *shape);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Time that was seen to pass does not follow a wall clock that jumps. */
-#include "coordinator/store/seen.h"
+#include "coordinator/store/age_clock.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -16,24 +16,24 @@
 
 static double after(const char *boot, double up, double wall)
 {
-	struct seen last = {.seconds = 1000, .up = 500, .wall = 100 * DAY, .boot = "first"},
-		    now = {.up = up, .wall = wall};
+	struct age_clock last = {.seconds = 1000, .up = 500, .wall = 100 * DAY, .boot = "first"},
+			 now = {.up = up, .wall = wall};
 	snprintf(now.boot, sizeof now.boot, "%s", boot);
-	seen_go_on(&now, &last, SEEN_CREDIT);
+	age_clock_advance(&now, &last, AGE_CLOCK_CREDIT);
 	return now.seconds;
 }
 
 static void wall_clock_jumps(void **state)
 {
 	(void)state;
-	struct seen first = {.seconds = 7, .up = 1, .wall = 2};
-	seen_go_on(&first, NULL, SEEN_CREDIT);
+	struct age_clock first = {.seconds = 7, .up = 1, .wall = 2};
+	age_clock_advance(&first, NULL, AGE_CLOCK_CREDIT);
 	assert_true(first.seconds == 0);
 	assert_true(after("first", 600, 140 * DAY) == 1100); /* 40 days ahead */
 	assert_true(after("first", 600, 0) == 1100);
 	assert_true(after("first", 400, 100 * DAY) == 1000); /* no clock of a machine does that */
 	assert_true(after("second", 10, 100 * DAY + 300) == 1300);
-	assert_true(after("second", 10, 140 * DAY) == 1000 + SEEN_CREDIT);
+	assert_true(after("second", 10, 140 * DAY) == 1000 + AGE_CLOCK_CREDIT);
 	assert_true(after("second", 10, 0) == 1000);
 	assert_true(after("", 600, 100 * DAY + 60) == 1060); /* a system without such a name */
 }
@@ -42,31 +42,31 @@ static void wall_clock_jumps(void **state)
 static void credit_is_a_part_of_what_is_kept(void **state)
 {
 	(void)state;
-	assert_true(seen_credit(0) == SEEN_CREDIT && seen_credit(30 * DAY) == SEEN_CREDIT);
-	assert_true(seen_credit(300 * DAY) == SEEN_CREDIT);
-	assert_true(seen_credit(3 * DAY) == DAY / 10 && seen_credit(60) == 2);
+	assert_true(age_clock_credit(0) == AGE_CLOCK_CREDIT && age_clock_credit(30 * DAY) == AGE_CLOCK_CREDIT);
+	assert_true(age_clock_credit(300 * DAY) == AGE_CLOCK_CREDIT);
+	assert_true(age_clock_credit(3 * DAY) == DAY / 10 && age_clock_credit(60) == 2);
 }
 
 static void as_text(void **state)
 {
 	(void)state;
-	struct seen s = {.seconds = 12345.678, .up = 99.5, .wall = 1.7e9, .boot = "f3a1-22"}, back;
-	char text[SEEN_TEXT];
-	size_t size = seen_to_text(&s, text);
-	assert_int_equal(seen_from_text(text, size, &back), 0);
+	struct age_clock s = {.seconds = 12345.678, .up = 99.5, .wall = 1.7e9, .boot = "f3a1-22"}, back;
+	char text[AGE_CLOCK_TEXT];
+	size_t size = age_clock_to_text(&s, text);
+	assert_int_equal(age_clock_from_text(text, size, &back), 0);
 	assert_true(back.seconds == s.seconds && back.up == s.up && back.wall == s.wall);
 	assert_string_equal(back.boot, s.boot);
 	for (size_t i = 0; i + 1 < size; i++)
 		for (int bit = 0; bit < 8; bit++) {
 			text[i] = (char)(text[i] ^ 1 << bit);
-			int rc = seen_from_text(text, size, &back);
+			int rc = age_clock_from_text(text, size, &back);
 			assert_true(rc == -EBADMSG ||
 				    (rc == 0 && back.seconds == s.seconds)); /* a hexadecimal digit of the other case */
 			text[i] = (char)(text[i] ^ 1 << bit);
 		}
 	for (size_t n = 0; n + 1 < size; n++)
-		assert_int_equal(seen_from_text(text, n, &back), -EBADMSG);
-	assert_int_equal(seen_from_text(text, SEEN_TEXT, &back), -EBADMSG);
+		assert_int_equal(age_clock_from_text(text, n, &back), -EBADMSG);
+	assert_int_equal(age_clock_from_text(text, AGE_CLOCK_TEXT, &back), -EBADMSG);
 }
 
 int main(void)

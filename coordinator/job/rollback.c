@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "coordinator/job/back.h"
+#include "coordinator/job/rollback.h"
 
 #include "common/base/list.h"
 #include "common/base/mem.h"
@@ -31,7 +31,7 @@ static void take_maker(struct live_job_maker *to, const Farm__Maker *from)
 	to->restarts = from->restarts;
 }
 
-void back_note(struct live_job *job, const struct lease_key *k, uint64_t at, const Farm__Maker *maker)
+void rollback_note(struct live_job *job, const struct lease_key *k, uint64_t at, const Farm__Maker *maker)
 {
 	if (job->plan.kind != PLAN_CHAINS || k->kind != LEASE_RENDER)
 		return;
@@ -76,11 +76,12 @@ static int read_batch(const struct live_job *job, struct journal *j, const struc
 	return rc;
 }
 
-int back_read(const struct live_job *job, struct journal *j, const struct lease_key *k, struct back *b, struct error *e)
+int rollback_read(const struct live_job *job, struct journal *j, const struct lease_key *k, struct rollback *b,
+		  struct error *e)
 {
 	struct lease_key last = *k;
 	struct batch before = {0};
-	*b = (struct back){0};
+	*b = (struct rollback){0};
 	last.epoch--;
 	if (job->plan.kind != PLAN_CHAINS || k->kind != LEASE_RENDER || k->group >= job->plan.groups ||
 	    k->part >= job->plan.parts || k->epoch == 0 || !job->canvas || canvas_has(job->canvas, k) ||
@@ -97,11 +98,11 @@ int back_read(const struct live_job *job, struct journal *j, const struct lease_
 	}
 	batch_fini(&before);
 	if (rc)
-		back_fini(b);
+		rollback_fini(b);
 	return rc;
 }
 
-void back_take(struct live_job *job, struct back *b)
+void rollback_take(struct live_job *job, struct rollback *b)
 {
 	const struct lease_key *k = &b->batch.key;
 	uint32_t slot = slot_of(job, k);
@@ -117,15 +118,15 @@ void back_take(struct live_job *job, struct back *b)
 	job->record.cpu_seconds = job->cpu_seconds;
 }
 
-void back_fini(struct back *b)
+void rollback_fini(struct rollback *b)
 {
 	if (b->states)
 		states_fini(b->states, b->batch.state_count);
 	batch_fini(&b->batch);
-	*b = (struct back){0};
+	*b = (struct rollback){0};
 }
 
-int back_replay(struct live_job *job, struct journal *j, const struct lease_key *k, struct error *e)
+int rollback_replay(struct live_job *job, struct journal *j, const struct lease_key *k, struct error *e)
 {
 	int rc = 0;
 	late_forget(job, k);
@@ -133,16 +134,16 @@ int back_replay(struct live_job *job, struct journal *j, const struct lease_key 
 		return 0;
 	while (!rc && canvas_has(job->canvas, k)) {
 		struct lease_key next = *k;
-		struct back b;
+		struct rollback b;
 		do
 			next.epoch++;
 		while (canvas_has(job->canvas, &next));
-		rc = back_read(job, j, &next, &b, e);
+		rc = rollback_read(job, j, &next, &b, e);
 		if (rc) /* an undamaged journal has all of them */
 			return rc == -ENOENT ? error_set(e, EBADMSG, "a batch that was replaced is not in the journal")
 					     : rc;
-		back_take(job, &b);
-		back_fini(&b);
+		rollback_take(job, &b);
+		rollback_fini(&b);
 		job->again[slot_of(job, k)] = false;
 	}
 	return rc;
@@ -165,8 +166,8 @@ static uint64_t copy_one(const struct live_job *job, struct journal *to, const s
 	return copied ? size : 0;
 }
 
-void back_copy(const struct live_job *job, struct journal *to, uint64_t most, struct merged_record **list,
-	       size_t *count)
+void rollback_copy(const struct live_job *job, struct journal *to, uint64_t most, struct merged_record **list,
+		   size_t *count)
 {
 	enum { LAST = 2 };
 	uint32_t slots = job->plan.groups * job->plan.parts;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "coordinator/core/lost.h"
+#include "coordinator/core/lost_holders.h"
 
 #include "common/base/text.h"
 #include "coordinator/core/failure_quorum.h"
@@ -14,7 +14,7 @@ static bool is_gone(const struct lost_worker *w)
 	return w->who->id != w->id || w->who->calls == w->calls;
 }
 
-static uint32_t gone(const struct lost *l, uint32_t *certificates)
+static uint32_t gone(const struct lost_holders *l, uint32_t *certificates)
 {
 	uint32_t n = 0;
 	*certificates = 0;
@@ -31,7 +31,7 @@ static uint32_t gone(const struct lost *l, uint32_t *certificates)
 }
 
 /* Its own entry, a free one, one that came back, or one of several with its certificate. */
-static void add_worker(struct lost *l, const struct identity *who)
+static void add_worker(struct lost_holders *l, const struct identity *who)
 {
 	uint32_t place = l->count;
 	for (uint32_t i = l->count; i-- > 0;)
@@ -47,7 +47,7 @@ static void add_worker(struct lost *l, const struct identity *who)
 }
 
 /* The list's length: it is not in it. */
-static uint32_t place_of(const struct lost *l, const struct identity *who)
+static uint32_t place_of(const struct lost_holders *l, const struct identity *who)
 {
 	uint32_t i = 0;
 	while (i < l->count && l->of[i].id != who->id)
@@ -55,12 +55,12 @@ static uint32_t place_of(const struct lost *l, const struct identity *who)
 	return i;
 }
 
-bool lost_has(const struct lost *l, const struct identity *who)
+bool lost_holders_have(const struct lost_holders *l, const struct identity *who)
 {
 	return place_of(l, who) < l->count;
 }
 
-bool lost_take(struct lost *l, const struct identity *who)
+bool lost_holders_remove(struct lost_holders *l, const struct identity *who)
 {
 	uint32_t place = place_of(l, who);
 	if (place == l->count)
@@ -69,7 +69,7 @@ bool lost_take(struct lost *l, const struct identity *who)
 	return true;
 }
 
-void lost_lease(struct farm *f, struct lease *l)
+void lost_holders_add(struct farm *f, struct lease *l)
 {
 	struct job *j = l->job;
 	struct slot *s = l->slot;

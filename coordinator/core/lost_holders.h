@@ -8,8 +8,8 @@
  * once in 65,536 leases; a farm that is switched off counts once per worker. As many certificates are required as in
  * failure_quorum.h. Pure.
  */
-#ifndef COORDINATOR_CORE_LOST_H
-#define COORDINATOR_CORE_LOST_H
+#ifndef COORDINATOR_CORE_LOST_HOLDERS_H
+#define COORDINATOR_CORE_LOST_HOLDERS_H
 
 #include "coordinator/core/slot.h"
 
@@ -21,9 +21,9 @@ struct lease;
 
 /* Adds the worker of this lease, which has disappeared or is silent: the lease is dropped, and the job ends if it
  * was one too many. */
-void lost_lease(struct farm *f, struct lease *l);
-bool lost_has(const struct lost *l, const struct identity *who);
+void lost_holders_add(struct farm *f, struct lease *l);
+bool lost_holders_have(const struct lost_holders *l, const struct identity *who);
 /* Removes a worker; true if it was in the list. */
-bool lost_take(struct lost *l, const struct identity *who);
+bool lost_holders_remove(struct lost_holders *l, const struct identity *who);
 
 #endif

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* The state shared by the steps that make an image. Private to common/estimate. */
-#ifndef COMMON_ESTIMATE_MAKING_H
-#define COMMON_ESTIMATE_MAKING_H
+#ifndef COMMON_ESTIMATE_IMAGE_BUILDER_H
+#define COMMON_ESTIMATE_IMAGE_BUILDER_H
 
 #include "common/estimate/image.h"
 #include "common/film/canvas_films.h"
 
 /* An image being made. */
-struct making {
+struct image_builder {
 	const struct canvas *c;
 	struct canvas_image *img;
 	bool open_rounds;

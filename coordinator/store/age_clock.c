@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "coordinator/store/seen.h"
+#include "coordinator/store/age_clock.h"
 
 #include "common/base/crc.h"
 
@@ -8,12 +8,12 @@
 #include <stdio.h>
 #include <string.h>
 
-double seen_credit(double keep)
+double age_clock_credit(double keep)
 {
-	return keep > 0 && keep < SEEN_SHARE * SEEN_CREDIT ? keep / SEEN_SHARE : SEEN_CREDIT;
+	return keep > 0 && keep < AGE_CLOCK_SHARE * AGE_CLOCK_CREDIT ? keep / AGE_CLOCK_SHARE : AGE_CLOCK_CREDIT;
 }
 
-void seen_go_on(struct seen *now, const struct seen *last, double credit)
+void age_clock_advance(struct age_clock *now, const struct age_clock *last, double credit)
 {
 	now->seconds = last ? last->seconds : 0;
 	if (!last)
@@ -24,17 +24,17 @@ void seen_go_on(struct seen *now, const struct seen *last, double credit)
 		now->seconds += fmin(fmax(0, now->wall - last->wall), credit);
 }
 
-size_t seen_to_text(const struct seen *s, char text[SEEN_TEXT])
+size_t age_clock_to_text(const struct age_clock *s, char text[AGE_CLOCK_TEXT])
 {
-	int n = snprintf(text, SEEN_TEXT, "seen %.3f up %.3f wall %.3f boot %s", s->seconds, s->up, s->wall,
+	int n = snprintf(text, AGE_CLOCK_TEXT, "seen %.3f up %.3f wall %.3f boot %s", s->seconds, s->up, s->wall,
 			 *s->boot ? s->boot : "-");
-	n += snprintf(text + n, SEEN_TEXT - (size_t)n, " crc32c %08x\n", (unsigned)crc32c(0, text, (size_t)n));
+	n += snprintf(text + n, AGE_CLOCK_TEXT - (size_t)n, " crc32c %08x\n", (unsigned)crc32c(0, text, (size_t)n));
 	return (size_t)n;
 }
 
-int seen_from_text(const char *text, size_t size, struct seen *s)
+int age_clock_from_text(const char *text, size_t size, struct age_clock *s)
 {
-	char line[SEEN_TEXT], boot[SEEN_BOOT];
+	char line[AGE_CLOCK_TEXT], boot[AGE_CLOCK_BOOT];
 	unsigned check;
 	if (size >= sizeof line)
 		return -EBADMSG;

@@ -8,13 +8,13 @@
  * (group, part) as far as they fit (JOURNAL_KEPT). If one is missing, nothing can be taken back. Nothing is kept for
  * samples. The loop's thread, or any thread that owns the live job. Memory: 24 bytes per batch of the journal.
  */
-#ifndef COORDINATOR_JOB_BACK_H
-#define COORDINATOR_JOB_BACK_H
+#ifndef COORDINATOR_JOB_ROLLBACK_H
+#define COORDINATOR_JOB_ROLLBACK_H
 
 #include "coordinator/job/live_job.h"
 
 /* A merged batch, and the states before it (NULL: it started from seeds). */
-struct back {
+struct rollback {
 	struct batch batch;
 	struct chain_state *states;
 	struct live_job_maker maker; /* of those */
@@ -22,21 +22,21 @@ struct back {
 
 /* Records a merged batch, whose record in the journal starts there; if memory is out it cannot be taken back. maker
  * NULL: not known. */
-void back_note(struct live_job *job, const struct lease_key *k, uint64_t at, const Farm__Maker *maker);
+void rollback_note(struct live_job *job, const struct lease_key *k, uint64_t at, const Farm__Maker *maker);
 /* Reads the last batch of that lease's (group, part), whose epoch must be the one before k's. -ENOENT: its place is
  * not known. */
-int back_read(const struct live_job *job, struct journal *j, const struct lease_key *k, struct back *b,
-	      struct error *e);
+int rollback_read(const struct live_job *job, struct journal *j, const struct lease_key *k, struct rollback *b,
+		  struct error *e);
 /* Takes it out of the live job, which cannot fail. Its states become the live job's. */
-void back_take(struct live_job *job, struct back *b);
-void back_fini(struct back *b);
+void rollback_take(struct live_job *job, struct rollback *b);
+void rollback_fini(struct rollback *b);
 
 /* While replaying: a batch of that lease replaces one that was merged; the old one and all after it are dropped. */
-int back_replay(struct live_job *job, struct journal *j, const struct lease_key *k, struct error *e);
+int rollback_replay(struct live_job *job, struct journal *j, const struct lease_key *k, struct error *e);
 
 /* Copies them into another journal, up to that many bytes. *list, of *count, gets their places there (mem_alloc'd).
  * What does not fit is left out. */
-void back_copy(const struct live_job *job, struct journal *to, uint64_t most, struct merged_record **list,
-	       size_t *count);
+void rollback_copy(const struct live_job *job, struct journal *to, uint64_t most, struct merged_record **list,
+		   size_t *count);
 
 #endif
