@@ -52,15 +52,6 @@ int net_addrs_resolve(struct net_addrs *l, const char *host_port, struct error *
 	return 0;
 }
 
-int net_addr_resolve(struct net_addr *a, const char *host_port, struct error *e)
-{
-	struct net_addrs l;
-	int rc = net_addrs_resolve(&l, host_port, e);
-	if (!rc)
-		*a = l.all[0];
-	return rc;
-}
-
 int net_addrs_allow(struct net_addrs *l, const char *host_port, bool safe, struct error *e)
 {
 	unsigned kept = 0;

@@ -25,7 +25,6 @@ struct net_addrs {
 };
 
 /* Resolves the name (may block on DNS). -EINVAL: not HOST:PORT; -EHOSTUNREACH: unknown name. Port 0 is allowed. */
-int net_addr_resolve(struct net_addr *a, const char *host_port, struct error *e); /* the first one */
 int net_addrs_resolve(struct net_addrs *l, const char *host_port, struct error *e);
 /* For those who resolve it themselves: the parts of HOST:PORT, and what getaddrinfo has found. */
 enum { NET_HOST_MAX = 256 };

@@ -454,11 +454,11 @@ static int fetch_through(struct client *cl, struct client_message *first, uint64
 }
 
 /* What comes in one piece needs no file: that may be where a disk is full. */
-int client_fetch_stream(struct client *cl, uint64_t job, Farm__What what, int fd, struct error *e)
+int client_fetch_log(struct client *cl, uint64_t job, int fd, struct error *e)
 {
 	static const char name[] = "stdout";
 	struct client_message first;
-	int rc = fetch_chunk(cl, job, what, 0, &first, e);
+	int rc = fetch_chunk(cl, job, FARM__WHAT__WHAT_LOG, 0, &first, e);
 	if (rc)
 		return rc;
 	const Farm__FetchChunk *c = first.envelope.message->fetch_chunk;
@@ -468,7 +468,7 @@ int client_fetch_stream(struct client *cl, uint64_t job, Farm__What what, int fd
 	} else if (!whole) {
 		rc = error_set(e, EIO, "cannot make a temporary file: %s", strerror(errno));
 	} else {
-		rc = fetch_whole(cl, &first, job, what, fileno(whole), "a temporary file", e);
+		rc = fetch_whole(cl, &first, job, FARM__WHAT__WHAT_LOG, fileno(whole), "a temporary file", e);
 		rc = rc ? rc : copy(fileno(whole), fd, name, e);
 		fclose(whole);
 	}

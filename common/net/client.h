@@ -45,8 +45,8 @@ int client_fetch(struct client *cl, uint64_t job, Farm__What what, const char *p
  * `.preview` before its extension. Because that name came over the wire, -EEXIST if a file of that name exists, or if
  * the name is unsafe (hidden, or like an option). */
 int client_fetch_here(struct client *cl, uint64_t job, Farm__What what, char name[CLIENT_NAME_BYTES], struct error *e);
-/* The same, to a stream, which gets nothing before the last byte has arrived. */
-int client_fetch_stream(struct client *cl, uint64_t job, Farm__What what, int fd, struct error *e);
+/* A job's log to a stream, which gets nothing before the last byte has arrived. */
+int client_fetch_log(struct client *cl, uint64_t job, int fd, struct error *e);
 
 /* The exit code for an error of the functions above: 75 unreachable, 6 refused, otherwise 1. */
 int client_exit_code(int rc);

@@ -177,7 +177,7 @@ static int fetch(struct client *cl, const struct job_options *o, struct error *e
 
 static int print_log(struct client *cl, const struct job_options *o, struct error *e)
 {
-	return client_fetch_stream(cl, o->job, FARM__WHAT__WHAT_LOG, STDOUT_FILENO, e);
+	return client_fetch_log(cl, o->job, STDOUT_FILENO, e);
 }
 
 /* -ENOENT: the coordinator refuses. */

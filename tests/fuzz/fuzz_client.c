@@ -144,7 +144,7 @@ static void make_request(struct client *cl, enum want w)
 		break;
 	case FETCH:
 		fd = open("/dev/null", O_WRONLY | O_CLOEXEC);
-		client_fetch_stream(cl, 1, FARM__WHAT__WHAT_LOG, fd, &e);
+		client_fetch_log(cl, 1, fd, &e);
 		close(fd);
 		break;
 	default:

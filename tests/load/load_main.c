@@ -11,6 +11,7 @@
 
 #include "common/base/mem.h"
 #include "tests/bench/process.h"
+#include "tests/support/first_address.h"
 
 #include <argp.h>
 #include <math.h>
@@ -237,7 +238,7 @@ static void start(char *host_port, size_t size)
 		load_die("the coordinator does not listen");
 	snprintf(host_port, size, "127.0.0.1:%s", port);
 	snprintf(tls, sizeof tls, "%s/crowd", folder);
-	if (net_addr_resolve(&load.address, host_port, &e) || (!load.s.insecure && tls_open(&load.tls, tls, &e)))
+	if (first_address(&load.address, host_port, &e) || (!load.s.insecure && tls_open(&load.tls, tls, &e)))
 		load_die("%s", e.text);
 }
 

@@ -420,7 +420,7 @@ static void a_dropped_stream_begins_again(void **state)
 		struct client *cl = meet(&c);
 		struct error e;
 		int fd = open("stream", O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-		int rc = client_fetch_stream(cl, 1, FARM__WHAT__WHAT_LOG, fd, &e);
+		int rc = client_fetch_log(cl, 1, fd, &e);
 		part(&c, cl);
 		close(fd);
 		assert_int_equal(rc, 0);

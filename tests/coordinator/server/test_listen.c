@@ -3,6 +3,7 @@
 #include "coordinator/server/server.h"
 #include "coordinator/server/server_options.h"
 #include "tests/support/folder.h"
+#include "tests/support/first_address.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -57,7 +58,7 @@ static int call(struct server *s, const char *host)
 	fclose(f);
 	port[strcspn(port, "\n")] = 0;
 	snprintf(address, sizeof address, "%s:%s", host, port);
-	assert_int_equal(net_addr_resolve(&a, address, &e), 0);
+	assert_int_equal(first_address(&a, address, &e), 0);
 	int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
 	assert_true(fd >= 0);
 	if (connect(fd, (struct sockaddr *)&a.storage, sizeof(struct sockaddr_in)))
