@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/base/program.h"
 
+#include "common/base/log.h"
 #include "common/base/option_print.h"
 
 #include <assert.h>
@@ -56,4 +57,11 @@ void program_options(const struct program *p, int argc, char **argv, void *targe
 		option_print(p, asked, stdout);
 		exit(0);
 	}
+}
+
+int program_take_verbose(void *target, char *arg, struct error *e)
+{
+	(void)target, (void)arg, (void)e;
+	log_set_level(LOG_LEVEL_DEBUG);
+	return 0;
 }

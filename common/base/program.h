@@ -11,4 +11,7 @@
  * everything (a full disk), it prints an error and the exit code becomes 1. */
 void program_options(const struct program *p, int argc, char **argv, void *target);
 
+/* For the row of --verbose. */
+int program_take_verbose(void *target, char *arg, struct error *e);
+
 #endif

@@ -1,18 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "coordinator/server/server_options.h"
 
-#include "common/base/log.h"
+#include "common/base/program.h"
 #include "coordinator/server/limits.h"
 
 #include <stdlib.h>
 #include <uv.h>
-
-static int take_verbose(void *target, char *arg, struct error *e)
-{
-	(void)target, (void)arg, (void)e;
-	log_set_level(LOG_LEVEL_DEBUG);
-	return 0;
-}
 
 #define CONFIG struct server_config
 
@@ -73,7 +66,7 @@ static const struct option_row rows[] = {
 	 OPTION_FLAG(CONFIG, accept_loss)},
 	{"insecure", 0, NULL, "Listen on addresses other than loopback without encryption",
 	 OPTION_FLAG(CONFIG, insecure)},
-	{"verbose", 'v', NULL, "Also log every lease", OPTION_TAKE(take_verbose)},
+	{"verbose", 'v', NULL, "Also log every lease", OPTION_TAKE(program_take_verbose)},
 	{0},
 };
 

@@ -10,13 +10,6 @@
 
 #define CONFIG struct agent_config
 
-static int take_verbose(void *target, char *arg, struct error *e)
-{
-	(void)target, (void)arg, (void)e;
-	log_set_level(LOG_LEVEL_DEBUG);
-	return 0;
-}
-
 static const struct option_row rows[] = {
 	{"coordinator", 'c', "HOST:PORT", "The coordinator", OPTION_TEXT(CONFIG, coordinator),
 	 .environment = "HSLT_COORDINATOR", .needed = true},
@@ -34,7 +27,7 @@ static const struct option_row rows[] = {
 	 OPTION_TEXT(CONFIG, tls), .environment = "HSLT_TLS"},
 	{"insecure", 0, NULL, "Connect to addresses other than loopback without encryption",
 	 OPTION_FLAG(CONFIG, insecure)},
-	{"verbose", 'v', NULL, "Log more", OPTION_TAKE(take_verbose)},
+	{"verbose", 'v', NULL, "Log more", OPTION_TAKE(program_take_verbose)},
 	{0},
 };
 

@@ -36,11 +36,6 @@ static float *pixel(const struct image *m, uint32_t x, uint32_t y)
 	return m->pixels + 3 * ((size_t)y * m->width + x);
 }
 
-static double angle_between(vec3 a, vec3 b)
-{
-	return atan2(vec3_length(vec3_cross(a, b)), vec3_dot(a, b));
-}
-
 /* The part of the horizon's light that `extend` sends up from below it: all at the horizon, none from the nadir. */
 static double extended(double angle)
 {
@@ -64,7 +59,7 @@ static void bake_sky(const struct baking *b, double scale, double stretch, bool 
 		for (uint32_t x = 0; x < m->width; x++) {
 			vec3 d = direction(m, x + 0.5, model * m->height / M_PI);
 			double rgb[3];
-			daylight_sky(&b->sky, model, angle_between(d, b->towards), rgb);
+			daylight_sky(&b->sky, model, vec3_angle(d, b->towards), rgb);
 			for (int k = 0; k < 3; k++)
 				pixel(m, x, y)[k] = (float)(factor * rgb[k]);
 		}
@@ -76,12 +71,12 @@ static double covered(const struct baking *b, uint32_t x, uint32_t y)
 {
 	enum { PARTS = 8 };
 	double reach = b->radius + 2 * M_PI / b->image.height;
-	if (angle_between(direction(&b->image, x + 0.5, y + 0.5), b->disk) > reach)
+	if (vec3_angle(direction(&b->image, x + 0.5, y + 0.5), b->disk) > reach)
 		return 0;
 	int inside = 0;
 	for (int i = 0; i < PARTS * PARTS; i++) {
 		vec3 d = direction(&b->image, x + (i % PARTS + 0.5) / PARTS, y + (i / PARTS + 0.5) / PARTS);
-		inside += angle_between(d, b->disk) <= b->radius;
+		inside += vec3_angle(d, b->disk) <= b->radius;
 	}
 	return (double)inside / (PARTS * PARTS);
 }
@@ -91,8 +86,7 @@ static void bake_sun(const struct baking *b, const double rgb[3])
 {
 	const struct image *m = &b->image;
 	double solid = 0, pixel_row = 2 * M_PI / m->width * M_PI / m->height;
-	double row = angle_between(b->disk, (vec3){0, 1, 0}) * m->height / M_PI,
-	       reach = b->radius * m->height / M_PI + 2;
+	double row = vec3_angle(b->disk, (vec3){0, 1, 0}) * m->height / M_PI, reach = b->radius * m->height / M_PI + 2;
 	uint32_t first = (uint32_t)fmax(row - reach, 0), last = (uint32_t)fmin(row + reach, m->height - 1.0);
 	for (uint32_t y = first; y <= last; y++)
 		for (uint32_t x = 0; x < m->width; x++)
@@ -172,7 +166,7 @@ static int read_albedo(const struct scene_node *n, const struct emitter_build *b
 /* Down from the zenith to so many times the angle. */
 static vec3 stretched(vec3 d, double by)
 {
-	double angle = by * angle_between(d, (vec3){0, 1, 0}), across = hypot(d.x, d.z);
+	double angle = by * vec3_angle(d, (vec3){0, 1, 0}), across = hypot(d.x, d.z);
 	double part = across > 0 ? sin(angle) / across : 0;
 	return (vec3){part * d.x, across > 0 ? cos(angle) : 1, part * d.z};
 }
@@ -215,7 +209,7 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	if ((code = read_sun(n, axis, build->dialect_3, &towards, e)))
 		return code;
 	b.towards = (vec3){vec3_dot(axis[0], towards), vec3_dot(axis[1], towards), vec3_dot(axis[2], towards)};
-	double sun = angle_between(b.towards, (vec3){0, 1, 0});
+	double sun = vec3_angle(b.towards, (vec3){0, 1, 0});
 	if (!(sun <= 0.5 * M_PI + 1e-6))
 		return node_error(n, e, EINVAL, "the sun is below the horizon (%.1f degrees)", 90 - sun / RADIANS);
 	double albedo[3];

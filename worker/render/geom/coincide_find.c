@@ -40,33 +40,28 @@ struct member {
 	double low[3], high[3];
 };
 
-static double along(vec3 v, int axis)
-{
-	return axis == 0 ? v.x : axis == 1 ? v.y : v.z;
-}
-
-static void extent_of_instance(const struct accel_shape *s, uint32_t prim, int axis, double *low, double *high)
+static void extent_of_instance(const struct accel_shape *s, uint32_t prim, unsigned axis, double *low, double *high)
 {
 	double margin = s->place->vertex_is_off;
 	if (prim == WHOLE) {
-		*low = along(s->place->center, axis) - along(s->place->half, axis) - margin;
-		*high = along(s->place->center, axis) + along(s->place->half, axis) + margin;
+		*low = vec3_along(s->place->center, axis) - vec3_along(s->place->half, axis) - margin;
+		*high = vec3_along(s->place->center, axis) + vec3_along(s->place->half, axis) + margin;
 		return;
 	}
 	const struct triangle t = accel_triangle(s, prim, 0);
-	double u = along(t.v[0], axis), v = along(t.v[1], axis), w = along(t.v[2], axis);
+	double u = vec3_along(t.v[0], axis), v = vec3_along(t.v[1], axis), w = vec3_along(t.v[2], axis);
 	*low = fmin(u, fmin(v, w)) - margin;
 	*high = fmax(u, fmax(v, w)) + margin;
 }
 
 /* The box's extent along an axis, slightly enlarged so that rounded coordinates meet. */
-static void extent(const struct search *f, struct prim_ref p, int axis, double *low, double *high)
+static void extent(const struct search *f, struct prim_ref p, unsigned axis, double *low, double *high)
 {
 	const struct accel_shape *s = &f->shapes[p.shape];
 	if (s->place) {
 		extent_of_instance(s, p.prim, axis, low, high);
 	} else if (s->is_sphere) {
-		double c = axis == 0 ? s->center.x : axis == 1 ? s->center.y : s->center.z;
+		double c = vec3_along(s->center, axis);
 		*low = c - s->radius;
 		*high = c + s->radius;
 	} else {
@@ -84,20 +79,20 @@ static void extent(const struct search *f, struct prim_ref p, int axis, double *
 static struct member member_of(const struct search *f, struct prim_ref p)
 {
 	struct member m = {.prim = p};
-	for (int k = 0; k < 3; k++)
+	for (unsigned k = 0; k < 3; k++)
 		extent(f, p, k, &m.low[k], &m.high[k]);
 	return m;
 }
 
 /* Finds the cut with the smallest halves, judged by a sample; false: they are hardly smaller than the whole. */
-static bool choose_cut(const struct search *f, const struct prim_ref *items, size_t n, int *axis, double *at)
+static bool choose_cut(const struct search *f, const struct prim_ref *items, size_t n, unsigned *axis, double *at)
 {
 	struct member m[SAMPLE];
 	double middle[SAMPLE];
 	size_t count = n < SAMPLE ? n : SAMPLE, least = SIZE_MAX;
 	for (size_t i = 0; i < count; i++)
 		m[i] = member_of(f, items[(size_t)((double)n * (double)i / (double)count)]);
-	for (int k = 0; k < 3; k++) {
+	for (unsigned k = 0; k < 3; k++) {
 		size_t below = 0, above = 0;
 		for (size_t i = 0; i < count; i++)
 			middle[i] = m[i].low[k] + (m[i].high[k] - m[i].low[k]) / 2;
@@ -266,7 +261,7 @@ static int look_into(struct search *f, struct prim_ref *items, size_t n, unsigne
 /* Where to cut; `is` false: nowhere. */
 struct cut {
 	bool is;
-	int axis;
+	unsigned axis;
 	double at;
 };
 
@@ -306,7 +301,7 @@ static struct member box_of_others(const struct search *f, const struct prim_ref
 	if (n > MANY)
 		return box;
 	for (size_t i = 0; i < n; i++)
-		for (int k = 0; k < 3 && i != without; k++) {
+		for (unsigned k = 0; k < 3 && i != without; k++) {
 			double low, high;
 			extent(f, items[i], k, &low, &high);
 			box.low[k] = fmin(box.low[k], low);

@@ -4,11 +4,6 @@
 #define UNEVEN 0x1p16
 #define TINY 0x1p-80
 
-static vec3 column(const mat4 *m, int k)
-{
-	return (vec3){m->m[0][k], m->m[1][k], m->m[2][k]};
-}
-
 static vec3 row(const mat4 *m, int k)
 {
 	return (vec3){m->m[k][0], m->m[k][1], m->m[k][2]};
@@ -35,10 +30,10 @@ static vec3 absolute(vec3 v)
 static void fill(struct placement *p, const mat4 *m, const mat4 *back, vec3 low, vec3 high)
 {
 	const mat4 inverse = *back;
-	*p = (struct placement){.x = column(m, 0),
-				.y = column(m, 1),
-				.z = column(m, 2),
-				.at = column(m, 3),
+	*p = (struct placement){.x = mat4_column(m, 0),
+				.y = mat4_column(m, 1),
+				.z = mat4_column(m, 2),
+				.at = mat4_column(m, 3),
 				.back = {row(&inverse, 0), row(&inverse, 1), row(&inverse, 2)},
 				.mirrored = mat4_det3(*m) < 0};
 	vec3 half = vec3_scale(0.5, vec3_sub(high, low));

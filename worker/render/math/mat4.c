@@ -163,7 +163,7 @@ bool mat4_keeps_angles(const mat4 *a)
 	vec3 axis[3];
 	double first = 0;
 	for (int c = 0; c < 3; c++) {
-		axis[c] = (vec3){a->m[0][c], a->m[1][c], a->m[2][c]};
+		axis[c] = mat4_column(a, c);
 		double length = vec3_length(axis[c]);
 		first = c ? first : length;
 		if (!(length > 0) || !(fabs(length - first) <= tolerance * first))

@@ -23,6 +23,11 @@ double mat4_det3(mat4 a);   /* of the upper left 3x3 block */
 /* Whether it rotates, mirrors, moves and scales evenly, and no more, to the four digits that files give. */
 bool mat4_keeps_angles(const mat4 *a);
 
+/* Where it takes the unit vector of axis k; 3: the origin. */
+static inline vec3 mat4_column(const mat4 *a, int k)
+{
+	return (vec3){a->m[0][k], a->m[1][k], a->m[2][k]};
+}
 vec3 mat4_point(const mat4 *a, vec3 p);
 vec3 mat4_vector(const mat4 *a, vec3 v);
 vec3 mat4_normal(const mat4 *inverse, vec3 n); /* by the transpose of the INVERSE; not normalised */

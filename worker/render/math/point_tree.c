@@ -15,12 +15,12 @@ void point_tree_partition(node *nodes, size_t count, size_t middle, unsigned axi
 {
 	size_t low = 0, high = count - 1;
 	while (low < high) {
-		double pivot = point_along(nodes[low + (high - low) / 2].p, axis);
+		double pivot = vec3_along(nodes[low + (high - low) / 2].p, axis);
 		size_t i = low, j = high;
 		for (;;) {
-			while (point_along(nodes[i].p, axis) < pivot)
+			while (vec3_along(nodes[i].p, axis) < pivot)
 				i++;
-			while (point_along(nodes[j].p, axis) > pivot)
+			while (vec3_along(nodes[j].p, axis) > pivot)
 				j--;
 			if (i >= j)
 				break;
@@ -64,7 +64,7 @@ static void search(const struct search *s, const node *nodes, size_t count, unsi
 		size_t middle = count / 2;
 		const node *m = &nodes[middle];
 		vec3 d = vec3_sub(m->p, s->at);
-		double across = point_along(d, axis);
+		double across = vec3_along(d, axis);
 		if (vec3_dot(d, d) <= s->radius * s->radius)
 			s->found(s->user, m->id);
 		axis = (axis + 1) % 3;

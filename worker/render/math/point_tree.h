@@ -19,12 +19,6 @@ struct point_tree {
 	size_t count;
 };
 
-/* The coordinate of p along axis 0, 1 or 2. */
-static inline double point_along(vec3 p, unsigned axis)
-{
-	return axis == 0 ? p.x : axis == 1 ? p.y : p.z;
-}
-
 /* Makes nodes[middle] what it would be if all were sorted along the axis, with none before it above and none after it
  * below. count > 0. */
 void point_tree_partition(struct point_tree_node *nodes, size_t count, size_t middle, unsigned axis);

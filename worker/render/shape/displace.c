@@ -125,7 +125,7 @@ static vec3 displaced_normal(const struct displacer *w, uint32_t triangle, doubl
 static double corner_angle(const struct mesh *m, const uint32_t t[3], uint32_t k)
 {
 	vec3 p = mesh_load(m->position[t[k]]);
-	return mesh_angle(vec3_sub(mesh_load(m->position[t[(k + 1) % 3]]), p),
+	return vec3_angle(vec3_sub(mesh_load(m->position[t[(k + 1) % 3]]), p),
 			  vec3_sub(mesh_load(m->position[t[(k + 2) % 3]]), p));
 }
 
@@ -248,7 +248,7 @@ static void add_turns(struct displacer *w, uint32_t triangle, const uint32_t ij[
 		if (at[k].inside || !w->places[at[k].place].bent)
 			continue;
 		double angle =
-			mesh_angle(vec3_sub(after[(k + 1) % 3], after[k]), vec3_sub(after[(k + 2) % 3], after[k]));
+			vec3_angle(vec3_sub(after[(k + 1) % 3], after[k]), vec3_sub(after[(k + 2) % 3], after[k]));
 		struct turn *turn = &w->turns[at[k].vertex];
 		turn->sum = vec3_madd(turn->sum, angle, turned);
 		turn->weight += angle;

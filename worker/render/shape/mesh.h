@@ -36,11 +36,6 @@ static inline void mesh_store(double out[3], vec3 v)
 	out[2] = v.z;
 }
 
-static inline double mesh_angle(vec3 a, vec3 b)
-{
-	return atan2(vec3_length(vec3_cross(a, b)), vec3_dot(a, b));
-}
-
 /* v normalised, however long it is; 0 if it has no length, or is not finite. */
 vec3 mesh_unit(vec3 v);
 

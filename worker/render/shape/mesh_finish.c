@@ -87,7 +87,7 @@ static void add_corner_normals(struct mesh *m, const uint32_t t[3], const double
 		if (given && vec3_length(mesh_load(given[v])) > 0)
 			continue;
 		vec3 p = mesh_load(m->position[v]);
-		double angle = mesh_angle(vec3_sub(mesh_load(m->position[t[(k + 1) % 3]]), p),
+		double angle = vec3_angle(vec3_sub(mesh_load(m->position[t[(k + 1) % 3]]), p),
 					  vec3_sub(mesh_load(m->position[t[(k + 2) % 3]]), p));
 		mesh_store(m->normal[v], vec3_madd(mesh_load(m->normal[v]), angle, g));
 	}

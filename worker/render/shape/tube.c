@@ -70,7 +70,7 @@ static int add_cap(struct list *rings, const struct sphere_at *s, vec3 axis, dou
 static int add_joint(struct list *rings, const struct sphere_at *s, vec3 from, double a, vec3 to, double b)
 {
 	vec3 across = mesh_unit(vec3_madd(to, -vec3_dot(from, to), from));
-	double turn = mesh_angle(from, to);
+	double turn = vec3_angle(from, to);
 	if (vec3_length(across) == 0)
 		across = frame_around(from).s;
 	double way = fmax(turn, fabs(b - a));

@@ -50,7 +50,7 @@ static const double *cell_of(const struct emitter_choice *c, vec3 p)
 {
 	uint32_t node = 1;
 	while (node < c->first_cell)
-		node = 2 * node + (point_along(p, c->cuts[node].axis) >= c->cuts[node].at);
+		node = 2 * node + (vec3_along(p, c->cuts[node].axis) >= c->cuts[node].at);
 	return &c->edge[(size_t)(node - c->first_cell) * (c->parts + 1)];
 }
 
@@ -97,7 +97,7 @@ static void sort_axes(const struct point_tree_node *nodes, size_t count, unsigne
 	vec3 side = vec3_sub(box.high, box.low);
 	for (unsigned k = 0; k < 3; k++) {
 		unsigned at = k;
-		for (; at > 0 && point_along(side, axis[at - 1]) < point_along(side, k); at--)
+		for (; at > 0 && vec3_along(side, axis[at - 1]) < vec3_along(side, k); at--)
 			axis[at] = axis[at - 1];
 		axis[at] = k;
 	}
@@ -106,7 +106,7 @@ static void sort_axes(const struct point_tree_node *nodes, size_t count, unsigne
 static bool is_divided(const struct point_tree_node *nodes, size_t middle, unsigned axis)
 {
 	for (size_t i = 0; i < middle; i++)
-		if (point_along(nodes[i].p, axis) >= point_along(nodes[middle].p, axis))
+		if (vec3_along(nodes[i].p, axis) >= vec3_along(nodes[middle].p, axis))
 			return false;
 	return true;
 }
@@ -145,7 +145,7 @@ static void halve(const struct maker *m, uint32_t node, struct point_tree_node *
 	}
 	size_t middle = count / 2;
 	unsigned axis = divide(nodes, count, middle);
-	m->to->cuts[node] = (struct cut){axis, point_along(nodes[middle].p, axis)};
+	m->to->cuts[node] = (struct cut){axis, vec3_along(nodes[middle].p, axis)};
 	halve(m, 2 * node, nodes, middle);
 	halve(m, 2 * node + 1, &nodes[middle], count - middle);
 	for (uint32_t e = 0; e < n; e++)

@@ -9,8 +9,7 @@
 /* Only translation, rotation, reflection and, with *scale, one scale for all directions. */
 static bool is_similar(const mat4 *m, double *scale)
 {
-	const vec3 x = {m->m[0][0], m->m[1][0], m->m[2][0]}, y = {m->m[0][1], m->m[1][1], m->m[2][1]},
-		   z = {m->m[0][2], m->m[1][2], m->m[2][2]};
+	const vec3 x = mat4_column(m, 0), y = mat4_column(m, 1), z = mat4_column(m, 2);
 	double s2 = vec3_dot(x, x), off = TOLERANCE * s2;
 	*scale = sqrt(s2);
 	return fabs(vec3_dot(y, y) - s2) <= off && fabs(vec3_dot(z, z) - s2) <= off && fabs(vec3_dot(x, y)) <= off &&

@@ -6,14 +6,9 @@
 #define MIXED 0x1p-12
 #define WIDE 0x1p11
 
-static double along(vec3 v, int axis)
+static double middle(const struct box *b, unsigned axis)
 {
-	return axis == 0 ? v.x : axis == 1 ? v.y : v.z;
-}
-
-static double middle(const struct box *b, int axis)
-{
-	return 0.5 * (along(b->low, axis) + along(b->high, axis));
+	return 0.5 * (vec3_along(b->low, axis) + vec3_along(b->high, axis));
 }
 
 int weighted_value_compare(const void *a, const void *b)
@@ -59,7 +54,7 @@ double origin_wide_from(const struct box *all, const struct box *shapes, uint32_
 vec3 origin_choose(const struct box *all, const struct box *shapes, uint32_t count, struct weighted_value *room)
 {
 	double at[3], least = least_extent(shapes, count);
-	for (int axis = 0; axis < 3; axis++) {
+	for (unsigned axis = 0; axis < 3; axis++) {
 		at[axis] = middle(all, axis);
 		if (!is_mixed(least, all))
 			continue;

@@ -7,17 +7,12 @@
 /* Matrices in files have six digits. */
 #define RIGID_TOLERANCE 1e-5
 
-static vec3 column(const mat4 *m, int k)
-{
-	return (vec3){m->m[0][k], m->m[1][k], m->m[2][k]};
-}
-
 /* Only translation, rotation or reflection. */
 static bool is_rigid(const mat4 *m)
 {
 	for (int i = 0; i < 3; i++)
 		for (int k = 0; k <= i; k++)
-			if (!(fabs(vec3_dot(column(m, i), column(m, k)) - (i == k)) <= RIGID_TOLERANCE))
+			if (!(fabs(vec3_dot(mat4_column(m, i), mat4_column(m, k)) - (i == k)) <= RIGID_TOLERANCE))
 				return false;
 	return true;
 }

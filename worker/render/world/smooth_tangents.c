@@ -84,7 +84,7 @@ static void add_triangle(const struct geom_shape *g, const uint32_t i[3], const 
 		vec3 next = in_plane(vec3_sub(load(g->position[i[(k + 1) % 3]]), p), n),
 		     before = in_plane(vec3_sub(load(g->position[i[(k + 2) % 3]]), p), n);
 		struct sums *s = &sums[number[i[k]]];
-		double angle = mesh_angle(next, before);
+		double angle = vec3_angle(next, before);
 		s->of[mirrored] = vec3_madd(s->of[mirrored], angle, in_plane(tangent, n));
 		s->angle[mirrored] += angle;
 	}

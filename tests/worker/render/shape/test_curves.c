@@ -153,14 +153,14 @@ static void test_normals(void **state)
 			vec3 a = built_corner(m, t, k), u = mesh_unit(vec3_sub(built_corner(m, t, (k + 1) % 3), a)),
 			     v = mesh_unit(vec3_sub(built_corner(m, t, (k + 2) % 3), a));
 			double *at = sum[m->index[t][k]];
-			mesh_store(at, vec3_madd(mesh_load(at), mesh_angle(u, v), mesh_unit(vec3_cross(u, v))));
+			mesh_store(at, vec3_madd(mesh_load(at), vec3_angle(u, v), mesh_unit(vec3_cross(u, v))));
 		}
 	for (uint32_t i = TUBE_SIDES + 1; i < last; i++) {
 		uint32_t ring = i / (TUBE_SIDES + 1) * (TUBE_SIDES + 1);
 		vec3 n = mesh_load(sum[i]);
 		if (i == ring || i == ring + TUBE_SIDES) /* the seam */
 			n = vec3_add(mesh_load(sum[ring]), mesh_load(sum[ring + TUBE_SIDES]));
-		double angle = mesh_angle(n, mesh_load(m->normal[i])) * 180 / pi;
+		double angle = vec3_angle(n, mesh_load(m->normal[i])) * 180 / pi;
 		if (angle > 2.5)
 			fail_msg("vertex %u: its normal is off by %g degrees", i, angle);
 		vec3 middle = {0, 0, 0};

@@ -125,7 +125,7 @@ static void check_body(const struct vol *v, vol_field *f, double volume, double 
 		fail_msg("a volume of %g instead of %g", sum, volume);
 	for (uint32_t i = 0; i < m->vertex_count; i++) {
 		double value = value_at(v, m->position[i]),
-		       angle = mesh_angle(mesh_load(m->normal[i]), gradient_of(f, mesh_load(m->position[i])));
+		       angle = vec3_angle(mesh_load(m->normal[i]), gradient_of(f, mesh_load(m->position[i])));
 		if (!(fabs(value) < 1e-9))
 			fail_msg("vertex %u: the field is %g", i, value);
 		if (!(angle * 180 / pi < most_degrees))
