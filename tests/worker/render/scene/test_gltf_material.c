@@ -407,7 +407,7 @@ static void test_images_in_buffers(void **state)
 			if (raster_read(&r, bitmap, &assets, &range, &arena, &e))
 				fail_msg("form %d, offset %zu: %s", form, offset, e.text);
 			for (int i = 0; i < 12; i++)
-				assert_near((double)indexed_image_at(&r.image, i), rgb[i]);
+				assert_near((double)indexed_image_at(&r.image, (size_t)i), rgb[i]);
 			arena_fini(&arena);
 			scene_fini(&s);
 		}
