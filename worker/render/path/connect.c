@@ -169,8 +169,13 @@ IN_BOTH struct refracted_joint refracted_joint_of(struct path_context *c, const 
 		return r;
 	if (path_refracts(c) && is_refracted(p))
 		r.end = p->passed + 1;
-	else if (path_refracts(c))
-		r.ratio = path_refracted_over_drawn(c, p->v, p->edges, &r.end);
+	if (r.end || !path_refracts(c))
+		return r;
+	unsigned end = path_refracted_end(p->v, p->edges);
+	if (end && !is_delta(p, end))
+		r.ratio = path_refracted_over_drawn(c, p->v, end);
+	if (r.ratio > 0)
+		r.end = end;
 	return r;
 }
 

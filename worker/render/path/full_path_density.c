@@ -99,17 +99,17 @@ static double log_refracted(struct path_context *c, const struct full_path *x, c
 {
 	const struct path_vertex *v[FULL_PATH_MAX_VERTICES];
 	double pdf[PATH_REFRACTED_MOST], log_transfer;
-	unsigned count;
 	if (!path_refracts(c) || !path_is_refracted(&x->v[1]))
 		return -INFINITY;
 	for (unsigned i = 0; i <= x->edges; i++)
 		v[i] = &x->v[i];
-	if (!path_is_made_by_refraction(c, v, x->edges, &count, &log_transfer))
+	unsigned end = path_refracted_end(v, x->edges);
+	if (!end || v[end]->delta || !path_is_made_by_refraction(c, v, end, &log_transfer))
 		return -INFINITY;
-	for (unsigned i = 0; i < count; i++)
-		pdf[i] = 1;
-	return from_camera[count + 1] + log(path_pdf_toward(c, v[0], v[count + 1]->x.p)) +
-	       log(path_refracted_ratio(v, count, log_transfer, pdf));
+	for (unsigned i = 1; i < end; i++)
+		pdf[i - 1] = 1;
+	return from_camera[end] + log(path_pdf_toward(c, v[0], v[end]->x.p)) +
+	       log(path_refracted_ratio(v, end - 1, log_transfer, pdf));
 }
 
 void full_path_log_techniques(struct path_context *c, struct full_path *x, double *log_pdf)

@@ -111,7 +111,8 @@ static double refracted_over_drawn(struct path_context *c, unsigned s, unsigned 
 		v[i] = &y[i];
 	v[s + 1] = &above;
 	above.x.p = vec3_madd(y[s].x.p, vec3_dot(y[s].x.ng, y[s].to_prev) > 0 ? 1 : -1, y[s].x.ng);
-	return path_refracted_over_drawn(c, v, s + 1, end);
+	*end = path_refracted_end(v, s + 1);
+	return *end && (*end == s || !y[*end].delta) ? path_refracted_over_drawn(c, v, *end) : 0;
 }
 
 /* Fills in the sums of struct photon. The techniques by which densities are divided need not exist. */

@@ -87,15 +87,17 @@ static const struct path_refraction *look_up(struct path_context *c, const struc
 	return k->found ? &k->of : NULL;
 }
 
-bool path_is_made_by_refraction(struct path_context *c, const struct path_vertex *const *v, unsigned k, unsigned *count,
-				double *log_transfer)
+unsigned path_refracted_end(const struct path_vertex *const *v, unsigned k)
 {
 	unsigned end = 1;
 	while (end < k && path_is_refracted(v[end]))
 		end++;
-	*count = end - 1;
-	if (*count == 0 || *count > PATH_REFRACTED_MOST || end == k || v[end]->kind != VERTEX_SURFACE)
-		return false;
+	return end > 1 && end - 1 <= PATH_REFRACTED_MOST && end < k && v[end]->kind == VERTEX_SURFACE ? end : 0;
+}
+
+bool path_is_made_by_refraction(struct path_context *c, const struct path_vertex *const *v, unsigned end,
+				double *log_transfer)
+{
 	const struct path_vertex *z = v[end];
 	double unused;
 	vec3 to_camera = path_direction(z, v[end + 1], &unused), straight = path_direction(z, v[0], &unused);
@@ -104,22 +106,20 @@ bool path_is_made_by_refraction(struct path_context *c, const struct path_vertex
 				   path_scatter(c, z, to_camera, straight)))
 		return false;
 	const struct path_refraction *r = look_up(c, z, v[0]);
-	if (!r || !is_same_path(r, v, *count))
+	if (!r || !is_same_path(r, v, end - 1))
 		return false;
 	*log_transfer = r->log_transfer;
 	return true;
 }
 
-double path_refracted_over_drawn(struct path_context *c, const struct path_vertex *const *v, unsigned k, unsigned *end)
+double path_refracted_over_drawn(struct path_context *c, const struct path_vertex *const *v, unsigned end)
 {
 	double pdf[PATH_REFRACTED_MOST], log_transfer;
-	unsigned count;
-	if (!path_is_made_by_refraction(c, v, k, &count, &log_transfer))
+	if (!path_is_made_by_refraction(c, v, end, &log_transfer))
 		return 0;
-	for (unsigned i = 0; i < count; i++)
-		pdf[i] = v[1 + i]->pdf;
-	*end = count + 1;
-	return path_refracted_ratio(v, count, log_transfer, pdf);
+	for (unsigned i = 1; i < end; i++)
+		pdf[i - 1] = v[i]->pdf;
+	return path_refracted_ratio(v, end - 1, log_transfer, pdf);
 }
 
 /* The weight of the lobe at v, which goes on to `next`; zero: none, or the shading normal disagrees. */

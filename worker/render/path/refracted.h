@@ -52,13 +52,18 @@ bool path_tries_to_refract(const struct path_context *c, const struct path_verte
 bool path_refract_to(struct path_context *c, const struct path_vertex *before, const struct path_vertex *z,
 		     const struct path_vertex *y, spectrum *left);
 
-/* Whether technique 1 makes this path by refraction: x_1 .. *count are refracted, and its walk ends there. v: from the
- * emitter on, k edges. */
-bool path_is_made_by_refraction(struct path_context *c, const struct path_vertex *const *v, unsigned k, unsigned *count,
+/* To which x_end technique 1 would join x_0 by refraction: x_1 .. x_end-1 are refracted, x_end is not. 0: to none. v:
+ * from the emitter on, k edges. Technique 1 scatters at x_end by a smooth lobe. A path that is specular there is
+ * another one, even if its vertices are the same: that is for the caller to tell, since a vertex at which a joint ends
+ * may be marked as specular for the way that its sub-path went on. */
+unsigned path_refracted_end(const struct path_vertex *const *v, unsigned k);
+
+/* Whether technique 1 makes the path that scatters smoothly at x_end: whether its walk ends at x_1 .. x_end-1. */
+bool path_is_made_by_refraction(struct path_context *c, const struct path_vertex *const *v, unsigned end,
 				double *log_transfer);
 
 /* Then the density of its joint over that of drawing x_1 .. x_end-1 as their sub-path did; 0: it does not make it. */
-double path_refracted_over_drawn(struct path_context *c, const struct path_vertex *const *v, unsigned k, unsigned *end);
+double path_refracted_over_drawn(struct path_context *c, const struct path_vertex *const *v, unsigned end);
 
 /* path_pdf from a refracting vertex: the density of `next` for a sub-path that comes from prev. */
 double path_pdf_refracted(const struct path_context *c, const struct path_vertex *prev, const struct path_vertex *at,

@@ -3,7 +3,9 @@
  * Refracted connections change the noise of an image and not its mean, also where more than one refracted path joins
  * two points and where the walk finds none: the caustic of a ball. Statistics as in tests/support/agree.h, but finding
  * a bias of 3 % of the mean only; if all paths were weighted as those that the walk finds, nearly half would be lost.
- * Where straight lines are blocked and light bent at a plane passes, it is that of Fresnel's formulas.
+ * The lamp's image in a floor that is partly a mirror would lose half if paths that are specular there were weighted as
+ * if a connection could make them. Where straight lines are blocked and light bent at a plane passes, it is that of
+ * Fresnel's formulas.
  */
 #include "tests/support/agree.h"
 #include "tests/support/worlds.h"
@@ -33,23 +35,56 @@ static struct world *caustic(const char *effects)
 	return w;
 }
 
-static void test_caustic(void **state)
+/* A lamp above a pane, and its image in a floor that reflects half of the light as a mirror and scatters the rest. */
+static struct world *image_of_lamp(const char *effects)
 {
-	(void)state;
+	worlds_effects = effects;
+	/* clang-format off */
+	struct world *w = world_of_text(16, 16, "%s",
+		"<integrator type='path'><integer name='max_depth' value='4'/></integrator>"
+		"<sensor type='perspective'><float name='fov' value='4'/><transform name='to_world'>"
+			"<lookat origin='2,0,0' target='1,-1,0' up='0,1,0'/></transform></sensor>"
+		"<shape type='rectangle'><transform name='to_world'><scale value='9'/><rotate x='1' angle='-90'/>"
+			"<translate y='-1'/></transform><bsdf type='blendbsdf'><float name='weight' value='.5'/>"
+			"<bsdf type='conductor'><string name='material' value='none'/></bsdf><bsdf type='diffuse'/></bsdf></shape>"
+		"<shape type='cube'><transform name='to_world'><scale x='3' y='.1' z='3'/><translate y='.5'/></transform>"
+			"<bsdf type='dielectric'/></shape>"
+		"<shape type='sphere'><point name='center' x='-1.6' y='1.6' z='0'/><float name='radius' value='.4'/>"
+			"<emitter type='area'><float name='radiance' value='3'/></emitter></shape>");
+	/* clang-format on */
+	worlds_effects = NULL;
+	return w;
+}
+
+/* With so many samples a pixel, twice as many without, a quarter of bdpt. */
+static void check_both(const char *name, struct world *(*build)(const char *effects), uint64_t spp)
+{
 	static struct agree_image without, with;
-	static const struct agree_side sides[] = {{"path", 2048, 32, 0, 0}, {"bdpt", 512, 32, 0, 0}};
-	struct world *w = caustic("-refracted-shadows");
-	agree_render(w, "caustic", "without", &(struct agree_side){"path", 4096, 32, 0, 0}, &without);
+	const struct agree_side sides[] = {{"path", spp, 32, 0, 0}, {"bdpt", spp / 4, 32, 0, 0}};
+	struct world *w = build("-refracted-shadows");
+	agree_render(w, name, "without", &(struct agree_side){"path", 2 * spp, 32, 0, 0}, &without);
 	world_free(w);
-	w = caustic(NULL);
+	w = build(NULL);
 	assert_true(w->effects.refracted_shadows);
 	for (size_t i = 0; i < sizeof sides / sizeof *sides; i++) {
 		char test[64];
-		snprintf(test, sizeof test, "caustic, %s", sides[i].integrator);
+		snprintf(test, sizeof test, "%s, %s", name, sides[i].integrator);
 		agree_render(w, test, "with", &sides[i], &with);
 		agree_within_errors(test, &with, &without);
 	}
 	world_free(w);
+}
+
+static void test_caustic(void **state)
+{
+	(void)state;
+	check_both("caustic", caustic, 2048);
+}
+
+static void test_image_of_lamp(void **state)
+{
+	(void)state;
+	check_both("image of a lamp", image_of_lamp, 512);
 }
 
 /* The floor of a pool under a low sun, beside a wall that stands in the way of straight lines to it. Refracted light
@@ -88,6 +123,7 @@ static void test_pool(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_caustic), cmocka_unit_test(test_pool)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_caustic), cmocka_unit_test(test_image_of_lamp),
+					   cmocka_unit_test(test_pool)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
