@@ -7,12 +7,14 @@
  *
  * A guess fails where the line meets a surface that does not refract, or more than PATH_REFRACTED_MOST of them, where
  * the walk does not arrive (walk.h), and where the path is a caustic's edge, at which T is infinite. Paths that are not
- * found are left to the other techniques.
+ * found are left to the other techniques. So are those between points that see each other: there the connection is
+ * straight (path/connect.c).
  */
 #include "worker/render/halfvec/refract.h"
 
 #include "worker/render/halfvec/constraint_system.h"
 #include "worker/render/halfvec/walk.h"
+#include "worker/render/path/transparent.h"
 #include "worker/render/path/visible.h"
 #include "worker/render/world/refracting.h"
 
@@ -116,6 +118,18 @@ static bool guess_bent(struct path_context *c, const struct path_vertex *z, cons
 	return false;
 }
 
+/* Whether z sees y along a straight line, perhaps through surfaces that let light straight through: then a connection
+ * is not refracted, and its paths must not be weighted as if it were. */
+static bool is_open(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y, vec3 d,
+		    double end)
+{
+	struct path_vertex first;
+	if (path_visible(c, z, y))
+		return true;
+	return path_sees_through(c) && path_extend(c, z, d, 0, end, &first) && first.kind == VERTEX_SURFACE &&
+	       bsdf_is_passed(first.bsdf);
+}
+
 bool halfvec_refract(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
 		     struct path_refraction *out)
 {
@@ -125,5 +139,5 @@ bool halfvec_refract(struct path_context *c, const struct path_vertex *z, const 
 		return false;
 	if (box_is_met(&c->w->refracting, z->x.p, d, end) && cross(c, z, y, d, end, false, out) && walk(c, z, y, out))
 		return true;
-	return guess_bent(c, z, y, out);
+	return guess_bent(c, z, y, out) && !is_open(c, z, y, d, end);
 }

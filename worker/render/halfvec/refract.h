@@ -6,7 +6,7 @@
 #include "worker/render/path/refracted.h"
 
 /* For path_context.refract. The walk starts where the straight line from z to y crosses surfaces, all of which have to
- * refract. Pure, but for the rays that it counts. */
+ * refract. Nothing is found between points that see each other straight. Pure, but for the rays that it counts. */
 path_refract halfvec_refract;
 
 #endif

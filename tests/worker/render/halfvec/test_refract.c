@@ -8,6 +8,7 @@
 #include "worker/render/halfvec/refract.h"
 #include "worker/render/math/mat2.h"
 #include "worker/render/path/connect.h"
+#include "worker/render/path/visible.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -276,6 +277,57 @@ static unsigned joined_by(const char *between)
 	return count;
 }
 
+enum sight { BLOCKED, OPEN, THROUGH_SHEET, SIGHTS };
+
+static enum sight sight_of(const struct path_vertex *z, const struct path_vertex *y)
+{
+	struct path_vertex first;
+	double distance2;
+	vec3 d = path_direction(z, y, &distance2);
+	if (path_visible(&c, z, y))
+		return OPEN;
+	assert_true(path_extend(&c, z, d, 0, sqrt(distance2), &first));
+	return bsdf_is_passed(first.bsdf) ? THROUGH_SHEET : BLOCKED;
+}
+
+/* A connection between points that see each other is straight, perhaps through holes of a sheet, and no other is to be
+ * made as well. Points of the floor under a bubble in glass, and a point light above it: beside the bubble's shadow,
+ * light arrives both straight and bent by its rim. */
+static void test_not_where_straight(void **state)
+{
+	(void)state;
+	unsigned count[SIGHTS] = {0}, found[SIGHTS] = {0};
+	/* clang-format off */
+	struct world *w = world_of_text(8, 8, "%s",
+		FLOOR BALL("x='0' y='0' z='0'", ".7", "<bsdf type='dielectric'><float name='int_ior' value='1'/>"
+			"<float name='ext_ior' value='1.5'/></bsdf>")
+		"<shape type='rectangle'><transform name='to_world'><scale value='3.5'/><rotate x='1' angle='90'/>"
+			"<translate x='5.5' y='-1'/></transform><bsdf type='mask'><float name='opacity' value='.5'/>"
+			"<bsdf type='diffuse'/></bsdf></shape>"
+		"<emitter type='point'><point name='position' x='.3' y='1.5' z='.2'/></emitter>");
+	/* clang-format on */
+	begin(w);
+	for (int i = 0; i < 1600; i++) {
+		double across = -3.9 + i % 40 * 0.2, along = -3.9 + i / 40 * 0.2;
+		struct path_vertex from = {.kind = VERTEX_CAMERA,
+					   .x = {.p = in_world(w, (vec3){across, -1.9, along}), .prim = PRIM_NONE}},
+				   z, y;
+		struct path_refraction r;
+		double pdf;
+		assert_true(path_extend(&c, &from, (vec3){0, -1, 0}, 0, INFINITY, &z));
+		memset(z.next_event, 0, sizeof z.next_event);
+		assert_true(path_next_event(&c, &z, &y, &pdf));
+		enum sight sight = sight_of(&z, &y);
+		count[sight]++;
+		found[sight] += halfvec_refract(&c, &z, &y, &r);
+	}
+	print_message("refracted light is found at %u of %u points in shadow\n", found[BLOCKED], count[BLOCKED]);
+	assert_true(found[BLOCKED] > 50 && count[OPEN] > 50 && count[THROUGH_SHEET] > 50);
+	assert_int_equal(found[OPEN], 0);
+	assert_int_equal(found[THROUGH_SHEET], 0);
+	world_free(w);
+}
+
 static void test_what_lies_between(void **state)
 {
 	(void)state;
@@ -306,6 +358,7 @@ int main(void)
 		cmocka_unit_test(test_lamps),
 		cmocka_unit_test(test_around_a_wall),
 		cmocka_unit_test(test_one_of_several),
+		cmocka_unit_test(test_not_where_straight),
 		cmocka_unit_test(test_what_lies_between),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
