@@ -1,0 +1,40 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Paths of exactly so many edges, where surfaces let light straight through: what connects two points without passing
+ * anything is too short, and must not come back as a connection that passes the surface on which one of them lies.
+ * Light sub-paths end on masks here, and those of `path` do not. Statistics as in tests/support/agree.h.
+ */
+#include "tests/support/agree.h"
+#include "tests/support/worlds.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+
+#include <cmocka.h>
+
+static void test_masks(void **state)
+{
+	(void)state;
+	static struct agree_image path, bdpt;
+	/* clang-format off */
+	struct world *w = world_of_text(16, 16, "%s",
+		SENSOR("0,0,5", "0,-.2,0")
+		"<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' y='1' angle='30'/></transform>"
+			"<bsdf type='mask'><float name='opacity' value='.6'/><bsdf type='twosided'><bsdf type='diffuse'/></bsdf>"
+			"</bsdf></shape>"
+		"<shape type='rectangle'><transform name='to_world'><scale value='9'/><translate z='-3'/></transform></shape>"
+		"<emitter type='constant'><float name='radiance' value='3'/></emitter>");
+	/* clang-format on */
+	assert_true(w->effects.transparent_shadows);
+	agree_render(w, "3 edges", "path", &(struct agree_side){"path", 16384, 32, 3, 3}, &path);
+	agree_render(w, "3 edges", "bdpt", &(struct agree_side){"bdpt", 11264, 32, 3, 3}, &bdpt);
+	agree_check("3 edges", &bdpt, &path);
+	world_free(w);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_masks)};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
