@@ -504,6 +504,41 @@ static struct world *uneven_media(const struct agree_case *k)
 	return world_of_files(32, 32, files);
 }
 
+/* A cloud of flakes that turn from place to place around a stone and a lamp, beside rough glass with other flakes inside. */
+static double flakes(double x, double y, double z, uint32_t channel)
+{
+	double c = cos(3 * x + y), s = sin(3 * x + y), thin = 0.05 + 0.4 * z;
+	const double m[] = {c * c + thin * s * s, s * s + thin * c * c, 0.3, (1 - thin) * c * s, 0, 0};
+	return m[channel];
+}
+
+static struct world *flaky_media(const struct agree_case *k)
+{
+	(void)k;
+	static char xml[1 << 13];
+	static struct vol grid, matrices;
+	vol_make(&grid, (const uint32_t[3]){6, 5, 7}, 1, puffs);
+	vol_make(&matrices, (const uint32_t[3]){6, 5, 7}, 6, flakes);
+#define SGGX(volume) "<phase type='sggx'>" volume "</phase>"
+	int n = snprintf(xml, sizeof xml, "%s", "<scene version='3.0.0'>" LOOK_AT_IT GROUND SKY
+			 "<shape type='sphere'>" AT("<scale value='0.7'/><translate x='-0.6' y='0.8'/>" TURN)
+				"<bsdf type='null'/>" UNEVEN("4", GRID("sigma_t", SIZED),
+				"<rgb name='albedo' value='0.9,0.8,0.7'/>" SGGX("<volume type='gridvolume' name='S'>"
+				"<string name='filename' value='flakes.vol'/>" SIZED "</volume>")) "</shape>"
+			 "<shape type='sphere'>" AT("<scale value='0.25'/><translate x='-0.6' y='0.6'/>" TURN) GREY("0.7") "</shape>"
+			 "<shape type='sphere'>" AT("<scale value='0.1'/><translate x='-0.5' y='1.1'/>" TURN)
+				"<emitter type='area'><rgb name='radiance' value='20'/></emitter></shape>"
+			 "<shape type='cube'>" AT("<scale value='0.4'/><rotate y='1' angle='20'/><translate x='0.7' y='0.5'/>"
+				TURN) ROUGH("1.33") SCATTERS("interior", "1,2,4", "1,0.95,0.9",
+				SGGX("<volume type='constvolume' name='S'><string name='value' value='.8,.3,.5,.2,-.1,.1'/>"
+				"</volume>")) "</shape>"
+			 "<shape type='rectangle'>" AT("<scale value='0.4'/><rotate x='1' angle='90'/><translate y='2.4'/>" TURN)
+			 "<emitter type='area'><rgb name='radiance' value='5'/></emitter></shape></scene>");
+	const struct memory_file files[] = {{"s.xml", xml, (size_t)n}, {"puffs.vol", grid.bytes, grid.size},
+					    {"flakes.vol", matrices.bytes, matrices.size}, {NULL, NULL, 0}};
+	return world_of_files(32, 32, files);
+}
+
 /* A lamp in a cloud that says something else of what is around it; and a lamp outside, from which light enters the cloud
  * through a face that states haze there. Most light sub-paths are in other media than the camera's. */
 static struct world *media_that_do_not_fit(const struct agree_case *k)
@@ -549,6 +584,7 @@ const struct agree_case agree_cases[] = {
 	{"absorbing media", "glass and water in haze", absorbing_media, 0.3, 0, 8, 2048, 1024, ALL, 0.07},
 	{"absorbing media", "that vary", uneven_media, 1, 0, 8, 1024, 1024, ALL, 0.02},
 	{"scattering media", "that vary", uneven_media, 0, 0, 10, 1024, 512, {"bdpt", "pssmlt", "hslt", "erpt"}, 0.03},
+	{"scattering media", "of flakes", flaky_media, 0, 0, 10, 1024, 512, {"bdpt", "pssmlt", "hslt", "erpt"}, 0.03},
 	{"scattering media", "a cloud and milk", scattering_media, 0, 0, 10, 1024, 512, {"bdpt", "pssmlt", "hslt", "erpt"}, 0.03},
 	{"scattering media", "a cloud and milk in fog", scattering_media, 0.2, 0, 10, 4096, 2048, {"bdpt", "pssmlt", "hslt", "erpt"}, 0.04},
 	{"scattering media", "that do not fit together", media_that_do_not_fit, 0, 0, 6, 1024, 1024,

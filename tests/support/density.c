@@ -60,12 +60,12 @@ static double per_area(const struct path_vertex *at, const struct path_vertex *t
 	return fabs(vec3_dot(to->x.ng, towards(at, to))) / vec3_dot(d, d);
 }
 
-/* By how much a channel of the grid counts in sigma_t; of a medium that is the same everywhere, sigma_t. */
-static double coefficient(const struct path_context *c, int channel, int lane)
+/* By how much a channel of the grid counts in sigma_t along d; of a medium that is the same everywhere, sigma_t. */
+static double coefficient(const struct path_context *c, vec3 d, int channel, int lane)
 {
 	const struct medium *m = &c->w->media[0];
 	if (!m->first.grid)
-		return medium_extinction(m, (vec3){0, 0, 0}, &c->wl).v[lane];
+		return medium_extinction(m, (vec3){0, 0, 0}, d, &c->wl).v[lane];
 	if (m->first.grid->channels == 1)
 		return m->per_length;
 	double sum = 0, own = 0;
@@ -78,15 +78,15 @@ static double coefficient(const struct path_context *c, int channel, int lane)
 }
 
 /* Sigma_t of the only medium there is, which is everywhere. */
-static double sigma_at(const struct path_context *c, const struct path_vertex *v, int lane)
+static double sigma_at(const struct path_context *c, const struct path_vertex *v, vec3 d, int lane)
 {
 	const struct grid *g = c->w->media[0].first.grid;
 	double x[3], sum = 0;
 	if (!g)
-		return coefficient(c, 0, lane);
+		return coefficient(c, d, 0, lane);
 	slow_grid_cells(g, &(struct grid_ray){v->x.p, {0, 0, 0}, 0, 0}, 0, x);
 	for (int k = 0; k < g->channels && slow_grid_has(g, v->x.p); k++)
-		sum += coefficient(c, k, lane) * slow_grid_value(g, x, k);
+		sum += coefficient(c, d, k, lane) * slow_grid_value(g, x, k);
 	return sum;
 }
 
@@ -104,7 +104,7 @@ static spectrum depth_between(const struct path_context *c, const struct path_ve
 	for (int k = 0; k < (g ? g->channels : 1); k++) {
 		double along = g ? slow_grid_integral(g, &r, k) : length - t_min;
 		for (int i = 0; i < SPECTRUM_LANES; i++)
-			depth.v[i] += coefficient(c, k, i) * along;
+			depth.v[i] += coefficient(c, r.d, k, i) * along;
 	}
 	return depth;
 }
@@ -117,7 +117,7 @@ static double by_distance(const struct path_context *c, const struct path_vertex
 		return 1;
 	spectrum depth = depth_between(c, at, to);
 	for (int i = 0; i < SPECTRUM_LANES; i++)
-		sum += exp(-depth.v[i]) * (to->kind == VERTEX_MEDIUM ? sigma_at(c, to, i) : 1);
+		sum += exp(-depth.v[i]) * (to->kind == VERTEX_MEDIUM ? sigma_at(c, to, towards(at, to), i) : 1);
 	return sum / SPECTRUM_LANES;
 }
 
@@ -300,7 +300,7 @@ static double scatter(const struct path_context *c, const struct path_vertex *ca
 		      const struct path_vertex *light)
 {
 	if (at->kind == VERTEX_MEDIUM)
-		return medium_scattering(&c->w->media[0], at->x.p, &c->wl).v[0] *
+		return medium_scattering(&c->w->media[0], at->x.p, towards(at, camera), &c->wl).v[0] *
 		       phase_eval(&c->w->media[0].phase, at->x.p, towards(at, camera), towards(at, light));
 	if (at->delta) {
 		struct bsdf_sample s = specular_lobe(c, camera, at, light, TRANSPORT_RADIANCE);
@@ -407,7 +407,7 @@ static double technique(const struct path_context *c, const struct route *r, uns
 static struct path_edge edge_between(const struct path_context *c, const struct path_vertex *a,
 				     const struct path_vertex *b)
 {
-	struct path_edge e = {.medium = 1, .before = 1, .fits = true};
+	struct path_edge e = {.medium = 1, .before = 1, .fits = true, .d = towards(a, b)};
 	spectrum depth = depth_between(c, a, b);
 	for (int i = 0; i < SPECTRUM_LANES; i++)
 		e.free.v[i] = exp(-depth.v[i]);

@@ -8,6 +8,7 @@
 #include "worker/render/medium/medium.h"
 
 #include "worker/render/math/measured_media.h"
+#include "worker/render/medium/flakes.h"
 
 #include <string.h>
 
@@ -137,7 +138,10 @@ int medium_create(struct medium *m, const struct scene_node *n, const struct vol
 		rc = read_forward(m, n, build, e);
 	if (rc)
 		return rc;
-	rc = phase_create(&m->phase, node_child(n, PLUGIN_PHASE, 0), build, e);
+	const struct scene_node *phase = node_child(n, PLUGIN_PHASE, 0);
+	rc = phase_create(&m->phase, phase, build, e);
+	if (!rc && m->phase.flakes && m->phase.flakes->uneven)
+		rc = volume_by_area(&m->first, m->phase.flakes->grid, phase, build, e);
 	if (rc)
 		return rc;
 	bool first = volume_max(&m->first) > 0, second = volume_max(&m->second) > 0,
@@ -182,21 +186,24 @@ static spectrum extinction(const struct medium *m, spectrum first, const struct 
 	return sigma_t;
 }
 
-spectrum medium_scattering(const struct medium *m, vec3 p, const struct wavelengths *w)
+spectrum medium_scattering(const struct medium *m, vec3 p, vec3 d, const struct wavelengths *w)
 {
 	spectrum unused, sigma_s = coefficients(m, volume_at(&m->first, p, true, w), volume_at(&m->second, p, false, w),
 						&unused);
-	return spectrum_scale(1 - m->phase.absorbed, sigma_s);
+	return spectrum_scale((1 - m->phase.absorbed) * phase_area(&m->phase, p, d), sigma_s);
 }
 
-spectrum medium_extinction(const struct medium *m, vec3 p, const struct wavelengths *w)
+spectrum medium_extinction(const struct medium *m, vec3 p, vec3 d, const struct wavelengths *w)
 {
-	return extinction(m, volume_at(&m->first, p, true, w), w);
+	return spectrum_scale(phase_area(&m->phase, p, d), extinction(m, volume_at(&m->first, p, true, w), w));
 }
 
-struct medium_lanes medium_at(const struct medium *m, const struct wavelengths *w)
+struct medium_lanes medium_at(const struct medium *m, vec3 d, const struct wavelengths *w)
 {
-	spectrum unit = extinction(m, color_eval(&m->first.color, w), w);
+	static const vec3 anywhere = {0, 0, 0};
+	bool uneven = m->first.grid && m->first.grid->area; /* then the grid sees to the area */
+	spectrum unit = spectrum_scale(uneven ? 1 : phase_area(&m->phase, anywhere, d),
+				       extinction(m, color_eval(&m->first.color, w), w));
 	struct medium_lanes l = {.grid = m->first.grid, .channels = 1, .sigma_t = {unit}};
 	if (!l.grid)
 		return l;

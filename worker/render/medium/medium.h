@@ -33,19 +33,20 @@ int medium_light(struct medium *m, const struct scene_node *n, const struct volu
 
 bool medium_is_coloured(const struct medium *m); /* its coefficients vary with wavelength */
 
-/* Sigma_s at p, without what the phase function absorbs of it. 1 / length */
-spectrum medium_scattering(const struct medium *m, vec3 p, const struct wavelengths *w);
-spectrum medium_extinction(const struct medium *m, vec3 p, const struct wavelengths *w); /* sigma_t */
+/* Sigma_s at p of light that travels along d, a unit vector, or along -d, without what the phase function absorbs of
+ * it. 1 / length */
+spectrum medium_scattering(const struct medium *m, vec3 p, vec3 d, const struct wavelengths *w);
+spectrum medium_extinction(const struct medium *m, vec3 p, vec3 d, const struct wavelengths *w); /* sigma_t */
 
-/* A medium at some wavelengths. */
+/* A medium at some wavelengths, along a direction. */
 struct medium_lanes {
 	const struct grid *grid; /* NULL: sigma_t[0] everywhere */
 	int channels;
 	spectrum sigma_t[GRID_CHANNELS_MAX]; /* where that channel of the grid is 1 */
 };
 
-struct medium_lanes medium_at(const struct medium *m, const struct wavelengths *w);
-/* The optical depth of a part of a ray. */
+struct medium_lanes medium_at(const struct medium *m, vec3 d, const struct wavelengths *w);
+/* The optical depth of a part of a ray along d or -d. */
 spectrum medium_depth(const struct medium_lanes *m, const struct grid_ray *r);
 /* The t at which that reaches `least` at one wavelength, with the depth up to there; INFINITY, with all of it: not
  * before t1. */

@@ -27,11 +27,16 @@ int phase_create(struct phase *p, const struct scene_node *n, const struct volum
 
 double phase_eval(const struct phase *p, vec3 at, vec3 wo, vec3 wi)
 {
-	return p->ops->eval(p, at, -vec3_dot(wo, wi));
+	return p->ops->eval_flakes ? p->ops->eval_flakes(p, at, wo, wi) : p->ops->eval(p, at, -vec3_dot(wo, wi));
 }
 
 vec3 phase_sample(const struct phase *p, vec3 at, vec3 wo, const double u[2], double *pdf)
 {
+	if (p->ops->sample_flakes) {
+		vec3 wi = p->ops->sample_flakes(p, at, wo, u);
+		*pdf = p->ops->eval_flakes(p, at, wo, wi);
+		return wi;
+	}
 	struct frame straight = frame_around(vec3_neg(wo));
 	double cosine = fmin(fmax(p->ops->sample(p, at, u[0]), -1), 1), phi = 2 * M_PI * u[1];
 	double sine = sqrt((1 - cosine) * (1 + cosine));

@@ -43,7 +43,7 @@ spectrum path_transmittance(const struct world *w, const struct wavelengths *wl,
 	double distance2;
 	vec3 d = path_direction(from, to, &distance2);
 	bool endless = to->kind == VERTEX_INFINITE;
-	const struct medium_lanes m = medium_at(path_medium(w, medium), wl);
+	const struct medium_lanes m = medium_at(path_medium(w, medium), d, wl);
 	const struct grid_ray r = {from->x.p, d, path_ray_begin(w, from, d), endless ? INFINITY : sqrt(distance2)};
 	return spectrum_attenuation(medium_depth(&m, &r));
 }
@@ -84,7 +84,7 @@ static void walk_enter(const struct path_context *c, struct walk *k, uint32_t me
 	if (!medium)
 		return;
 	const struct medium *m = path_medium(c->w, medium);
-	k->lanes = medium_at(m, &c->wl);
+	k->lanes = medium_at(m, k->d, &c->wl);
 	k->shines = k->emission && m->shines ? m : NULL;
 }
 
@@ -100,7 +100,7 @@ static struct walk walk_begin(const struct path_context *c, const struct path_ve
 			 .events = spectrum_of(0),
 			 .emission = emission,
 			 .wl = &c->wl};
-	*edge = (struct path_edge){.before = medium, .fits = true};
+	*edge = (struct path_edge){.before = medium, .fits = true, .d = d};
 	walk_enter(c, &k, medium);
 	return k;
 }
@@ -271,7 +271,8 @@ double path_edge_pdf(const struct path_context *c, const struct path_edge *edge,
 {
 	if (to->kind != VERTEX_MEDIUM)
 		return spectrum_mean(edge->free);
-	return spectrum_mean(spectrum_mul(medium_extinction(path_medium(c->w, medium), to->x.p, &c->wl), edge->free));
+	const struct medium *m = path_medium(c->w, medium);
+	return spectrum_mean(spectrum_mul(medium_extinction(m, to->x.p, edge->d, &c->wl), edge->free));
 }
 
 void path_travel(const struct path_context *c, struct path_vertex *to, spectrum left)
@@ -285,5 +286,5 @@ spectrum path_scatter_in_medium(const struct world *w, const struct wavelengths 
 				vec3 wo, vec3 wi)
 {
 	const struct medium *m = path_medium(w, v->edge.medium);
-	return spectrum_scale(phase_eval(&m->phase, v->x.p, wo, wi), medium_scattering(m, v->x.p, wl));
+	return spectrum_scale(phase_eval(&m->phase, v->x.p, wo, wi), medium_scattering(m, v->x.p, wo, wl));
 }

@@ -149,8 +149,8 @@ static bool depart_in_medium(const struct path_context *c, const struct path_ver
 	const struct medium *m = path_medium(c->w, v->edge.medium);
 	*out = (struct departure){.eta = 1};
 	out->wi = phase_sample(&m->phase, v->x.p, v->to_prev, u, &out->pdf);
-	out->pdf_rev = out->pdf;
-	out->beta = spectrum_mul(v->beta, medium_scattering(m, v->x.p, &c->wl));
+	out->pdf_rev = m->phase.ops->eval_flakes ? phase_eval(&m->phase, v->x.p, out->wi, v->to_prev) : out->pdf;
+	out->beta = spectrum_mul(v->beta, medium_scattering(m, v->x.p, v->to_prev, &c->wl));
 	return out->pdf > 0;
 }
 

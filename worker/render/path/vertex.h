@@ -30,6 +30,7 @@ struct path_edge {
 	uint32_t before; /* at the vertex before */
 	bool fits;	 /* each face on the way states the medium that it is reached through */
 	spectrum free;	 /* exp(-optical depth), without that of media that only absorb */
+	vec3 d;		 /* the unit direction along it, one way or the other */
 };
 
 struct path_vertex {

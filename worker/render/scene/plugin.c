@@ -127,7 +127,6 @@ static const struct {
 	{PLUGIN_MEDIUM, "homogeneous"},
 	{PLUGIN_PHASE, "kkay"},
 	{PLUGIN_PHASE, "microflake"},
-	{PLUGIN_PHASE, "sggx"},
 	{PLUGIN_VOLUME, "hgridvolume"},
 	{PLUGIN_VOLUME, "volcache"},
 };

@@ -296,7 +296,7 @@ static int make_mesh(const struct surface *s, bool smooth, struct arena *arena, 
 static int read_field(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 		      struct grid_file *grid, struct error *e)
 {
-	int rc = grid_file_read(n, assets, false, arena, grid, e);
+	int rc = grid_file_read(n, assets, 1, arena, grid, e);
 	for (int i = 0; i < 3 && !rc; i++)
 		if (grid->size[i] < 2)
 			rc = node_error(n, e, ERANGE, "%s: %u values along %c; 2 to %d are supported",

@@ -31,6 +31,10 @@ struct grid {
 				   whole numbers */
 	enum grid_outside outside;
 	const unsigned char *full; /* of each brick: whether any value counts in it */
+	/* NULL, or two grids of three channels with the same points, a symmetric matrix: xx yy zz, xy xz yz. Then
+	 * values count sqrt(d . matrix d) times along a ray, though not in grid_at. Integrals are no longer exact:
+	 * Gauss's rule with eight points is used in each cell. */
+	const struct grid *area;
 };
 
 #define GRID_CELL_MAX 1e9

@@ -19,19 +19,22 @@
 enum { VERSION = 3, FLOATS = 1, BYTES = 3, HEAD = 4 + 4 * 5 + 4 * 6, TICK_INTERVAL = 1 << 16 };
 
 /* *count: of all values. */
-static int read_head(const unsigned char *p, size_t size, const struct scene_node *n, const char *name, bool three,
+static int read_head(const unsigned char *p, size_t size, const struct scene_node *n, const char *name, uint32_t most,
 		     struct grid_file *out, uint64_t *count, struct error *e)
 {
 	if (size < HEAD || memcmp(p, "VOL", 3) != 0)
 		return node_error(n, e, EINVAL, "%s: this is not a grid of numbers (.vol)", name);
 	uint32_t type = get32(p + 4);
 	out->channels = get32(p + 20);
-	if (p[3] != VERSION || (type != FLOATS && type != BYTES) ||
-	    !(out->channels == 1 || (three && out->channels == 3)))
+	bool fits = out->channels == most || (most == 3 && out->channels == 1);
+	if (p[3] != VERSION || (type != FLOATS && type != BYTES) || !fits)
 		return node_error(n, e, ENOTSUP,
 				  "%s: version %u, type %u, %u channels; supported are version 3, types 1 (floats) and "
-				  "3 (bytes), 1 channel%s",
-				  name, p[3], type, out->channels, three ? " or 3" : "");
+				  "3 (bytes), %s",
+				  name, p[3], type, out->channels,
+				  most == 1   ? "1 channel"
+				  : most == 3 ? "1 channel or 3"
+					      : "6 channels");
 	*count = out->channels;
 	for (int i = 0; i < 3; i++) {
 		out->size[i] = get32(p + 8 + 4 * i);
@@ -47,11 +50,11 @@ static int read_head(const unsigned char *p, size_t size, const struct scene_nod
 	return 0;
 }
 
-static int read_grid(const unsigned char *p, size_t size, const struct scene_node *n, const char *name, bool three,
+static int read_grid(const unsigned char *p, size_t size, const struct scene_node *n, const char *name, uint32_t most,
 		     struct arena *arena, struct grid_file *out, struct error *e)
 {
 	uint64_t count = 0;
-	int rc = read_head(p, size, n, name, three, out, &count, e);
+	int rc = read_head(p, size, n, name, most, out, &count, e);
 	if (rc)
 		return rc;
 	bool floats = get32(p + 4) == FLOATS;
@@ -72,7 +75,7 @@ static int read_grid(const unsigned char *p, size_t size, const struct scene_nod
 	return 0;
 }
 
-int grid_file_read(const struct scene_node *n, const struct asset_source *assets, bool three, struct arena *arena,
+int grid_file_read(const struct scene_node *n, const struct asset_source *assets, uint32_t most, struct arena *arena,
 		   struct grid_file *out, struct error *e)
 {
 	struct asset_range a;
@@ -80,7 +83,7 @@ int grid_file_read(const struct scene_node *n, const struct asset_source *assets
 	int rc = asset_part_open(&a, n, assets, e);
 	if (rc)
 		return rc;
-	rc = read_grid(a.bytes, a.size, n, node_string(n, "filename", ""), three, arena, out, e);
+	rc = read_grid(a.bytes, a.size, n, node_string(n, "filename", ""), most, arena, out, e);
 	asset_range_close(&a, assets);
 	return rc;
 }
@@ -109,7 +112,7 @@ int grid_file_share(struct grid_cache *cache, const struct scene_node *n, const 
 			*out = entry->file;
 			return 0;
 		}
-	int rc = grid_file_read(n, assets, true, arena, out, e);
+	int rc = grid_file_read(n, assets, 3, arena, out, e);
 	if (rc)
 		return rc;
 	const struct grid g = {.size = {(int)out->size[0], (int)out->size[1], (int)out->size[2]},

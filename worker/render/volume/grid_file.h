@@ -23,11 +23,11 @@ struct grid_cache {
 	struct grid_entry *first[GRID_LISTS];
 };
 
-/* The file that a node names, of one channel or, if `three`, of one or three. -ENOENT, -EINVAL, -ENOTSUP, -ERANGE,
- * -ENOMEM. */
-int grid_file_read(const struct scene_node *n, const struct asset_source *assets, bool three, struct arena *arena,
+/* The file that a node names, of one channel, with `most` 3 of one or three, with 6 of six. -ENOENT, -EINVAL,
+ * -ENOTSUP, -ERANGE, -ENOMEM. */
+int grid_file_read(const struct scene_node *n, const struct asset_source *assets, uint32_t most, struct arena *arena,
 		   struct grid_file *out, struct error *e);
-/* The same with `three`, from the cache if it is there. The arena must outlive the cache. */
+/* The same with 3, from the cache if it is there. The arena must outlive the cache. */
 int grid_file_share(struct grid_cache *cache, const struct scene_node *n, const struct asset_source *assets,
 		    struct arena *arena, struct grid_file *out, struct error *e);
 

@@ -18,7 +18,7 @@
 #define LARGEST 1e30
 
 const struct plugin_decl volume_decls[] = {
-	PLUGIN(VOLUME, "constvolume", {"value", VALUE_COLOR, PARAM_UNDERSTOOD, 0, LARGEST, NULL},
+	PLUGIN(VOLUME, "constvolume", {"value", VALUE_COLOR | VALUE_STRING, PARAM_UNDERSTOOD, 0, LARGEST, NULL},
 	       {"to_world", UNDERSTOOD(VALUE_TRANSFORM)}),
 	PLUGIN(VOLUME, "gridvolume", {"filename", UNDERSTOOD(VALUE_STRING)}, {"to_world", UNDERSTOOD(VALUE_TRANSFORM)},
 	       {"use_grid_bbox", UNDERSTOOD(VALUE_BOOL | VALUE_OF_3)},
@@ -145,15 +145,17 @@ static enum grid_outside outside_of(const struct scene_node *n, bool dialect_3)
 	return strcmp(mode, "repeat") == 0 ? GRID_REPEAT : strcmp(mode, "mirror") == 0 ? GRID_MIRROR : GRID_CLAMP;
 }
 
-/* A copy of `made`, with its place. */
-static int add_grid(struct volume *v, const struct grid *made, const struct scene_node *n, double box[2][3],
-		    const struct volume_build *b, struct error *e)
+int volume_grid(struct grid *g, const struct scene_node *n, const struct grid_file *f, const struct volume_build *b,
+		struct error *e)
 {
-	struct grid *g = arena_alloc(b->arena, 1, sizeof *g);
-	if (!g)
-		return node_error(n, e, ENOMEM, "out of memory");
-	*g = *made;
-	v->grid = g;
+	double box[2][3];
+	*g = (struct grid){.size = {(int)f->size[0], (int)f->size[1], (int)f->size[2]},
+			   .channels = (int)f->channels,
+			   .value = f->value,
+			   .full = f->full,
+			   .nearest = strcmp(node_string(n, "filter_type", "trilinear"), "nearest") == 0,
+			   .outside = outside_of(n, b->dialect_3)};
+	box_of(n, f, b->dialect_3, box);
 	return place_grid(g, n, box, b, e);
 }
 
@@ -161,7 +163,6 @@ static int read_grid(struct volume *v, const struct scene_node *n, enum color_ro
 		     struct error *e)
 {
 	struct grid_file f;
-	double box[2][3];
 	int rc = grid_file_share(b->cache, n, b->assets, b->arena, &f, e);
 	if (!rc)
 		rc = check_values(n, &f, role, e);
@@ -174,16 +175,13 @@ static int read_grid(struct volume *v, const struct scene_node *n, enum color_ro
 		const double rgb[3] = {k == 0, k == 1, k == 2};
 		rc = color_from_rgb(rgb, COLOR_REFLECTANCE, &v->primary[k]);
 	}
-	const struct grid made = {.size = {(int)f.size[0], (int)f.size[1], (int)f.size[2]},
-				  .channels = (int)f.channels,
-				  .value = f.value,
-				  .full = f.full,
-				  .nearest = strcmp(node_string(n, "filter_type", "trilinear"), "nearest") == 0,
-				  .outside = outside_of(n, b->dialect_3)};
-	box_of(n, &f, b->dialect_3, box);
+	struct grid *g = arena_alloc(b->arena, 1, sizeof *g);
+	if (!rc && !g)
+		rc = node_error(n, e, ENOMEM, "out of memory");
 	if (!rc)
-		rc = add_grid(v, &made, n, box, b, e);
-	if (!rc && v->grid->turned && role != COLOR_REFLECTANCE && made.outside != GRID_CLAMP)
+		rc = volume_grid(g, n, &f, b, e);
+	v->grid = g;
+	if (!rc && g->turned && role != COLOR_REFLECTANCE && g->outside != GRID_CLAMP)
 		rc = node_error(n, e, ENOTSUP, "a density that is turned cannot repeat itself (wrap_mode)");
 	return rc;
 }
@@ -202,8 +200,13 @@ static const struct grid one_cell = {.size = {1, 1, 1},
 static int add_cube(struct volume *v, const struct scene_node *n, const struct volume_build *b, struct error *e)
 {
 	double unit[2][3] = {{0, 0, 0}, {1, 1, 1}};
+	struct grid *g = arena_alloc(b->arena, 1, sizeof *g);
+	if (!g)
+		return node_error(n, e, ENOMEM, "out of memory");
+	*g = one_cell;
 	v->largest = 1;
-	return add_grid(v, &one_cell, n, unit, b, e);
+	v->grid = g;
+	return place_grid(g, n, unit, b, e);
 }
 
 int volume_from_node(struct volume *v, const struct scene_node *n, const char *name, double fallback,
@@ -264,6 +267,56 @@ int volume_cover(struct volume *v, const struct volume *other, const struct scen
 	*g = *v->grid;
 	v->grid = g;
 	set_box(g, least, most);
+	return 0;
+}
+
+static bool same_points(const struct grid *a, const struct grid *b)
+{
+	bool same = a->nearest == b->nearest && a->outside == b->outside;
+	for (int i = 0; i < 3; i++)
+		same = same && a->size[i] == b->size[i];
+	return same && memcmp(&a->to_cells, &b->to_cells, sizeof a->to_cells) == 0;
+}
+
+/* Ones at the points of another grid, within the box of v's. */
+static int add_ones(struct grid *g, const struct grid *at, const struct grid *box, const struct volume_build *b)
+{
+	vec3 least, most;
+	size_t count = (size_t)at->size[0] * (size_t)at->size[1] * (size_t)at->size[2];
+	float *value = arena_alloc(b->arena, count, sizeof *value);
+	*g = *at;
+	g->channels = 1;
+	g->value = value;
+	unsigned char *bricks = arena_alloc(b->arena, grid_bricks(g), 1);
+	g->full = bricks;
+	if (!value || !bricks || !box_in_world(box, &least, &most))
+		return -ENOMEM;
+	for (size_t i = 0; i < count; i++)
+		value[i] = 1;
+	memset(bricks, 1, grid_bricks(g));
+	set_box(g, box->turned ? box->least : least, box->turned ? box->most : most);
+	return 0;
+}
+
+int volume_by_area(struct volume *v, const struct grid area[2], const struct scene_node *n,
+		   const struct volume_build *b, struct error *e)
+{
+	bool cube = v->grid && v->grid->value == &one;
+	struct grid *g = arena_alloc(b->arena, 1, sizeof *g);
+	if (!g)
+		return node_error(n, e, ENOMEM, "out of memory");
+	if (!v->grid)
+		return node_error(n, e, ENOTSUP, "S differs from place to place: needs a heterogeneous medium");
+	if (cube ? area->outside != GRID_CLAMP : !same_points(v->grid, area))
+		return node_error(n, e, ENOTSUP,
+				  "the grids of sigma_t and of S must have the same size, to_world, filter_type and "
+				  "wrap_mode");
+	if (cube && add_ones(g, area, v->grid, b))
+		return node_error(n, e, ENOMEM, "out of memory");
+	if (!cube)
+		*g = *v->grid;
+	g->area = area;
+	v->grid = g;
 	return 0;
 }
 

@@ -42,6 +42,16 @@ int volume_from_node(struct volume *v, const struct scene_node *n, const char *n
 int volume_cover(struct volume *v, const struct volume *other, const struct scene_node *n,
 		 const struct volume_build *build, struct error *e);
 
+/* The grid of a node's file, with its place. */
+struct grid_file;
+int volume_grid(struct grid *g, const struct scene_node *n, const struct grid_file *f, const struct volume_build *build,
+		struct error *e);
+
+/* Lets the numbers of v count by the area of two grids (struct grid.area) that outlive it. n: what is to blame.
+ * -ENOTSUP: v has no grid, or one with other points; a box of one number takes over theirs. */
+int volume_by_area(struct volume *v, const struct grid area[2], const struct scene_node *n,
+		   const struct volume_build *build, struct error *e);
+
 static inline bool volume_varies(const struct volume *v)
 {
 	return v->grid;

@@ -18,11 +18,12 @@
 #include <cmocka.h>
 
 static const vec3 nowhere = {0, 0, 0}; /* in particular */
+static const vec3 along_z = {0, 0, 1};
 
 static spectrum let_through(const struct medium *m, double distance, const struct wavelengths *w)
 {
-	const struct medium_lanes lanes = medium_at(m, w);
-	return spectrum_attenuation(medium_depth(&lanes, &(struct grid_ray){{0, 0, 0}, {0, 0, 1}, 0, distance}));
+	const struct medium_lanes lanes = medium_at(m, along_z, w);
+	return spectrum_attenuation(medium_depth(&lanes, &(struct grid_ray){nowhere, along_z, 0, distance}));
 }
 
 static double through(double sigma, double per_length, double distance)
@@ -30,7 +31,8 @@ static double through(double sigma, double per_length, double distance)
 	const struct medium m = {.first.color = color_constant(sigma),
 				 .second.color = color_constant(0),
 				 .absorbs = true,
-				 .per_length = per_length};
+				 .per_length = per_length,
+				 .phase.ops = phase_registry[0]};
 	const struct wavelengths w = wavelengths_sample(0.3);
 	spectrum t = let_through(&m, distance, &w);
 	for (int i = 1; i < SPECTRUM_LANES; i++)
@@ -76,7 +78,8 @@ static struct medium coloured(bool by_albedo)
 			       .by_albedo = by_albedo,
 			       .absorbs = true,
 			       .scatters = true,
-			       .per_length = 2};
+			       .per_length = 2,
+			       .phase.ops = phase_registry[0]};
 }
 
 static void test_coefficients(void **state)
@@ -84,7 +87,7 @@ static void test_coefficients(void **state)
 	(void)state;
 	for (int by_albedo = 0; by_albedo <= 1; by_albedo++) {
 		struct medium m = coloured(by_albedo);
-		spectrum s = medium_scattering(&m, nowhere, &four), left = let_through(&m, 0.3, &four);
+		spectrum s = medium_scattering(&m, nowhere, along_z, &four), left = let_through(&m, 0.3, &four);
 		for (int i = 0; i < SPECTRUM_LANES; i++) {
 			assert_true(fabs(s.v[i] - 2 * sigma_s[i]) < 1e-12);
 			assert_true(fabs(left.v[i] - exp(-0.6 * sigma_t[i])) < 1e-12);
@@ -95,7 +98,7 @@ static void test_coefficients(void **state)
 			assert_true(fabs(left.v[i] - exp(-0.6 * sigma_s[i])) < 1e-12);
 		m.absorbs = true;
 		m.scatters = false;
-		assert_true(spectrum_is_zero(medium_scattering(&m, nowhere, &four)));
+		assert_true(spectrum_is_zero(medium_scattering(&m, nowhere, along_z, &four)));
 		left = let_through(&m, 0.3, &four);
 		for (int i = 0; i < SPECTRUM_LANES; i++)
 			assert_true(fabs(left.v[i] - exp(-0.6 * sigma_a[i])) < 1e-12);
@@ -119,8 +122,8 @@ static void check_rgb(const char *version, const char *inner, double red_s, doub
 {
 	struct world *w = world_with(version, inner);
 	const struct wavelengths rgb = {.rgb = true};
-	double s = medium_scattering(&w->media[0], nowhere, &rgb).v[0] * w->scale,
-	       t = medium_extinction(&w->media[0], nowhere, &rgb).v[0] * w->scale;
+	double s = medium_scattering(&w->media[0], nowhere, along_z, &rgb).v[0] * w->scale,
+	       t = medium_extinction(&w->media[0], nowhere, along_z, &rgb).v[0] * w->scale;
 	if (fabs(s - red_s) > 1e-9 || fabs(t - red_t) > 1e-9)
 		fail_msg("%s: sigma_s %g and sigma_t %g, not %g and %g", inner, s, t, red_s, red_t);
 	world_free(w);

@@ -228,23 +228,28 @@ static void test_camera_in_medium(void **state)
 	"<integrator type='volpath'><integer name='max_depth' value='" depth \
 	"'/><integer name='rr_depth' value='128'/></integrator>"
 
+#define FORWARDS "<phase type='hg'><float name='g' value='0.6'/></phase>"
+#define FLAKES \
+	"<phase type='sggx'><volume type='constvolume' name='S'><string name='value' value='.5,.2,.9,.1,.3,-.1'/></volume></phase>"
+
 /* Where nothing is absorbed, everything looks like the sky. */
 static void test_white_media(void **state)
 {
 	(void)state;
 	static const char *const boundary[] = {"<bsdf type='null'/>", "<bsdf type='dielectric'/>"};
-	for (int i = 0; i < 2; i++)
+	static const char *const names[] = {"white fog", "milk in glass", "white flakes in glass"};
+	static const char *const phases[] = {FORWARDS, FORWARDS, FLAKES};
+	for (int i = 0; i < 3; i++)
 		check_constant(
-			i ? "milk in glass" : "white fog",
+			names[i],
 			world_of_text(
 				16, 16,
 				WITHOUT_ROULETTE("128") SKY
 				"<sensor type='perspective'><float name='fov' value='25'/><transform name='to_world'><lookat "
 				"origin='0,0,4' target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'><rfilter type='box'/>"
 				"</film></sensor><shape type='sphere'>%s<medium type='homogeneous' name='interior'>"
-				"<float name='sigma_s' value='2'/><phase type='hg'><float name='g' value='0.6'/></phase>"
-				"</medium></shape>",
-				boundary[i]),
+				"<float name='sigma_s' value='2'/>%s</medium></shape>",
+				boundary[i > 0], phases[i]),
 			0.7, i ? (struct effort){320, 0, 0} : (struct effort){3072, 0, 0});
 }
 
@@ -332,7 +337,15 @@ static double strata(double x, double y, double z, uint32_t channel)
 	return z == 0 ? 0.3 : z < 0.4 ? 2.9 : z < 0.7 ? 0 : 0.8;
 }
 
-/* A beam at an angle, scattered once by Rayleigh's function: only the optical depth counts, not where it comes from. */
+/* From (-0.8, 0, 0.6) to z: by the areas seen and D of the half vector, with the inverse of the matrix FLAKES. */
+static double flakes_once(double albedo)
+{
+	const double x = -0.8 / sqrt(3.2), z = 1.6 / sqrt(3.2), det = .5 * .17 - .1 * .12 - .3 * .07;
+	double form = (x * x * .17 + z * z * .09 - 2 * x * z * .07) / det, along = sqrt(.9) + sqrt(.356) / 0.6;
+	return albedo / (4 * M_PI * sqrt(det) * form * form) * (1 - exp(-2 * along)) / along;
+}
+
+/* A beam at an angle, scattered once: only the optical depth counts, not where it comes from. */
 static void test_beam_in_layer(void **state)
 {
 	(void)state;
@@ -344,9 +357,8 @@ static void test_beam_in_layer(void **state)
 #define STRATA                                                                                             \
 	"<volume name='sigma_t' type='gridvolume'><string name='filename' value='strata.vol'/><transform " \
 	"name='to_world'><translate x='-.5' y='-.5' z='-1'/><scale x='80' y='80' z='2'/></transform></volume>"
-	static const char even[] = BEAM_IN(LAYER("1", "0.6", "<phase type='rayleigh'/>")),
-			  layered[] =
-				  BEAM_IN(LAYER_OF("heterogeneous", "1", STRATA, "0.6", "<phase type='rayleigh'/>"));
+	static const char layered[] =
+		BEAM_IN(LAYER_OF("heterogeneous", "1", STRATA, "0.6", "<phase type='rayleigh'/>"));
 	/* Light goes on by -0.6; there the table has 1.2 / (6 * 2 pi). */
 	static const char mixed[] = BEAM_IN(
 		LAYER("1", "0.6",
@@ -354,15 +366,16 @@ static void test_beam_in_layer(void **state)
 		      "type='tabphase'><string name='values' value='0,3,6'/></phase></phase>"));
 	static struct vol grid;
 	vol_make(&grid, (const uint32_t[3]){1, 1, 4}, 1, strata);
-	double cosine = 0.6, along = 1 + 1 / cosine, phase = 3 / (16 * M_PI) * (1 + cosine * cosine);
-	for (int i = 0; i < 3; i++) {
-		const char *xml = i == 0 ? even : i == 1 ? layered : mixed;
-		double value = i == 2 ? 0.2 * phase + 0.5 * 1.2 / (6 * 2 * M_PI) : phase;
-		const struct memory_file files[] = {
-			{"beam.xml", xml, strlen(xml)}, {"strata.vol", grid.bytes, grid.size}, {NULL, NULL, 0}};
-		static const char *const names[] = {"beam in a layer", "beam in strata", "beam in a mixture"};
-		check_depths(names[i], world_of_files(16, 16, files), 2,
-			     5 * 0.6 * value * (1 - exp(-2 * along)) / along, (struct effort){512, 512, 0});
+	double along = 1 + 1 / 0.6, phase = 3 / (16 * M_PI) * 1.36, once = 0.6 * (1 - exp(-2 * along)) / along;
+	static const char *const names[] = {"beam in a layer", "beam in strata", "beam in a mixture", "beam in flakes"},
+				 *const scenes[] = {BEAM_IN(LAYER("1", "0.6", "<phase type='rayleigh'/>")), layered,
+						    mixed, BEAM_IN(LAYER("1", "0.6", FLAKES))};
+	const double share[] = {once * phase, once * phase, once * (0.2 * phase + 0.1 / (2 * M_PI)), flakes_once(0.6)};
+	for (int i = 0; i < 4; i++) {
+		const struct memory_file files[] = {{"beam.xml", scenes[i], strlen(scenes[i])},
+						    {"strata.vol", grid.bytes, grid.size},
+						    {NULL, NULL, 0}};
+		check_depths(names[i], world_of_files(16, 16, files), 2, 5 * share[i], (struct effort){512, 512, 0});
 	}
 }
 

@@ -263,6 +263,23 @@ static void test_fog(void **state)
 	/* clang-format on */
 }
 
+/* Flakes that lie nearly flat, in which fog is three times as dense along one direction as along another. */
+static void test_flakes(void **state)
+{
+	(void)state;
+	/* clang-format off */
+	check_fog("fog of flakes",
+		"<medium type='homogeneous' id='fog'>"
+			"<rgb name='sigma_t' value='.4,.8,1.2'/>"
+			"<rgb name='albedo' value='.9,.8,.7'/>"
+			"<phase type='sggx'>"
+				"<volume type='constvolume' name='S'><string name='value' value='.4,1,.3,.2,-.1,.3'/></volume>"
+			"</phase>"
+		"</medium>",
+		NULL, 4000);
+	/* clang-format on */
+}
+
 static double puffs(double x, double y, double z, uint32_t channel)
 {
 	return 0.5 + 0.5 * sin(3 * x + channel) * cos(2 * y - channel) * sin(1 + 5 * z);
@@ -400,6 +417,7 @@ int main(void)
 		cmocka_unit_test(test_infinity),
 		cmocka_unit_test(test_passed),
 		cmocka_unit_test(test_blended_fog),
+		cmocka_unit_test(test_flakes),
 		cmocka_unit_test(test_fog),
 		cmocka_unit_test(test_puffs),
 		cmocka_unit_test(test_lens),

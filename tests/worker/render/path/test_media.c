@@ -57,7 +57,7 @@ static const vec3 down = {0, 0, -1};
 /* Of a medium that is the same everywhere. */
 static spectrum let_through(const struct medium *m, double distance, const struct wavelengths *w)
 {
-	spectrum t = medium_extinction(m, down, w);
+	spectrum t = medium_extinction(m, (vec3){0, 0, 0}, down, w);
 	for (int i = 0; i < SPECTRUM_LANES; i++)
 		t.v[i] = exp(-t.v[i] * distance);
 	return t;

@@ -21,6 +21,7 @@
 #include <cmocka.h>
 
 static struct vol grid, second;
+static const vec3 along_z = {0, 0, 1};
 
 static double numbers(double x, double y, double z, uint32_t channel)
 {
@@ -112,10 +113,10 @@ static void check_place(const struct place *t)
 			  t->low[2] + u[2] * (t->high[2] - t->low[2])};
 		p = vec3_scale(w->scale, vec3_sub(p, w->center));
 		double wanted = inside ? 2 * wanted_at(u, *t->version == '3', t->nearest) : 0,
-		       found = medium_extinction(&w->media[0], p, &wl).v[0] * w->scale;
+		       found = medium_extinction(&w->media[0], p, along_z, &wl).v[0] * w->scale;
 		if (fabs(found - wanted) > 1e-9)
 			fail_msg("%s %s: %g, not %g", t->version, t->params, found, wanted);
-		assert_true(fabs(medium_scattering(&w->media[0], p, &wl).v[0] * w->scale - wanted / 2) < 1e-9);
+		assert_true(fabs(medium_scattering(&w->media[0], p, along_z, &wl).v[0] * w->scale - wanted / 2) < 1e-9);
 	}
 	world_free(w);
 }
@@ -159,7 +160,7 @@ static void test_turned(void **state)
 			 old ? "density" : "sigma_t", 45 / acos(0));
 		struct world *w = world_with(old ? "0.6.0" : "3.0.0", inner);
 		const struct wavelengths wl = wavelengths_sample(0.3);
-		const struct medium_lanes lanes = medium_at(&w->media[0], &wl);
+		const struct medium_lanes lanes = medium_at(&w->media[0], along_z, &wl);
 		struct dice d = dice_of("turned grids");
 		unsigned beside = 0;
 		for (int round = 0; round < 500; round++) {
@@ -174,7 +175,7 @@ static void test_turned(void **state)
 			beside += in_box && !in_cube;
 			double wanted = (old ? in_cube : in_box) ? wanted_at(near, !old, false) : 0;
 			vec3 here = vec3_scale(w->scale, vec3_sub(p, w->center));
-			double found = medium_extinction(&w->media[0], here, &wl).v[0] * w->scale;
+			double found = medium_extinction(&w->media[0], here, along_z, &wl).v[0] * w->scale;
 			if (fabs(found - wanted) > 1e-9)
 				fail_msg("%d: %g at %g %g %g, not %g", old, found, p.x, p.y, p.z, wanted);
 			const struct grid_ray r = {here, {0, 0, 1}, 0, 1e-7};
@@ -215,10 +216,10 @@ static void test_outside(void **state)
 		const char *type = *cases[i].version == '0' ? "heterogeneous" : "homogeneous";
 		struct world *w = world_of_files(8, 8, scene_of(cases[i].version, type, inner));
 		vec3 p = vec3_scale(w->scale, vec3_sub((vec3){cases[i].u, 0.5, 0.5}, w->center));
-		double found = medium_scattering(&w->media[0], p, &wl).v[0] * w->scale / 3;
+		double found = medium_scattering(&w->media[0], p, along_z, &wl).v[0] * w->scale / 3;
 		if (fabs(found - cases[i].wanted) > 1e-9)
 			fail_msg("case %zu: %g, not %g", i, found, cases[i].wanted);
-		assert_true(fabs(medium_extinction(&w->media[0], p, &wl).v[0] * w->scale - 3) < 1e-9);
+		assert_true(fabs(medium_extinction(&w->media[0], p, along_z, &wl).v[0] * w->scale - 3) < 1e-9);
 		world_free(w);
 	}
 }
@@ -291,13 +292,14 @@ static void test_cube(void **state)
 	const struct wavelengths wl = wavelengths_sample(0.3);
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		struct world *w = world_with(cases[i].version, cases[i].inner);
-		const struct medium_lanes lanes = medium_at(&w->media[0], &wl);
+		const struct medium_lanes lanes = medium_at(&w->media[0], along_z, &wl);
 		double middle = cases[i].low + cases[i].size / 2;
 		for (double off = -0.85; off < 1; off += 0.2) {
 			bool in = cases[i].size == 0 || fabs(off) * cases[i].size < cases[i].size / 2;
 			vec3 p = vec3_scale(w->scale,
 					    vec3_sub((vec3){middle + off * cases[i].size, middle, middle}, w->center));
-			assert_true(fabs(medium_extinction(&w->media[0], p, &wl).v[2] * w->scale - in) < 1e-12);
+			assert_true(fabs(medium_extinction(&w->media[0], p, along_z, &wl).v[2] * w->scale - in) <
+				    1e-12);
 			double depth = medium_depth(&lanes, &(struct grid_ray){p, {0, 0, 1}, 0, 9 * w->scale}).v[1];
 			assert_true(fabs(depth - (cases[i].size == 0 ? 9 : in ? cases[i].size / 2 : 0)) < 1e-12);
 		}
@@ -314,8 +316,10 @@ static void check_same(const char *version, const char *a, const char *b)
 	for (int i = 0; i < 3; i++) {
 		const struct medium *m[2] = {&w[0]->media[0], &w[1]->media[0]};
 		vec3 p = vec3_scale(w[0]->scale, vec3_sub((vec3){0.1, 0.2, 0.3}, w[0]->center));
-		assert_true(medium_extinction(m[0], p, &rgb).v[i] == medium_extinction(m[1], p, &rgb).v[i]);
-		assert_true(medium_scattering(m[0], p, &rgb).v[i] == medium_scattering(m[1], p, &rgb).v[i]);
+		assert_true(medium_extinction(m[0], p, along_z, &rgb).v[i] ==
+			    medium_extinction(m[1], p, along_z, &rgb).v[i]);
+		assert_true(medium_scattering(m[0], p, along_z, &rgb).v[i] ==
+			    medium_scattering(m[1], p, along_z, &rgb).v[i]);
 	}
 	world_free(w[0]);
 	world_free(w[1]);
@@ -351,7 +355,7 @@ static void test_bytes(void **state)
 	for (int i = 0; i < 2; i++) {
 		vec3 p = vec3_scale(w->scale, vec3_sub((vec3){0.25 + 0.5 * i, 0.5, 0.5}, w->center));
 		double wanted = i ? 1 : 0.2;
-		assert_true(fabs(medium_extinction(&w->media[0], p, &wl).v[0] * w->scale - wanted) < 1e-7);
+		assert_true(fabs(medium_extinction(&w->media[0], p, along_z, &wl).v[0] * w->scale - wanted) < 1e-7);
 	}
 	world_free(w);
 }
@@ -469,9 +473,9 @@ static void test_effects(void **state)
 		worlds_effects = cases[i].effects;
 		struct world *w = world_with("3.0.0", GRID("sigma_t", "") "<float name='albedo' value='0.2'/>");
 		vec3 p = vec3_scale(w->scale, vec3_sub((vec3){0.4, 0.4, 0.4}, w->center));
-		const struct medium_lanes lanes = medium_at(&w->media[0], &wl);
+		const struct medium_lanes lanes = medium_at(&w->media[0], along_z, &wl);
 		const struct grid_ray r = {p, {0, 0, 1}, 0, 0.1 * w->scale};
-		double sigma = medium_extinction(&w->media[0], p, &wl).v[1];
+		double sigma = medium_extinction(&w->media[0], p, along_z, &wl).v[1];
 		assert_true(fabs(sigma * w->scale - cases[i].share * 0.3) < 1e-7);
 		assert_true(fabs(medium_depth(&lanes, &r).v[1] - sigma * r.t1) < 1e-12);
 		world_free(w);
@@ -487,7 +491,8 @@ static void test_effects(void **state)
 	grid.value[0] = 1;
 	vol_write(&grid);
 	struct world *white = world_of_files(8, 8, scene_of("3.0.0", "homogeneous", GRID("albedo", "")));
-	assert_true(fabs(medium_extinction(&white->media[0], (vec3){0, 0, 0}, &wl).v[0] * white->scale - 1) < 1e-12);
+	assert_true(fabs(medium_extinction(&white->media[0], (vec3){0, 0, 0}, along_z, &wl).v[0] * white->scale - 1) <
+		    1e-12);
 	world_free(white);
 	worlds_effects = cases[3].effects;
 	struct world *w = world_with("3.0.0", GRID("albedo", ""));

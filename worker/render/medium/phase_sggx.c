@@ -1,0 +1,100 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Microflakes that reflect like mirrors, of the SGGX distribution (Heitz, Dupuy, Crassin and Dachsbacher 2015, The SGGX
+ * Microflake Distribution). With the matrix S = L L^T, the flakes' area seen along w is sigma(w) = sqrt(w . S w), their
+ * distribution D(m) = 1 / (pi det L |L^-1 m|^4), and the phase function p(wo, wi) = D(h) / (4 sigma(wo)), h half way
+ * between both. Sigma(wo) p(wo, wi) = sigma(wi) p(wi, wo).
+ *
+ * The flakes are those of a sphere, whose normals n L takes to L n, with areas in proportion to |L n|: their area seen
+ * along w is the integral of max(0, w . L n) / pi, which is |L^T w|. So those that are visible from w are drawn as n
+ * with the density cos / pi around L^T w.
+ *
+ * Failures: those of flakes.h; a scene of 0.6. Where there are no flakes, densities are 0.
+ */
+#include "worker/render/math/frame.h"
+#include "worker/render/medium/flakes.h"
+#include "worker/render/medium/phase.h"
+
+#include <math.h>
+
+static int create(struct phase *p, const struct scene_node *n, const struct volume_build *build, struct error *e)
+{
+	struct flakes *f = arena_alloc(build->arena, 1, sizeof *f);
+	if (!f)
+		return node_error(n, e, ENOMEM, "out of memory");
+	p->flakes = f;
+	if (!build->dialect_3)
+		return node_error(n, e, ENOTSUP, "a scene of 0.6 has no \"sggx\"");
+	return flakes_create(f, n, build, e);
+}
+
+/* L, by Cholesky's method. */
+struct root {
+	double xx, yx, yy, zx, zy, zz;
+};
+
+/* false: there are no flakes at this place. */
+static bool root_at(const struct phase *p, vec3 at, struct root *l)
+{
+	double s[FLAKES_NUMBERS];
+	flakes_at(p->flakes, at, s);
+	if (!(s[0] + s[1] + s[2] > 1e-60))
+		return false;
+	l->xx = sqrt(s[0]);
+	l->yx = s[3] / l->xx;
+	l->zx = s[4] / l->xx;
+	l->yy = sqrt(s[1] - l->yx * l->yx);
+	l->zy = (s[5] - l->zx * l->yx) / l->yy;
+	l->zz = sqrt(s[2] - l->zx * l->zx - l->zy * l->zy);
+	return true;
+}
+
+static vec3 times_transposed(const struct root *l, vec3 w)
+{
+	return (vec3){l->xx * w.x + l->yx * w.y + l->zx * w.z, l->yy * w.y + l->zy * w.z, l->zz * w.z};
+}
+
+static double distribution(const struct root *l, vec3 m)
+{
+	double x = m.x / l->xx, y = (m.y - l->yx * x) / l->yy, z = (m.z - l->zx * x - l->zy * y) / l->zz,
+	       square = x * x + y * y + z * z;
+	return 1 / (M_PI * l->xx * l->yy * l->zz * square * square);
+}
+
+static double eval(const struct phase *p, vec3 at, vec3 wo, vec3 wi)
+{
+	struct root l;
+	vec3 h = vec3_add(wo, wi);
+	double length = vec3_length(h);
+	if (!root_at(p, at, &l))
+		return 0;
+	/* Of light that goes straight on, any flake along the ray. */
+	h = length > 0 ? vec3_scale(1 / length, h) : frame_around(wo).s;
+	return distribution(&l, h) / (4 * vec3_length(times_transposed(&l, wo)));
+}
+
+static vec3 sample(const struct phase *p, vec3 at, vec3 wo, const double u[2])
+{
+	struct root l;
+	if (!root_at(p, at, &l))
+		return vec3_neg(wo);
+	struct frame around = frame_around(vec3_normalize(times_transposed(&l, wo)));
+	double r = sqrt(u[0]), phi = 2 * M_PI * u[1];
+	vec3 n = frame_to_world(&around, (vec3){r * cos(phi), r * sin(phi), sqrt(1 - u[0])});
+	vec3 m = vec3_normalize((vec3){l.xx * n.x, l.yx * n.x + l.yy * n.y, l.zx * n.x + l.zy * n.y + l.zz * n.z});
+	return vec3_normalize(vec3_madd(vec3_neg(wo), 2 * vec3_dot(wo, m), m));
+}
+
+static double area(const struct phase *p, vec3 at, vec3 w)
+{
+	struct root l;
+	return root_at(p, at, &l) ? vec3_length(times_transposed(&l, w)) : 0;
+}
+
+const struct phase_ops phase_ops_sggx = {
+	.decl = PLUGIN(PHASE, "sggx", {"S", UNDERSTOOD(VALUE_NODE | VALUE_IN_SPACE)}),
+	.create = create,
+	.eval_flakes = eval,
+	.sample_flakes = sample,
+	.area = area,
+};
