@@ -6,15 +6,14 @@
  * Failures: out of memory aborts.
  */
 #include "tests/support/measured_file.h"
-
-#include "common/base/bytes.h"
+#include "tests/support/tensor_file.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define PI 3.14159265358979323846
-enum { WAVELENGTHS = 7, ARRAYS_MAX = 12, BYTES = 1, FLOATS = 10 };
+enum { WAVELENGTHS = 7 };
 
 double measured_tint(double nm)
 {
@@ -119,72 +118,39 @@ static void warp(const double *grid, int n, double u, double v, double *x, doubl
 
 /* ---- the arrays ---- */
 
-struct array {
-	const char *name;
-	unsigned type, dimensions;
-	uint64_t shape[5];
-	unsigned char *bytes;
-	size_t size;
-};
-
-struct file {
-	struct array array[ARRAYS_MAX];
-	size_t count;
-};
-
-static unsigned char *add(struct file *f, const char *name, unsigned type, unsigned dimensions, const int *shape)
-{
-	struct array *a = &f->array[f->count++];
-	*a = (struct array){.name = name, .type = type, .dimensions = dimensions, .size = type == FLOATS ? 4 : 1};
-	for (unsigned i = 0; i < dimensions; i++) {
-		a->shape[i] = (uint64_t)shape[i];
-		a->size *= (size_t)shape[i];
-	}
-	a->bytes = calloc(1, a->size);
-	if (!a->bytes)
-		abort();
-	return a->bytes;
-}
-
-static void put(unsigned char **at, double x)
-{
-	put_float(*at, (float)x);
-	*at += 4;
-}
-
 static double wavelength(const struct measured_kind *k, int i)
 {
 	static const double rgb[3] = {600, 550, 450};
 	return k->rgb ? rgb[i] : 340 + 90 * i;
 }
 
-static void add_axes(struct file *f, const struct measured_kind *k)
+static void add_axes(struct tensor_file *f, const struct measured_kind *k)
 {
-	unsigned char *at = add(f, "phi_i", FLOATS, 1, &k->azimuths);
+	unsigned char *at = tensor_file_add(f, "phi_i", TENSOR_FLOATS, 1, &k->azimuths);
 	for (int i = 0; i < k->azimuths; i++)
-		put(&at, phi_of(k, i));
-	at = add(f, "theta_i", FLOATS, 1, &k->elevations);
+		tensor_file_put(&at, phi_of(k, i));
+	at = tensor_file_add(f, "theta_i", TENSOR_FLOATS, 1, &k->elevations);
 	for (int i = 0; i < k->elevations; i++)
-		put(&at, measured_kind_theta(k, i));
-	add(f, "jacobian", BYTES, 1, (const int[]){1})[0] = !k->absolute;
-	add(f, "description", BYTES, 1, (const int[]){4});
+		tensor_file_put(&at, measured_kind_theta(k, i));
+	tensor_file_add(f, "jacobian", TENSOR_BYTES, 1, (const int[]){1})[0] = !k->absolute;
+	tensor_file_add(f, "description", TENSOR_BYTES, 1, (const int[]){4});
 	if (k->rgb)
 		return;
-	at = add(f, "wavelengths", FLOATS, 1, (const int[]){WAVELENGTHS});
+	at = tensor_file_add(f, "wavelengths", TENSOR_FLOATS, 1, (const int[]){WAVELENGTHS});
 	for (int i = 0; i < WAVELENGTHS; i++)
-		put(&at, wavelength(k, i));
+		tensor_file_put(&at, wavelength(k, i));
 }
 
-static void add_planes(struct file *f, const struct measured_kind *k)
+static void add_planes(struct tensor_file *f, const struct measured_kind *k)
 {
 	int n = k->fine;
-	unsigned char *ndf = add(f, "ndf", FLOATS, 2, (const int[]){n, n}),
-		      *sigma = add(f, "sigma", FLOATS, 2, (const int[]){n, n});
+	unsigned char *ndf = tensor_file_add(f, "ndf", TENSOR_FLOATS, 2, (const int[]){n, n}),
+		      *sigma = tensor_file_add(f, "sigma", TENSOR_FLOATS, 2, (const int[]){n, n});
 	for (int y = 0; y < n; y++)
 		for (int x = 0; x < n; x++) {
 			vec3 w = direction((double)x / (n - 1), (double)y / (n - 1));
-			put(&ndf, facets(k, w));
-			put(&sigma, shown(k, w));
+			tensor_file_put(&ndf, facets(k, w));
+			tensor_file_put(&sigma, shown(k, w));
 		}
 }
 
@@ -201,13 +167,14 @@ static void find_visible(const struct measured_kind *k, vec3 wo, double *grid)
 }
 
 /* Luminance differs from the colours, which it may: it is what samples follow. */
-static void add_slices(struct file *f, const struct measured_kind *k)
+static void add_slices(struct tensor_file *f, const struct measured_kind *k)
 {
 	int n = k->fine, side = k->side, channels = k->rgb ? 3 : WAVELENGTHS;
 	int p = k->azimuths, t = k->elevations;
-	unsigned char *vndf = add(f, "vndf", FLOATS, 4, (const int[]){p, t, n, n}),
-		      *luminance = add(f, "luminance", FLOATS, 4, (const int[]){p, t, side, side}),
-		      *color = add(f, k->rgb ? "rgb" : "spectra", FLOATS, 5, (const int[]){p, t, channels, side, side});
+	unsigned char *vndf = tensor_file_add(f, "vndf", TENSOR_FLOATS, 4, (const int[]){p, t, n, n}),
+		      *luminance = tensor_file_add(f, "luminance", TENSOR_FLOATS, 4, (const int[]){p, t, side, side}),
+		      *color = tensor_file_add(f, k->rgb ? "rgb" : "spectra", TENSOR_FLOATS, 5,
+					       (const int[]){p, t, channels, side, side});
 	double *grid = calloc((size_t)n * (size_t)n, sizeof *grid);
 	if (!grid || n > 256)
 		abort();
@@ -216,15 +183,15 @@ static void add_slices(struct file *f, const struct measured_kind *k)
 		vec3 wo = {sin(theta) * cos(phi), sin(theta) * sin(phi), cos(theta)};
 		find_visible(k, wo, grid);
 		for (int i = 0; i < n * n; i++)
-			put(&vndf, grid[i]);
+			tensor_file_put(&vndf, grid[i]);
 		for (int i = 0; i < side * side; i++) {
 			double u = (double)(i % side) / (side - 1), v = (double)(i / side) / (side - 1), x, y;
 			warp(grid, n, u, v, &x, &y);
 			vec3 m = direction(x, y), wi = vec3_sub(vec3_scale(2 * vec3_dot(wo, m), m), wo);
-			put(&luminance, 0.2 + u * v);
+			tensor_file_put(&luminance, 0.2 + u * v);
 			for (int c = 0; c < channels; c++) {
 				unsigned char *at = color + 4 * ((slice * channels + c) * side * side + i);
-				put(&at, color_of(k, measured_tint(wavelength(k, c)), wo, wi));
+				tensor_file_put(&at, color_of(k, measured_tint(wavelength(k, c)), wo, wi));
 			}
 		}
 	}
@@ -233,40 +200,11 @@ static void add_slices(struct file *f, const struct measured_kind *k)
 
 unsigned char *measured_file_make(const struct measured_kind *k, size_t *size)
 {
-	struct file f = {.count = 0};
+	struct tensor_file f = {.count = 0};
 	add_axes(&f, k);
 	add_planes(&f, k);
 	add_slices(&f, k);
-	size_t head = 18, at, data;
-	for (size_t i = 0; i < f.count; i++)
-		head += 2 + strlen(f.array[i].name) + 11 + 8 * f.array[i].dimensions;
-	*size = head;
-	for (size_t i = 0; i < f.count; i++)
-		*size += f.array[i].size;
-	unsigned char *out = calloc(1, *size);
-	if (!out)
-		abort();
-	memcpy(out, "tensor_file\0\1", 13);
-	put32(out + 14, (uint32_t)f.count);
-	at = 18;
-	data = head;
-	for (size_t i = 0; i < f.count; i++) {
-		struct array *a = &f.array[i];
-		size_t length = strlen(a->name);
-		put_bytes(out + at, length, 2);
-		memcpy(out + at + 2, a->name, length);
-		at += 2 + length;
-		put_bytes(out + at, a->dimensions, 2);
-		out[at + 2] = (unsigned char)a->type;
-		put64(out + at + 3, data);
-		at += 11;
-		for (unsigned d = 0; d < a->dimensions; d++, at += 8)
-			put64(out + at, a->shape[d]);
-		memcpy(out + data, a->bytes, a->size);
-		data += a->size;
-		free(a->bytes);
-	}
-	return out;
+	return tensor_file_end(&f, size);
 }
 
 const struct memory_file *measured_files(void)

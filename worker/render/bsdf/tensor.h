@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum tensor_type { TENSOR_BYTES = 1, TENSOR_FLOATS = 10 }; /* of those that files number 1 to 11 */
+enum tensor_type { TENSOR_BYTES = 1, TENSOR_SHORTS = 3, TENSOR_FLOATS = 10 }; /* of those that files number 1 to 11 */
 enum { TENSOR_DIMENSIONS_MAX = 8 };
 
 struct tensor {
