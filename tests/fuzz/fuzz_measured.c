@@ -1,13 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * libFuzzer: files of measured materials. What is read scatters light: everywhere finite and not negative.
+ * libFuzzer: files of measured materials of both kinds. What is read scatters light: everywhere finite and not
+ * negative.
  */
 #include "tests/fuzz/seeds.h"
 #include "tests/support/measured_file.h"
 #include "tests/support/nodes.h"
+#include "tests/support/polarized_file.h"
 #include "worker/render/bsdf/bsdf.h"
 
 #include <math.h>
+
+static double some(double phi_d, double theta_d, double theta_h, double nm)
+{
+	return theta_h > 1 ? NAN : theta_d * nm + phi_d;
+}
 
 int LLVMFuzzerInitialize(int *argc, char ***argv)
 {
@@ -29,6 +36,10 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 		seed_file("measured", i, bytes, size);
 		free(bytes);
 	}
+	size_t size;
+	unsigned char *bytes = polarized_file_make(some, 3, 2, &size);
+	seed_file("measured", 8, bytes, size);
+	free(bytes);
 	exit(0);
 }
 
@@ -47,7 +58,7 @@ static void scatter(const struct bsdf *b, enum transport transport, bool rgb)
 	}
 }
 
-int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
+static void read_as(const char *text, const uint8_t *bytes, size_t size)
 {
 	const struct memory_file files[] = {{"m.bsdf", bytes, size}, {0}};
 	const struct asset_source assets = memory_assets(files);
@@ -55,9 +66,15 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 	const struct bsdf_build build = {.arena = &arena, .assets = &assets};
 	struct bsdf b;
 	struct error e;
-	if (!bsdf_create(&b, node_bsdf(&arena, "measured filename=m.bsdf"), &build, &e))
+	if (!bsdf_create(&b, node_bsdf(&arena, text), &build, &e))
 		for (int i = 0; i < 4; i++)
 			scatter(&b, i % 2 ? TRANSPORT_RADIANCE : TRANSPORT_IMPORTANCE, i / 2);
 	arena_fini(&arena);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
+{
+	read_as("measured filename=m.bsdf", bytes, size);
+	read_as("measured_polarized filename=m.bsdf", bytes, size);
 	return 0;
 }

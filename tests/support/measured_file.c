@@ -6,6 +6,7 @@
  * Failures: out of memory aborts.
  */
 #include "tests/support/measured_file.h"
+#include "tests/support/polarized_file.h"
 #include "tests/support/tensor_file.h"
 
 #include <math.h>
@@ -207,6 +208,14 @@ unsigned char *measured_file_make(const struct measured_kind *k, size_t *size)
 	return tensor_file_end(&f, size);
 }
 
+/* Brighter where facets are flat, unlike on either side of them, with a corner that was not measured. */
+static double flat_facets(double phi_d, double theta_d, double theta_h, double nm)
+{
+	if (theta_d + theta_h > 2.5)
+		return NAN;
+	return (0.02 + 0.3 * exp(-6 * theta_h * theta_h)) * (1 + 0.3 * cos(phi_d) * sin(theta_d)) * nm / 600;
+}
+
 const struct memory_file *measured_files(void)
 {
 	static const struct measured_kind kinds[] = {
@@ -238,11 +247,16 @@ const struct memory_file *measured_files(void)
 		 .absolute = true},
 	};
 	enum { KINDS = sizeof kinds / sizeof *kinds };
-	static struct memory_file files[KINDS + 1];
+	static struct memory_file files[KINDS + 2];
 	for (size_t i = 0; i < KINDS && !files[i].name; i++) {
 		size_t size;
 		unsigned char *bytes = measured_file_make(&kinds[i], &size);
 		files[i] = (struct memory_file){kinds[i].name, bytes, size};
+	}
+	if (!files[KINDS].name) {
+		size_t size;
+		unsigned char *bytes = polarized_file_make(flat_facets, 9, 5, &size);
+		files[KINDS] = (struct memory_file){"polarized.pbsdf", bytes, size};
 	}
 	return files;
 }

@@ -34,7 +34,7 @@ double measured_kind_reflected(const struct measured_kind *k, double tint, vec3 
 /* Its file, of *size bytes; the caller frees it. */
 unsigned char *measured_file_make(const struct measured_kind *k, size_t *size);
 
-/* Small files for the generic tests: isotropic.bsdf, anisotropic.bsdf, rgb.bsdf. Made once. */
+/* Small files for the generic tests: isotropic.bsdf, anisotropic.bsdf, rgb.bsdf, polarized.pbsdf. Made once. */
 const struct memory_file *measured_files(void);
 
 #endif

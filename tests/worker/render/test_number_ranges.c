@@ -5,6 +5,7 @@
  * (two numbers that contradict each other, a scene that is too large). Each trial is a whole scene in a process of its
  * own.
  */
+#include "tests/support/measured_file.h"
 #include "tests/support/length.h"
 #include "tests/support/scene_trial.h"
 #include "worker/render/render.h"
@@ -69,9 +70,10 @@ static const char *companions(const struct plugin_decl *d, const struct param *p
 
 static const char *file_of(const struct plugin_decl *d)
 {
-	return strcmp(d->type, "obj") == 0	    ? "<string name='filename' value='m.obj'/>"
-	       : strcmp(d->type, "ply") == 0	    ? "<string name='filename' value='m.ply'/>"
-	       : strcmp(d->type, "gridvolume") == 0 ? "<string name='filename' value='m.vol'/>"
+	return strcmp(d->type, "obj") == 0		    ? "<string name='filename' value='m.obj'/>"
+	       : strcmp(d->type, "ply") == 0		    ? "<string name='filename' value='m.ply'/>"
+	       : strcmp(d->type, "gridvolume") == 0	    ? "<string name='filename' value='m.vol'/>"
+	       : strcmp(d->type, "measured_polarized") == 0 ? "<string name='filename' value='polarized.pbsdf'/>"
 	       : strcmp(d->type, "bitmap") == 0 || strcmp(d->type, "envmap") == 0
 		       ? "<string name='filename' value='sky.hdr'/>"
 		       : "";
@@ -136,9 +138,13 @@ static int try_value(const struct plugin_decl *d, const struct param *p, enum va
 	if (!print_value(property, sizeof property, p, type, x))
 		return 0;
 	print_scene(text, d, companions(d, p), property);
-	const struct memory_file files[] = {{"s.xml", text, strlen(text)},  {"sky.hdr", sky, sizeof sky - 1},
-					    {"m.obj", obj, sizeof obj - 1}, {"m.ply", ply, sizeof ply - 1},
-					    {"m.vol", vol, sizeof vol - 1}, {NULL, NULL, 0}};
+	const struct memory_file files[] = {{"s.xml", text, strlen(text)},
+					    {"sky.hdr", sky, sizeof sky - 1},
+					    {"m.obj", obj, sizeof obj - 1},
+					    {"m.ply", ply, sizeof ply - 1},
+					    {"m.vol", vol, sizeof vol - 1},
+					    measured_files()[3],
+					    {NULL, NULL, 0}};
 	return scene_trial(files, said, size);
 }
 

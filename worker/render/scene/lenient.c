@@ -27,6 +27,7 @@ static const struct {
 	const char *type, *stand_in;
 } likes[] = {
 	{PLUGIN_BSDF, "measured", "roughplastic"}, /* where its file is missing */
+	{PLUGIN_BSDF, "measured_polarized", "roughplastic"},
 	{PLUGIN_BSDF, "dielectric_disp", "dielectric"},
 	{PLUGIN_BSDF, "disney", "principled"},
 	{PLUGIN_BSDF, "openpbr", "principled"},
@@ -265,8 +266,8 @@ bool lenient_needs_texture(const char *type)
 const char *lenient_missing(const struct asset_source *assets, const struct xml_element *el)
 {
 	const char *type = xml_attribute(el, "type");
-	if (strcmp(el->name, "texture") != 0 &&
-	    (strcmp(el->name, "bsdf") != 0 || !type || strcasecmp(type, "measured") != 0))
+	bool measured = type && (strcasecmp(type, "measured") == 0 || strcasecmp(type, "measured_polarized") == 0);
+	if (strcmp(el->name, "texture") != 0 && !(strcmp(el->name, "bsdf") == 0 && measured))
 		return NULL;
 	for (const struct xml_element *c = el->first; c; c = c->next) {
 		const char *name = xml_attribute(c, "name"), *file = xml_attribute(c, "value"), *rest;

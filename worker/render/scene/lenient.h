@@ -47,7 +47,7 @@ bool lenient_needs_texture(const char *type);
 #define LENIENT_TEXTURE_HINT "; --lenient leaves the texture out"
 const char *lenient_texture_hint(const char *sentence); /* without the semicolon where that is a question */
 
-/* The file of a texture or a `measured` material that the scene does not come with: it is missing, or its name begins
+/* The file of a texture or a measured material that the scene does not come with: it is missing, or its name begins
  * at the root, from which nothing is read. NULL: it is there, or outside the folders that may be read, or it is another
  * kind of object, or it needs no file. Textures of old scenes are often lost; a mesh, or an environment, has no
  * replacement. */

@@ -100,7 +100,6 @@ static const struct {
 	{PLUGIN_BSDF, "dielectric_disp"},
 	{PLUGIN_BSDF, "hk"},
 	{PLUGIN_BSDF, "irawan"},
-	{PLUGIN_BSDF, "measured_polarized"},
 	{PLUGIN_BSDF, "neuralbsdf"},
 	{PLUGIN_BSDF, "openpbr"},
 	{PLUGIN_TEXTURE, "color_ramp"},

@@ -1,0 +1,244 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Materials of the KAIST database, whose Mueller matrices were measured (Baek et al. 2020, Image-Based Acquisition and
+ * Modeling of Polarimetric Reflectance), for unpolarized light: the element that says how much of it is reflected.
+ *
+ * The table has the angles of Rusinkiewicz 1998: theta_h, of the half vector h to the normal; theta_d, of the direction
+ * to the light to h; and phi_d, its azimuth about h, from the way down along the meridian. Between
+ * measurements the numbers are linear in all three and in the wavelength, beyond them the last ones hold, negative ones
+ * count as 0, and where any of them is not finite, or beyond 1e30, nothing could be measured, and there is no light, as
+ * in Mitsuba. Samples are a tenth of the cosine and visible GGX normals of roughness `alpha_sample`.
+ *
+ * Measured light is not reciprocal: paths from a light use f with the roles of the directions exchanged.
+ *
+ * Failures: an array that is missing, of another type or of sizes that disagree with others; axes
+ * that do not ascend. Arrays are within the file, which bounds what is allocated: a sixteenth of it.
+ */
+#include "worker/render/bsdf/create.h"
+#include "worker/render/bsdf/microfacet.h"
+#include "worker/render/bsdf/tensor_input.h"
+#include "worker/render/bsdf/warp.h"
+#include "worker/render/math/search.h"
+#include "worker/render/scene/asset_part.h"
+#include "common/base/liveness.h"
+
+#include <float.h>
+
+#define LEAST_COSINE 0x1p-500 /* as for `measured` */
+#define ALL_WAVELENGTHS (-1)
+#define COSINE_SHARE 0.1 /* of samples */
+
+enum { AXES = 4, MUELLER = 16, TICK_INTERVAL = 1 << 16 };
+
+/* What was not measured: it outweighs all numbers around it, and what is negative counts as 0. */
+static const float nothing = -FLT_MAX;
+
+struct axis {
+	uint32_t count;
+	const double *at;
+};
+
+struct polarized {
+	struct axis axis[AXES];	  /* phi_d, theta_d, theta_h; wavelengths in nm, whose numbers are neighbours */
+	const float *value;	  /* f */
+	const double (*rgb)[3];	  /* what each wavelength adds to linear Rec. 709 under D65 */
+	double nm;		  /* the only wavelength, or ALL_WAVELENGTHS */
+	struct microfacet facets; /* for samples */
+};
+
+/* ---- the table ---- */
+
+/* Between two numbers of an axis. */
+struct cell {
+	uint32_t i, next;
+	double part;
+};
+
+static struct cell cell_of(const struct axis *a, double x)
+{
+	uint32_t last = a->count - 1;
+	if (!(x > a->at[0]))
+		return (struct cell){0, 0, 0};
+	if (!(x < a->at[last]))
+		return (struct cell){last, last, 0};
+	uint32_t i = search_cell(a->at, last, x);
+	return (struct cell){i, i + 1, (x - a->at[i]) / (a->at[i + 1] - a->at[i])};
+}
+
+/* The numbers around a pair of directions, by their first wavelength, and the share of each. */
+struct nodes {
+	int count;
+	const float *value[8];
+	double weight[8];
+};
+
+static struct nodes nodes_at(const struct polarized *m, vec3 light, vec3 h)
+{
+	/* b and t: across h, and from it down the meridian. */
+	double across = hypot(h.x, h.y);
+	vec3 b = across > 0 ? (vec3){-h.y / across, h.x / across, 0} : (vec3){0, 1, 0}, t = vec3_cross(b, h);
+	double x = vec3_dot(t, light), y = vec3_dot(b, light);
+	const double angle[3] = {atan2(y, x), atan2(hypot(x, y), vec3_dot(h, light)), atan2(across, h.z)};
+	struct cell c[3];
+	struct nodes n = {.count = 0};
+	for (int i = 0; i < 3; i++)
+		c[i] = cell_of(&m->axis[i], angle[i]);
+	for (unsigned k = 0; k < 8; k++) {
+		size_t at = 0;
+		double weight = 1;
+		for (unsigned i = 0; i < 3; i++) {
+			bool next = k >> i & 1;
+			at = at * m->axis[i].count + (next ? c[i].next : c[i].i);
+			weight *= next ? c[i].part : 1 - c[i].part;
+		}
+		if (weight > 0) {
+			n.value[n.count] = m->value + at * m->axis[3].count;
+			n.weight[n.count++] = weight;
+		}
+	}
+	return n;
+}
+
+static double at_wavelength(const struct polarized *m, const struct nodes *n, double nm)
+{
+	struct cell c = cell_of(&m->axis[3], nm);
+	double sum = 0;
+	for (int i = 0; i < n->count; i++)
+		sum += n->weight[i] * ((1 - c.part) * (double)n->value[i][c.i] + c.part * (double)n->value[i][c.next]);
+	return max_of(sum, 0);
+}
+
+/* f for light that goes to the camera. */
+static spectrum reflected(const struct polarized *m, const struct wavelengths *w, vec3 camera, vec3 light)
+{
+	vec3 h;
+	double length, rgb[3] = {0, 0, 0};
+	if (!microfacet_half(camera, 1, light, &h, &length))
+		return spectrum_of(0);
+	struct nodes n = nodes_at(m, light, h);
+	if (m->nm != ALL_WAVELENGTHS)
+		return spectrum_of(at_wavelength(m, &n, m->nm));
+	if (!w->rgb) {
+		spectrum f;
+		for (int i = 0; i < SPECTRUM_LANES; i++)
+			f.v[i] = at_wavelength(m, &n, w->nm[i]);
+		return f;
+	}
+	for (uint32_t k = 0; k < m->axis[3].count; k++) {
+		double f = at_wavelength(m, &n, m->axis[3].at[k]);
+		for (int i = 0; i < 3; i++)
+			rgb[i] += m->rgb[k][i] * f;
+	}
+	for (int i = 0; i < 3; i++)
+		rgb[i] = max_of(rgb[i], 0);
+	return spectrum_of_rgb(rgb);
+}
+
+/* ---- the material ---- */
+
+static bool both_above(vec3 wo, vec3 wi)
+{
+	return wo.z >= LEAST_COSINE && wi.z >= LEAST_COSINE;
+}
+
+static spectrum polarized_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	if (!both_above(wo, wi))
+		return spectrum_of(0);
+	return p->transport == TRANSPORT_IMPORTANCE ? reflected(b->data, p->w, wi, wo)
+						    : reflected(b->data, p->w, wo, wi);
+}
+
+static double polarized_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct polarized *m = b->data;
+	vec3 h;
+	double length;
+	(void)p;
+	if (!both_above(wo, wi) || !microfacet_half(wo, 1, wi, &h, &length))
+		return 0;
+	double mirrored = 0.25 * microfacet_d(&m->facets, h) * microfacet_g1_over_cos(&m->facets, wo);
+	return COSINE_SHARE * wi.z / WARP_PI + (1 - COSINE_SHARE) * mirrored;
+}
+
+static bool polarized_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+			     struct bsdf_sample *out)
+{
+	const struct polarized *m = b->data;
+	if (!(wo.z >= LEAST_COSINE))
+		return false;
+	vec3 wi = u[2] < COSINE_SHARE ? warp_cosine_hemisphere(u[0], u[1])
+				      : microfacet_sample_mirrored(&m->facets, wo, u[0], u[1]);
+	return bsdf_sample_smooth(b, p, wo, wi, out);
+}
+
+/* ---- reading ---- */
+
+static int read_table(const struct tensor_input *in, struct polarized *m)
+{
+	struct tensor t;
+	int rc = tensor_input_find(in, "M", TENSOR_FLOATS, AXES + 2, &t);
+	if (rc)
+		return rc;
+	for (int i = 0; i < AXES; i++)
+		if (t.shape[i] != m->axis[i].count)
+			return tensor_fault(in, EINVAL, "M", "has other sizes than phi_d, theta_d, theta_h and wvls");
+	if (t.shape[AXES] != 4 || t.shape[AXES + 1] != 4)
+		return tensor_fault(in, EINVAL, "M", "needs matrices of 4 x 4");
+	float *value = arena_alloc(in->arena, t.count / MUELLER, sizeof *value);
+	if (!value)
+		return tensor_fault(in, ENOMEM, "M", "does not fit into memory");
+	for (uint64_t i = 0; i < t.count / MUELLER; i++) {
+		value[i] = tensor_is_usable(&t, MUELLER * i) ? (float)tensor_value(&t, MUELLER * i) : nothing;
+		if (i % TICK_INTERVAL == 0)
+			tick();
+	}
+	m->value = value;
+	return 0;
+}
+
+static int read_material(const struct tensor_input *in, struct polarized *m)
+{
+	static const char *const names[AXES] = {"phi_d", "theta_d", "theta_h", "wvls"};
+	double(*rgb)[3] = NULL;
+	int rc = 0;
+	for (int i = 0; i < AXES && !rc; i++)
+		rc = tensor_axis(in, names[i], i < 3 ? TENSOR_FLOATS : TENSOR_SHORTS, i < 3 ? 2 : 1, &m->axis[i].count,
+				 &m->axis[i].at);
+	if (!rc)
+		rc = tensor_rgb_weights(in, m->axis[3].at, m->axis[3].count, &rgb);
+	m->rgb = (const double(*)[3])rgb;
+	return rc ? rc : read_table(in, m);
+}
+
+static int polarized_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+{
+	struct polarized *m = b->data;
+	struct asset_range a;
+	m->nm = node_float(n, "wavelength", ALL_WAVELENGTHS);
+	double alpha = node_float(n, "alpha_sample", 0.1);
+	microfacet_set(&m->facets, true, alpha, alpha);
+	int rc = asset_part_open(&a, n, build->assets, e);
+	if (rc)
+		return rc;
+	const struct tensor_input in = {a.bytes, a.size, n, build->arena, e};
+	rc = read_material(&in, m);
+	asset_range_close(&a, build->assets);
+	b->modes = BSDF_REFLECT;
+	b->has_smooth = true;
+	b->directed = true;
+	b->alpha = b->alpha_mean = alpha;
+	bsdf_add_shape(b, m->nm == ALL_WAVELENGTHS ? COLOR_SHAPE_OTHER : COLOR_SHAPE_CONSTANT);
+	return rc;
+}
+
+const struct bsdf_ops bsdf_ops_measured_polarized = {
+	.decl = PLUGIN(BSDF, "measured_polarized", {.name = "filename", .types = VALUE_STRING},
+		       {"alpha_sample", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, MICROFACET_ALPHA_MIN, 1, NULL},
+		       {"wavelength", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, ALL_WAVELENGTHS, 1e6, NULL}),
+	.data_size = sizeof(struct polarized),
+	.create = polarized_create,
+	.eval = polarized_eval,
+	.pdf_solid = polarized_pdf,
+	.sample = polarized_sample,
+};
