@@ -135,3 +135,10 @@ vec3 daylight_position(const struct daylight_time *t)
 	zenith += 6371.01 / 149597890 * sin(zenith);
 	return (vec3){sin(zenith) * sin(azimuth), cos(zenith), -sin(zenith) * cos(azimuth)};
 }
+
+int daylight_days_between(const struct daylight_time *from, const struct daylight_time *to)
+{
+	struct daylight_time a = *from, b = *to;
+	a.hour = b.hour = a.zone = b.zone = 0;
+	return (int)(days_of(&b) - days_of(&a));
+}

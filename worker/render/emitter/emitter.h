@@ -46,6 +46,7 @@ struct emitter_build {
 	vec3 center;			       /* a scene point p is at scale (p - center) in the rescaled world */
 	double scale;
 	const struct volume_build *volumes; /* NULL: none */
+	double shutter_open, shutter_close; /* of the camera */
 };
 
 struct emitter;

@@ -8,8 +8,8 @@
  * Refused: a to_world that does more than rotate, a sun below the horizon or without a direction, a day that the month
  * has not, an albedo that depends on the place.
  */
-#include "worker/render/emitter/daylight.h"
-#include "worker/render/emitter/envmap.h"
+#include "worker/render/emitter/sunsky.h"
+
 #include "worker/render/math/cie.h"
 
 #include <string.h>
@@ -105,6 +105,17 @@ static int days_of(int month, int year)
 	return days[month - 1] + (month == 2 && year % 4 == 0 && (year % 100 != 0 || year % 400 == 0));
 }
 
+int sunsky_check_day(const struct scene_node *n, int year, int month, int day, struct error *e)
+{
+	return day > days_of(month, year) ? node_error(n, e, ERANGE, "month %d of %d has no day %d", month, year, day)
+					  : 0;
+}
+
+vec3 sunsky_compass(vec3 d, bool dialect_3)
+{
+	return dialect_3 ? (vec3){d.z, d.y, d.x} : d; /* the third axis is -y in 3.x */
+}
+
 /* In the world. axis: of the map, whose second is up. */
 static int read_sun(const struct scene_node *n, const vec3 axis[3], bool dialect_3, vec3 *towards, struct error *e)
 {
@@ -130,17 +141,15 @@ static int read_sun(const struct scene_node *n, const vec3 axis[3], bool dialect
 				  .month = (int)node_float(n, "month", 7),
 				  .day = (int)node_float(n, "day", 10)};
 	t.hour = node_float(n, "hour", 15) + node_float(n, "minute", 0) / 60 + node_float(n, "second", 0) / 3600;
-	if (t.day > days_of(t.month, t.year))
-		return node_error(n, e, ERANGE, "month %d of %d has no day %d", t.month, t.year, t.day);
-	vec3 d = daylight_position(&t);
-	if (dialect_3) /* axis[2] is -y */
-		d = (vec3){d.z, d.y, d.x};
+	int code = sunsky_check_day(n, t.year, t.month, t.day, e);
+	if (code)
+		return code;
+	vec3 d = sunsky_compass(daylight_position(&t), dialect_3);
 	*towards = vec3_madd(vec3_madd(vec3_scale(d.x, axis[0]), d.y, axis[1]), d.z, axis[2]);
 	return 0;
 }
 
-/* Of the ground, seen by X, Y and Z. */
-static int read_albedo(const struct scene_node *n, const struct emitter_build *build, double albedo[3], struct error *e)
+int sunsky_albedo(const struct scene_node *n, const struct emitter_build *build, double albedo[3], struct error *e)
 {
 	const struct texture_build inner = {build->assets, build->arena, build->dialect_3, NULL, NULL, false};
 	struct texture t;
@@ -188,6 +197,21 @@ static double disk_radius(const struct scene_node *n)
 	return node_float(n, "sun_aperture", 2 * radius / RADIANS) * RADIANS / 2;
 }
 
+int sunsky_axes_read(const struct scene_node *n, const struct emitter_build *build, struct envmap_axes *axes,
+		     struct error *e)
+{
+	int code = envmap_axes_read(n, axes, e);
+	if (!code && axes->stretched)
+		code = node_error(n, e, ENOTSUP, "to_world of a sky can only rotate");
+	if (code || !build->dialect_3)
+		return code;
+	vec3 y = axes->axis[1];
+	axes->axis[1] = axes->axis[2];
+	axes->axis[2] = vec3_neg(y);
+	memcpy(axes->back, axes->axis, sizeof axes->back);
+	return 0;
+}
+
 static int create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
 {
 	bool has_sky = strcmp(n->type, "sun") != 0, has_sun = strcmp(n->type, "sky") != 0;
@@ -195,17 +219,9 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	double turbidity = node_float(n, "turbidity", 3), stretch = node_float(n, "stretch", 1);
 	struct envmap_axes axes;
 	vec3 *axis = axes.axis, towards = {0, 1, 0};
-	int code = envmap_axes_read(n, &axes, e);
-	if (!code && axes.stretched)
-		code = node_error(n, e, ENOTSUP, "to_world of a sky can only rotate");
+	int code = sunsky_axes_read(n, build, &axes, e);
 	if (code)
 		return code;
-	if (build->dialect_3) {
-		vec3 y = axis[1];
-		axis[1] = axis[2];
-		axis[2] = vec3_neg(y);
-		memcpy(axes.back, axis, sizeof axes.back);
-	}
 	if ((code = read_sun(n, axis, build->dialect_3, &towards, e)))
 		return code;
 	b.towards = (vec3){vec3_dot(axis[0], towards), vec3_dot(axis[1], towards), vec3_dot(axis[2], towards)};
@@ -213,7 +229,7 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	if (!(sun <= 0.5 * M_PI + 1e-6))
 		return node_error(n, e, EINVAL, "the sun is below the horizon (%.1f degrees)", 90 - sun / RADIANS);
 	double albedo[3];
-	if ((code = read_albedo(n, build, albedo, e)))
+	if ((code = sunsky_albedo(n, build, albedo, e)))
 		return code;
 	b.sky = daylight_of(turbidity, albedo, sun);
 	b.radius = disk_radius(n);

@@ -32,7 +32,6 @@ static const struct {
 	{PLUGIN_BSDF, "disney", "principled"},
 	{PLUGIN_BSDF, "openpbr", "principled"},
 	/* 3 p.m. of the first day, instead of all times together */
-	{PLUGIN_EMITTER, "timed_sunsky", "sunsky"},
 	{PLUGIN_EMITTER, "avg_sunsky", "sunsky"},
 };
 

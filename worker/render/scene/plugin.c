@@ -113,7 +113,6 @@ static const struct {
 	{PLUGIN_TEXTURE, "vertexcolors"},
 	{PLUGIN_TEXTURE, "volume"},
 	{PLUGIN_EMITTER, "astroobject"},
-	{PLUGIN_EMITTER, "timed_sunsky"},
 	{PLUGIN_SENSOR, "distant"},
 	{PLUGIN_SENSOR, "fluxmeter"},
 	{PLUGIN_SENSOR, "hdistant"},

@@ -134,7 +134,8 @@ static int on_emitter(struct report *r, const struct scene_node *n, bool dialect
 	    (node_find(n, "sun_scale") || node_find(n, "sky_scale")))
 		return remark(r, n, e,
 			      "only `scale` counts here, as in Mitsuba 0.6: `sunScale` and `skyScale` are of `sunsky`");
-	if (!dialect_3 || (!sun && strcmp(n->type, "sunsky") != 0))
+	bool both = strcmp(n->type, "sunsky") == 0 || strcmp(n->type, "timed_sunsky") == 0;
+	if (!dialect_3 || (!sun && !both))
 		return 0;
 	return remark(
 		r, n, e,

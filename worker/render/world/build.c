@@ -172,6 +172,19 @@ static int power_error(const struct scene_node *n, struct error *e)
 	return node_error(n, e, ERANGE, "its power is not finite");
 }
 
+static struct emitter_build emitter_build_of(const struct builder *b)
+{
+	struct world *w = b->w;
+	return (struct emitter_build){.assets = b->assets,
+				      .arena = &w->arena,
+				      .dialect_3 = b->scene->dialect_3,
+				      .center = w->center,
+				      .scale = w->scale,
+				      .volumes = &b->volumes,
+				      .shutter_open = w->settings.shutter_open,
+				      .shutter_close = w->settings.shutter_close};
+}
+
 static int create_emitters(struct builder *b)
 {
 	struct world *w = b->w;
@@ -182,7 +195,7 @@ static int create_emitters(struct builder *b)
 	b->emitter_nodes = arena_alloc(&b->scratch, limit, sizeof(void *));
 	if (!w->emitters || !w->emitter_shape || !b->emitter_nodes)
 		return build_out_of_memory(b->e);
-	struct emitter_build build = {b->assets, &w->arena, s->dialect_3, NULL, NULL, w->center, w->scale, &b->volumes};
+	struct emitter_build build = emitter_build_of(b);
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		const struct scene_node *n = node_child(b->shape_nodes[i], PLUGIN_EMITTER, 0);
 		w->parts[i].emitter = -1;

@@ -30,7 +30,7 @@ static void test_page(void **state)
 	assert_string_equal(at, "");
 	/* Of each kind a row that must be there. */
 	assert_non_null(strstr(text, "\n| `roughconductor` | `material`"));
-	assert_non_null(strstr(text, "\n| emitter | `timed_sunsky` | `sunsky` |"));
+	assert_non_null(strstr(text, "\n| emitter | `astroobject` |"));
 	assert_non_null(strstr(text, "\n| any | `max_depth`"));
 	assert_null(strstr(text, "| bsdf | `diffuse` |"));
 	fclose(page);

@@ -32,7 +32,7 @@ static void test_stand_ins(void **state)
 		{PLUGIN_TEXTURE, "math", LENIENT_INNER, NULL},
 		{PLUGIN_TEXTURE, "color_ramp", LENIENT_LEAVE_OUT, NULL},
 		{PLUGIN_FILM, "tape", LENIENT_REPLACE, "hdrfilm"},
-		{PLUGIN_EMITTER, "timed_sunsky", LENIENT_REPLACE, "sunsky"},
+		{PLUGIN_EMITTER, "avg_sunsky", LENIENT_REPLACE, "sunsky"},
 		{PLUGIN_EMITTER, "laser", LENIENT_LEAVE_OUT, NULL},
 		{PLUGIN_RFILTER, "windowed", LENIENT_REPLACE, "gaussian"},
 		{PLUGIN_TEXTURE, "curvature", LENIENT_LEAVE_OUT, NULL},

@@ -1,0 +1,267 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Daylight over a time, `timed_sunsky` of Mitsuba 3.7: the time of the camera's shutter, as a share of the emitter's
+ * own, goes through the days from the first to the one before the last, and through the window of hours on each. The
+ * image has the mean of all, so the emitter is an environment map of it: of the sky, its mean at SKIES times; of the
+ * sun, its light at SUNS of them, each at a point of its disk. (One time, and DISK points, where the shutter opens and
+ * closes at once.) When the sun is below the horizon there is no light.
+ *
+ * Failures: those of sunsky.c; times in another order, a shutter that is open beyond the emitter's, a scene of 0.6.
+ */
+#include "worker/render/emitter/sunsky.h"
+
+#include "common/base/liveness.h"
+
+#include <string.h>
+
+enum {
+	SKIES = 256,
+	SUNS = 1 << 20,
+	DISK = 1 << 12,
+	SKY_WIDTH = 256,
+	SKY_HEIGHT = 128,
+	HEIGHTS = 256,
+	SCALE = 8,
+	DAYS_MAX = 366 * 200
+};
+
+/* Irrational steps, so that the numbers of many times fill an interval or a square evenly (Roberts 2018). */
+#define STEP 0.6180339887498949
+#define STEP_X 0.7548776662466927
+#define STEP_Y 0.5698402909980532
+
+static double fraction(double x)
+{
+	return x - floor(x);
+}
+
+struct timed {
+	struct daylight_time first; /* hour: of the window's begin */
+	double hours;		    /* the window's length */
+	int days;
+	double from, to; /* the part of all this that the image sees */
+	int skies, suns; /* samples */
+	double turbidity, albedo[3], radius, sky_scale, sun_scale;
+	struct envmap_axes axes;
+	struct image image;
+};
+
+/* Where the sun is at a share of the time that the image sees; false: below the horizon. */
+static bool sun_at(const struct timed *t, double share, vec3 *towards, double *angle)
+{
+	struct daylight_time now = t->first;
+	double day = fmin((t->from + share * (t->to - t->from)) * t->days, t->days * (1 - 0x1p-52)), whole = floor(day);
+	now.day += (int)whole;
+	now.hour += (day - whole) * t->hours;
+	*towards = sunsky_compass(daylight_position(&now), true);
+	*angle = atan2(hypot(towards->x, towards->z), towards->y);
+	return *angle <= 0.5 * M_PI;
+}
+
+/* ---- the map: rows from up (+y) down, columns from -z on over +x ---- */
+
+static vec3 direction(double column, double row)
+{
+	double phi = 2 * M_PI * column, theta = M_PI * row;
+	return (vec3){sin(theta) * sin(phi), cos(theta), -sin(theta) * cos(phi)};
+}
+
+static void add_sky(const struct timed *t, vec3 towards, double angle, double *mean)
+{
+	struct daylight sky = daylight_of(t->turbidity, t->albedo, angle);
+	for (int y = 0; y < SKY_HEIGHT / 2; y++)
+		for (int x = 0; x < SKY_WIDTH; x++) {
+			double row = (y + 0.5) / SKY_HEIGHT, rgb[3];
+			vec3 d = direction((x + 0.5) / SKY_WIDTH, row);
+			double gamma = atan2(vec3_length(vec3_cross(d, towards)), vec3_dot(d, towards));
+			daylight_sky(&sky, M_PI * row, gamma, rgb);
+			for (int k = 0; k < 3; k++)
+				mean[3 * (y * SKY_WIDTH + x) + k] += t->sky_scale * rgb[k] / t->skies;
+		}
+	tick();
+}
+
+/* Bilinear between the coarse points; the outer rows go on to the pole and to the horizon. */
+static void put_sky(const struct timed *t, const double *mean)
+{
+	for (uint32_t y = 0; y < t->image.height / 2; y++)
+		for (uint32_t x = 0; x < t->image.width; x++) {
+			double row = (y + 0.5) / SCALE - 0.5, column = (x + 0.5) / SCALE - 0.5;
+			int r = (int)floor(row), c = (int)floor(column), up = r < 0 ? 0 : r,
+			    down = r + 1 < SKY_HEIGHT / 2 ? r + 1 : SKY_HEIGHT / 2 - 1;
+			double v = row - r, u = column - c;
+			for (int k = 0; k < 3; k++) {
+				const double *at = mean + k;
+				int left = (c + SKY_WIDTH) % SKY_WIDTH, right = (c + 1) % SKY_WIDTH;
+				double a = at[3 * (up * SKY_WIDTH + left)], b = at[3 * (up * SKY_WIDTH + right)],
+				       d = at[3 * (down * SKY_WIDTH + left)], f = at[3 * (down * SKY_WIDTH + right)];
+				t->image.pixels[3 * ((size_t)y * t->image.width + x) + (size_t)k] =
+					(float)((1 - v) * ((1 - u) * a + u * b) + v * ((1 - u) * d + u * f));
+			}
+		}
+}
+
+static int bake_sky(const struct timed *t, struct arena *room)
+{
+	double *mean = arena_alloc(room, (size_t)SKY_WIDTH * SKY_HEIGHT / 2, 3 * sizeof *mean);
+	if (!mean)
+		return -ENOMEM;
+	for (int i = 0; i < t->skies && t->sky_scale > 0; i++) {
+		vec3 towards;
+		double angle;
+		if (sun_at(t, (i + fraction(i * STEP)) / t->skies, &towards, &angle))
+			add_sky(t, towards, angle, mean);
+	}
+	put_sky(t, mean);
+	return 0;
+}
+
+/* Of the disk at its true size, by the angle from the zenith, of which there are HEIGHTS. */
+static void sun_colors(const struct timed *t, double rgb[HEIGHTS][3])
+{
+	for (int i = 0; i < HEIGHTS; i++)
+		daylight_sun(t->turbidity, 0.5 * M_PI * i / (HEIGHTS - 1), rgb[i]);
+}
+
+/* Light from a direction, bilinear between four pixels. l: radiance times solid angle. */
+static void splat(const struct timed *t, vec3 d, const double l[3])
+{
+	const struct image *m = &t->image;
+	double column = (atan2(d.x, -d.z) / (2 * M_PI) + 1) * m->width - 0.5,
+	       row = fmin(fmax(atan2(hypot(d.x, d.z), d.y) / M_PI * m->height - 0.5, 0), m->height - 1.0);
+	uint32_t y = (uint32_t)row, x = (uint32_t)column;
+	for (uint32_t k = 0; k < 4; k++) {
+		uint32_t right = k & 1, down = k >> 1;
+		uint32_t at_x = (x + right) % m->width, at_y = y + down < m->height ? y + down : y;
+		double weight = (right ? column - x : 1 - (column - x)) * (down ? row - y : 1 - (row - y)),
+		       solid = 2 * M_PI / m->width * M_PI / m->height * sin(M_PI * (at_y + 0.5) / m->height);
+		float *pixel = m->pixels + 3 * ((size_t)at_y * m->width + at_x);
+		for (int c = 0; c < 3; c++)
+			pixel[c] += (float)(weight * l[c] / solid);
+	}
+}
+
+static void bake_sun(const struct timed *t)
+{
+	static const vec3 up = {0, 1, 0};
+	double colors[HEIGHTS][3], whole = 4 * M_PI * pow(sin(0.5 * DAYLIGHT_SUN_RADIUS), 2);
+	sun_colors(t, colors);
+	for (int i = 0; i < t->suns; i++) {
+		vec3 towards;
+		double angle, l[3];
+		if (i % 4096 == 0)
+			tick();
+		if (!sun_at(t, (i + 0.5) / t->suns, &towards, &angle))
+			continue;
+		double place = angle / (0.5 * M_PI) * (HEIGHTS - 1), r = t->radius * sqrt(fraction(i * STEP_X)),
+		       phi = 2 * M_PI * fraction(i * STEP_Y);
+		int low = (int)fmin(place, HEIGHTS - 2);
+		for (int k = 0; k < 3; k++)
+			l[k] = t->sun_scale * whole / t->suns *
+			       (colors[low][k] + (place - low) * (colors[low + 1][k] - colors[low][k]));
+		struct frame f = frame_along(towards, up);
+		splat(t, frame_to_world(&f, (vec3){sin(r) * cos(phi), sin(r) * sin(phi), cos(r)}), l);
+	}
+}
+
+/* ---- reading ---- */
+
+/* The part of the emitter's time in which the camera's shutter is open. */
+static int read_shutter(struct timed *t, const struct scene_node *n, const struct emitter_build *build, struct error *e)
+{
+	double open = node_float(n, "shutter_open", 0), length = node_float(n, "shutter_close", 1) - open;
+	if (!(length > 0))
+		return node_error(n, e, EINVAL, "its shutter_close must be after its shutter_open");
+	t->from = (build->shutter_open - open) / length;
+	t->to = (build->shutter_close - open) / length;
+	if (!(t->from >= 0 && t->to <= 1))
+		return node_error(n, e, EINVAL,
+				  "the sensor's shutter is open from %g to %g, which is not within %g to %g",
+				  build->shutter_open, build->shutter_close, open, open + length);
+	return 0;
+}
+
+static int read_time(struct timed *t, const struct scene_node *n, struct error *e)
+{
+	double begin = node_float(n, "window_start_time", 7), end = node_float(n, "window_end_time", 19);
+	t->first = (struct daylight_time){.latitude = node_float(n, "latitude", 35.689),
+					  .longitude = node_float(n, "longitude", 139.6917),
+					  .zone = node_float(n, "timezone", 9),
+					  .hour = begin,
+					  .year = (int)node_float(n, "start_year", 2025),
+					  .month = (int)node_float(n, "start_month", 1),
+					  .day = (int)node_float(n, "start_day", 1)};
+	struct daylight_time last = t->first;
+	last.year = (int)node_float(n, "end_year", t->first.year + 1);
+	last.month = (int)node_float(n, "end_month", t->first.month);
+	last.day = (int)node_float(n, "end_day", t->first.day);
+	int code = sunsky_check_day(n, t->first.year, t->first.month, t->first.day, e);
+	if (!code)
+		code = sunsky_check_day(n, last.year, last.month, last.day, e);
+	if (code)
+		return code;
+	t->hours = end - begin;
+	t->days = daylight_days_between(&t->first, &last);
+	if (t->hours < 0 || t->days < 0 || t->days > DAYS_MAX)
+		return node_error(n, e, EINVAL, "its %s",
+				  t->hours < 0	? "window_end_time is before window_start_time"
+				  : t->days < 0 ? "last day is before its first"
+						: "days are more than 200 years");
+	t->days += t->days == 0;
+	bool once = t->from == t->to || (t->hours == 0 && t->days == 1);
+	t->skies = once ? 1 : SKIES;
+	t->suns = once ? DISK : SUNS;
+	return 0;
+}
+
+static int create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
+{
+	struct timed t = {.turbidity = node_float(n, "turbidity", 3),
+			  .sky_scale = node_float(n, "sky_scale", 1),
+			  .sun_scale = node_float(n, "sun_scale", 1),
+			  .image = {.width = SKY_WIDTH * SCALE, .height = SKY_HEIGHT * SCALE, .channels = 3}};
+	t.radius = node_float(n, "sun_aperture", 2 * DAYLIGHT_SUN_RADIUS * 180 / M_PI) * M_PI / 360;
+	int code = build->dialect_3 ? 0 : node_error(n, e, ENOTSUP, "a scene of 0.6 has no \"timed_sunsky\"");
+	if (!code)
+		code = sunsky_axes_read(n, build, &t.axes, e);
+	if (!code)
+		code = read_shutter(&t, n, build, e);
+	if (!code)
+		code = read_time(&t, n, e);
+	if (!code)
+		code = sunsky_albedo(n, build, t.albedo, e);
+	if (code)
+		return code;
+	struct arena room = {.limit = build->arena->limit};
+	t.image.pixels = arena_alloc(build->arena, (size_t)t.image.width * t.image.height, 3 * sizeof *t.image.pixels);
+	code = t.image.pixels ? bake_sky(&t, &room) : -ENOMEM;
+	arena_fini(&room);
+	if (code)
+		return node_error(n, e, ENOMEM, "out of memory");
+	if (t.sun_scale > 0)
+		bake_sun(&t);
+	return envmap_make(em, &(struct raster){.image = indexed_image_of(&t.image)}, false, 1, &t.axes, n, build, e);
+}
+
+#define RANGE(name_, types_, min_, max_)                                 \
+	{                                                                \
+		.name = name_, .types = types_, .min = min_, .max = max_ \
+	}
+#define NUMBER(name, min, max) RANGE(name, VALUE_FLOAT | VALUE_INT, min, max)
+
+const struct emitter_ops emitter_ops_timed_sunsky = {
+	.decl = {PLUGIN_EMITTER, "timed_sunsky",
+		 PARAMS(NUMBER("turbidity", 1, 10), NUMBER("sky_scale", 0, 1e9), NUMBER("sun_scale", 0, 1e9),
+			NUMBER("sun_aperture", 0.05, 30), NUMBER("latitude", -90, 90), NUMBER("longitude", -180, 180),
+			NUMBER("timezone", -14, 14), NUMBER("window_start_time", 0, 24),
+			NUMBER("window_end_time", 0, 24), RANGE("start_year", VALUE_INT, 1900, 2200),
+			RANGE("start_month", VALUE_INT, 1, 12), RANGE("start_day", VALUE_INT, 1, 31),
+			RANGE("end_year", VALUE_INT, 1900, 2200), RANGE("end_month", VALUE_INT, 1, 12),
+			RANGE("end_day", VALUE_INT, 1, 31), NUMBER("shutter_open", -1e30, 1e30),
+			NUMBER("shutter_close", -1e30, 1e30), {.name = "to_world", .types = VALUE_TRANSFORM},
+			{.name = "albedo", .types = VALUE_TEXTURE, .max = 1},
+			{.name = "complex_sun", .types = VALUE_BOOL, .status = PARAM_IGNORED},
+			{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED}),
+		 0, PARAM_UNDERSTOOD},
+	.create = create,
+	ENVMAP_OPS};
