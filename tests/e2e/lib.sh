@@ -44,7 +44,7 @@ finish() {
 	# Lazily: the process that renders ends a moment after its supervisor, and has the cache open until then.
 	[ -z "${HSLT_OWN_MOUNTS:-}" ] || umount -l "$DIR/spool" "$DIR/disk" 2>/dev/null || :
 	[ -z "${HSLT_KEEP:-}" ] || cp -r "$TOP" "$HSLT_KEEP"
-	rm -rf "$TOP"
+	rm -rf --one-file-system "$TOP"
 	exit $code
 }
 trap finish EXIT
@@ -87,9 +87,9 @@ need_debians() {
 	unshare --mount --pid --fork true 2>/dev/null || skip "no namespaces for mounts and processes here"
 }
 
-# fresh_debian SUITE ROOT
+# fresh_debian SUITE ROOT. What debootstrap mounts in it (/proc, now and then left behind) stays in a namespace of its own.
 fresh_debian() {
-	debootstrap --variant=minbase "$1" "$2" "${HSLT_DEBIAN_MIRROR:-http://deb.debian.org/debian}" >"$DIR/debootstrap.log" 2>&1 ||
+	unshare --mount debootstrap --variant=minbase "$1" "$2" "${HSLT_DEBIAN_MIRROR:-http://deb.debian.org/debian}" >"$DIR/debootstrap.log" 2>&1 ||
 		skip "debootstrap: $(tail -n 1 "$DIR/debootstrap.log")"
 	cp /etc/resolv.conf /etc/hosts "$2/etc/"
 }

@@ -25,5 +25,5 @@ for suite in bookworm trixie; do
 		sh tests/e2e/bits.sh /tree/build
 		gcc -dumpfullversion >/version' || fail "Debian $suite: $(grep -m 3 'error:\|FAILED' "$DIR/inside.log" | tr '\n' ' ')"
 	echo "$suite: $(grep -c '^ok ' "$DIR/inside.log") tests, gcc $(cat "$ROOT/version")"
-	rm -rf "$ROOT"
+	rm -rf --one-file-system "$ROOT"
 done
