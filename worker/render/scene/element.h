@@ -24,7 +24,7 @@ struct xml_nesting {
 struct xml_element {
 	const char *name, *file;
 	int line;
-	bool snake;   /* names are to be converted from camelCase (a file of version < 2) */
+	bool snake;   /* names are to be converted from camelCase (version < 2) */
 	bool ignored; /* it or one of those around it has no meaning here */
 	bool text;    /* holds text other than blanks */
 	bool unset;   /* a $name in it has no value, or the file to include is not there: reported by xml.c */

@@ -395,7 +395,7 @@ int maker_node(struct maker *m, struct xml_element *el, const struct scene_node 
 	enum plugin_class cls;
 	plugin_class_find(el->name, &cls);
 	bool file = el->parent && strcmp(el->parent->name, "include") == 0;
-	int r = element_check(el, file ? "type|id|name|version" : "type|id|name", true, m->error);
+	int r = element_check(el, file || m->tree->dialect_3 ? "type|id|name|version" : "type|id|name", true, m->error);
 	if (r)
 		return r;
 	const char *type = xml_attribute(el, "type");

@@ -232,6 +232,21 @@ static int begin_file(struct reader *r, struct xml_element *el)
 	return 0;
 }
 
+/* From 2.x on, an object may have a version of its own, for the names in it. */
+static int begin_object(struct reader *r, struct xml_element *el)
+{
+	el->snake = r->snake || (el != r->top && el->parent->snake);
+	const char *version = xml_attribute(el, "version");
+	if (el == r->top || !version || !r->tree->dialect_3 || el->ignored || el->unset)
+		return 0;
+	int64_t major;
+	const char *rest = number_scan_int(version, version + strlen(version), &major);
+	if (!rest || (*rest != 0 && *rest != '.') || major < 0)
+		return xml_error(el, r->error, EINVAL, "version=\"%.64s\" is not one of Mitsuba's", version);
+	el->snake |= major < 2;
+	return 0;
+}
+
 static int read_default(struct reader *r, const struct xml_element *el)
 {
 	const char *name = xml_attribute(el, "name"), *value = xml_attribute(el, "value");
@@ -327,7 +342,8 @@ static int open_element(struct reader *r, const char *name, const char **attribu
 		r->top = el;
 		c = begin_file(r, el);
 	}
-	el->snake = r->snake;
+	if (!c)
+		c = begin_object(r, el);
 	if (!c && el->parent)
 		element_link(el->parent, el);
 	else if (!c)

@@ -363,6 +363,41 @@ static void test_no_version(void **state)
 	}
 }
 
+/* From 2.x on an object may have a version: its names, and those of what is inside it, follow that, and no others. */
+static void test_versions_of_objects(void **state)
+{
+	(void)state;
+	static const char old[] =
+		"<shape type='sphere' version='0.6.0'><transform name='toWorld'><translate x='3'/>"
+		"</transform><bsdf type='plastic'><float name='intIOR' value='1.4'/></bsdf></shape>"
+		"<shape type='disk' version='3.5'><transform name='to_world'><translate y='2'/></transform>"
+		"<bsdf type='plastic' version='2.0.0'><float name='int_ior' value='1.3'/></bsdf></shape>",
+			  now[] = "<shape type='sphere'><transform name='to_world'><translate x='3'/></transform>"
+				  "<bsdf type='plastic'><float name='int_ior' value='1.4'/></bsdf></shape>"
+				  "<shape type='disk'><transform name='to_world'><translate y='2'/></transform>"
+				  "<bsdf type='plastic'><float name='int_ior' value='1.3'/></bsdf></shape>";
+	struct scene s[2] = {read_ok("2.0.0", old, ""), read_ok("3.0.0", now, "")};
+	assert_int_equal(s[0].object_count, 2);
+	for (uint32_t i = 0; i < 2; i++)
+		assert_same_node(s[0].objects[i], s[1].objects[i]);
+	scene_fini(&s[0]);
+	scene_fini(&s[1]);
+	static const char *const refused[][3] = {
+		{"3.0.0",
+		 "<shape type='sphere' version='0.6.0'/><shape type='sphere'><transform name='toWorld'/></shape>",
+		 "has no `toWorld`"},
+		{"3.0.0", "<shape type='sphere' version='new'/>", "version=\"new\" is not one of Mitsuba's"},
+		{"3.0.0", "<shape type='sphere'><float name='radius' value='1' version='3.0.0'/></shape>",
+		 "has no attribute `version`"},
+		{"0.6.0", "<shape type='sphere' version='0.6.0'/>", "has no attribute `version`"},
+	};
+	for (size_t i = 0; i < sizeof refused / sizeof *refused; i++) {
+		struct error e;
+		if (!read_as(&s[0], refused[i][0], refused[i][1], "", &e) || !strstr(e.text, refused[i][2]))
+			fail_msg("%s: \"%s\"", refused[i][1], e.text);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -376,6 +411,7 @@ int main(void)
 		cmocka_unit_test(test_left_is_right),
 		cmocka_unit_test(test_refused),
 		cmocka_unit_test(test_no_version),
+		cmocka_unit_test(test_versions_of_objects),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
