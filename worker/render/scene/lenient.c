@@ -198,6 +198,12 @@ const char *lenient_param(const char *stand_in, const char *name)
 	return name;
 }
 
+bool lenient_says_again(const char *stand_in, const char *name, const struct xml_element *owner)
+{
+	static const char *const index[] = {"eta", "specular_ior", NULL};
+	return strcmp(stand_in, "principled") == 0 && strcmp(name, "specular") == 0 && has_parameter(owner, index);
+}
+
 /* By its own name anywhere in the object, or by the same old one before. */
 static bool is_given(const struct xml_element *el, const char *own, const char *old)
 {
@@ -282,16 +288,28 @@ const char *lenient_missing(const struct asset_source *assets, const struct xml_
 	return NULL;
 }
 
+/* Glass over something else is its coat: what is below gives the colour. */
+static bool is_coat(const struct xml_element *bsdf)
+{
+	static const char *const clear[] = {"dielectric", "null", NULL};
+	const char *type = xml_attribute(bsdf, "type");
+	return type && part_of(type, clear);
+}
+
 struct xml_element *lenient_inner(struct id_table *ids, const struct xml_element *el, enum plugin_class wanted)
 {
 	struct error unused;
 	enum plugin_class cls;
+	struct xml_element *coat = NULL;
 	for (struct xml_element *c = el->first; c; c = c->next) {
 		struct xml_element *target = c;
 		if (strcmp(c->name, "ref") == 0 && id_table_find(ids, c, &target, &unused))
 			continue;
-		if (plugin_class_find(target->name, &cls) && cls == wanted)
+		if (!plugin_class_find(target->name, &cls) || cls != wanted)
+			continue;
+		if (cls != PLUGIN_BSDF || !is_coat(target))
 			return target;
+		coat = coat ? coat : target;
 	}
-	return NULL;
+	return coat;
 }

@@ -32,6 +32,9 @@ enum lenient_way lenient_element(const struct xml_element *el, enum plugin_class
 /* The replacement's parameter that corresponds to `name` of the plug-in replaced; `name` itself if there is none. */
 const char *lenient_param(const char *stand_in, const char *name);
 
+/* Whether the replacement's parameter `name` goes because another in the `owner` that is replaced says the same. */
+bool lenient_says_again(const char *stand_in, const char *name, const struct xml_element *owner);
+
 /* The parameter that `name` is in 0.6, for files of 3.x; stands_in: d replaces the plug-in that has it. NULL: none, or
  * the object of the element `el` has it by its own name too, or by this one before. */
 const struct param *lenient_old_param(const struct plugin_decl *d, bool stands_in, const struct xml_element *el,
@@ -53,7 +56,8 @@ const char *lenient_texture_hint(const char *sentence); /* without the semicolon
  * replacement. */
 const char *lenient_missing(const struct asset_source *assets, const struct xml_element *el);
 
-/* The first object of the class `wanted` inside one of it that is not supported; NULL: none. */
+/* The first object of the class `wanted` inside one of it that is not supported, of BSDFs rather one that is not clear;
+ * NULL: none. */
 struct xml_element *lenient_inner(struct id_table *ids, const struct xml_element *el, enum plugin_class wanted);
 
 #endif

@@ -132,6 +132,9 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 		return note_parameter(&m->notes, owner, el, written, no_effect);
 	if (!found && is_foreign_parameter(m, d, el, name))
 		return note_parameter(&m->notes, owner, el, written, "is not known and is ignored");
+	if (found && d->stands_in && lenient_says_again(d->decl->type, found->name, owner))
+		return note_parameter(&m->notes, owner, el, written,
+				      "goes, because the index of refraction says the same (lenient)");
 	if ((!found || found->status == PARAM_REFUSED) && m->lenient)
 		return leave_out(&m->notes, el, xml_attribute(owner, "type"), written, "the parameter");
 	if (!found || found->status == PARAM_REFUSED)
@@ -249,7 +252,10 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 		return add_property(m, d, el, p, (struct value){.type = VALUE_NODE, .as.node = child});
 	bool many = d->node->cls == cls && (cls == PLUGIN_BSDF || cls == PLUGIN_SHAPE || cls == PLUGIN_SENSOR ||
 					    cls == PLUGIN_INTEGRATOR || cls == PLUGIN_PHASE);
-	if (!many && node_child(d->node, cls, 0))
+	bool second = !many && node_child(d->node, cls, 0);
+	if (second && d->stands_in)
+		return leave_out(&m->notes, el, d->node->type, written ? written : target->name, "a second object,");
+	if (second)
 		return xml_error(el, m->error, EINVAL, "a second %s in <%s type=\"%.64s\">, which may have one",
 				 plugin_class_name(cls), owner->name, d->node->type);
 	d->children[d->node->child_count++] = child;

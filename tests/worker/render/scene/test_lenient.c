@@ -435,6 +435,39 @@ static void test_names_and_values_of_others(void **state)
 	scene_fini(&s);
 }
 
+/* What a plug-in that is replaced says twice, or has twice, is no mistake; of layers, the stand-in is not the glass. */
+static void test_more_than_the_stand_in_has(void **state)
+{
+	(void)state;
+	static const char xml[] =
+		"<scene version='2.2.1'>\n<sensor type='perspective'><film type='streakfilm' id='film'>"
+		"<rfilter name='rfilter' type='gaussian'/>\n<rfilter name='tfilter' type='box'/></film></sensor>"
+		"<bsdf type='disneybsdf' id='disney'><rgb name='baseColor' value='0.2'/><float name='metallic' value='0.5'/>"
+		"\n<float name='specular' value='0.5'/><float name='eta' value='1.7'/></bsdf>"
+		"<bsdf type='multilayered'><bsdf type='roughdielectric' name='surface_0'/>"
+		"<bsdf type='roughconductor' name='surface_1' id='metal'/><bsdf type='diffuse' name='surface_2'/></bsdf>"
+		"<bsdf type='multilayered'><bsdf type='dielectric' id='glass'/><bsdf type='roughdielectric'/></bsdf></scene>";
+	struct scene s = read_leniently(xml);
+	const struct scene_node *film = node_child(s.objects[0], PLUGIN_FILM, 0), *disney = scene_named(&s, "disney");
+	assert_string_equal(film->type, "hdrfilm");
+	assert_int_equal(film->child_count, 1);
+	assert_string_equal(film->children[0]->type, "gaussian");
+	assert_null(node_find(disney, "specular"));
+	assert_true(node_float(disney, "eta", 0) == 1.7);
+	assert_string_equal(scene_named(&s, "metal")->type, "roughconductor");
+	assert_string_equal(scene_named(&s, "glass")->type, "dielectric");
+	assert_true(scene_has_note(&s, "s.xml:3: <rfilter>: a second object, `tfilter` is not supported and left out"));
+	assert_true(scene_has_note(&s, "s.xml:4: <bsdf type=\"disneybsdf\">: `specular` goes, because the index of"));
+	scene_fini(&s);
+	static const char twice[] = "<scene version='3.0.0'><sensor type='perspective'><film type='hdrfilm'>"
+				    "<rfilter type='box'/><rfilter type='tent'/></film></sensor></scene>";
+	const struct memory_file files[] = {{"s.xml", twice, sizeof twice - 1}, {0}};
+	const struct asset_source assets = memory_assets(files);
+	struct error e;
+	assert_int_not_equal(scene_read_lenient(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e), 0);
+	assert_non_null(strstr(e.text, "a second rfilter in"));
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -451,6 +484,7 @@ int main(void)
 		cmocka_unit_test(test_lights_in_shapes),
 		cmocka_unit_test(test_volumes_without_a_value),
 		cmocka_unit_test(test_names_and_values_of_others),
+		cmocka_unit_test(test_more_than_the_stand_in_has),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
