@@ -73,7 +73,10 @@ stop $hup
 	fail "--spp: $(cat "$DIR/ends.log")"
 "$BIN/hslt-render" "$BOX" -o "$DIR/ends.exr" --size 8x8 -i path 2>"$DIR/ends.log" && grep -q "stopped by: the scene's samples per pixel" "$DIR/ends.log" ||
 	fail "no bound: $(cat "$DIR/ends.log")"
-grep -q "^note: $BOX:15: " "$DIR/ends.log" && grep -q 'MB for Embree$' "$DIR/ends.log" || fail "notes: $(cat "$DIR/ends.log")"
+grep -q 'MB for Embree$' "$DIR/ends.log" && ! grep -q '^note: .*is ignored' "$DIR/ends.log" || fail "no notes: $(cat "$DIR/ends.log")"
+sed 's/"independent"/"stratified"/; s|filename" value="|&scenes/box/|' "$BOX" >"$DIR/box.xml"
+"$BIN/hslt-render" "$DIR/box.xml" --path "$HERE/.." -o "$DIR/ends.exr" --size 8x8 -i path --spp 4 2>"$DIR/ends.log" &&
+	grep -q "^note: $DIR/box.xml:15: " "$DIR/ends.log" || fail "notes: $(cat "$DIR/ends.log")"
 code 2 "$BIN/hslt-render" "$BOX" -o "$DIR/ends.exr" --json
 grep -q -- '--json requires --estimate or --explain' "$DIR/err.log" || fail "--json: $(cat "$DIR/err.log")"
 

@@ -99,10 +99,25 @@ int note_old_name(const struct notes *t, const struct xml_element *owner, const 
 		    el->file, el->line, owner->name, type, written, name);
 }
 
+/* Samples are independent here: with their number alone, nothing of such a sampler is ignored. */
+static bool says_what_is_done(const struct xml_element *el, const char *type)
+{
+	if (strcmp(el->name, "sampler") != 0 || strcasecmp(type, "independent") != 0)
+		return false;
+	for (const struct xml_element *c = el->first; c; c = c->next) {
+		const char *name = xml_attribute(c, "name");
+		if (!name || (strcmp(name, "sample_count") != 0 && strcmp(name, "sampleCount") != 0))
+			return false;
+	}
+	return true;
+}
+
 int note_ignored_plugin(const struct notes *t, const struct xml_element *el, const struct plugin_decl *decl)
 {
 	char list[256];
 	const char *type = xml_attribute(el, "type");
+	if (says_what_is_done(el, type))
+		return 0;
 	plugin_list_params(decl, list, sizeof list);
 	return note(t, el, type, "", "%s:%d: <%.64s type=\"%.64s\"> is ignored except for: %s", el->file, el->line,
 		    el->name, type, list);

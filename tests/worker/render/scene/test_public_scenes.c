@@ -28,9 +28,9 @@ static const struct expected all[] = {
 	{"cornell-box", "scene.xml", false, 8, 0, 3, 36, 0, 1024, 1024, FILTER_TENT, 64, 65, 19.5},
 	{"veach-mis", "scene.xml", false, 9, 0, 4, 52, 3, 1280, 720, FILTER_TENT, 512, 5, 35},
 	{"veach-door", "scene.xml", false, 22, 28, 3, 0, 0, 1280, 720, FILTER_BOX, 0, 128, 54.6003},
-	{".", "three-spheres.xml", true, 5, 0, 2, 4, 3, 512, 288, FILTER_BOX, 64, 31, 47.27},
-	{".", "half-sunk.xml", true, 3, 0, 2, 4, 1, 512, 288, FILTER_BOX, 64, 31, 38.58},
-	{".", "half-sunk-rough.xml", true, 3, 0, 2, 4, 1, 512, 288, FILTER_BOX, 64, 31, 38.58},
+	{".", "three-spheres.xml", true, 5, 0, 1, 4, 3, 512, 288, FILTER_BOX, 64, 31, 47.27},
+	{".", "half-sunk.xml", true, 3, 0, 1, 4, 1, 512, 288, FILTER_BOX, 64, 31, 38.58},
+	{".", "half-sunk-rough.xml", true, 3, 0, 1, 4, 1, 512, 288, FILTER_BOX, 64, 31, 38.58},
 };
 
 static void check_shapes(const struct scene *s, const struct asset_source *assets, const struct expected *x)

@@ -135,6 +135,36 @@ static void test_wide_filters(void **state)
 #undef MAP
 }
 
+/* Nothing of a sampler is ignored that asks for so many independent samples and for no more. */
+static void test_independent_samples(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *version, *sampler;
+		bool told;
+	} cases[] = {
+		{"3.0.0", "<sampler type='independent'><integer name='sample_count' value='9'/></sampler>", false},
+		{"0.6.0", "<sampler type='Independent'><integer name='sampleCount' value='9'/></sampler>", false},
+		{"3.0.0", "<sampler type='independent'/>", false},
+		{"3.0.0", "<sampler type='independent'><integer name='seed' value='9'/></sampler>", true},
+		{"3.0.0", "<sampler type='stratified'><integer name='sample_count' value='9'/></sampler>", true},
+		{"3.0.0", "<integrator type='independent'/>", true},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		char xml[256];
+		struct scene s;
+		struct error e;
+		snprintf(xml, sizeof xml, "<scene version='%s'>%s</scene>", cases[i].version, cases[i].sampler);
+		const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {0}};
+		struct asset_source assets = memory_assets(files);
+		if (scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e))
+			fail_msg("%s: %s", xml, e.text);
+		if (scene_has_note(&s, "is ignored except for") != cases[i].told)
+			fail_msg("%s: %s", xml, cases[i].told ? "no note" : s.notes[0]);
+		scene_fini(&s);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -143,6 +173,7 @@ int main(void)
 		cmocka_unit_test(test_names_of_integrators),
 		cmocka_unit_test(test_known_integrators),
 		cmocka_unit_test(test_wide_filters),
+		cmocka_unit_test(test_independent_samples),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
