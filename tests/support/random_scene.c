@@ -381,7 +381,7 @@ void random_scene_make(struct random_scene *s, uint64_t number, const char *cons
 
 struct world *random_scene_world(const struct random_scene *s, uint32_t width, uint32_t height)
 {
-	enum { SIDE = 8, OWN = 4, MEASURED = 3 };
+	enum { SIDE = 8, OWN = 4, MEASURED = 4 };
 	static char xml[sizeof s->body + 64];
 	static unsigned char picture[16 + 3 * SIDE * SIDE];
 	int n = snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s</scene>", s->body);
