@@ -163,20 +163,21 @@ const struct mtl_material *mtl_find(const struct mtl *m, const char *name)
 
 /* ---- elements */
 
-struct image_builder {
+struct element_builder {
 	const struct mtl *m;
 	struct arena *arena;
 	int count; /* of elements; negative: out of memory */
 };
 
-static struct xml_element *make_element(struct image_builder *k, struct xml_element *in, const char *element, int line)
+static struct xml_element *make_element(struct element_builder *k, struct xml_element *in, const char *element,
+					int line)
 {
 	struct xml_element *el = k->count < 0 ? NULL : element_make(in, element, k->m->file, line, k->arena);
 	k->count = el ? k->count + 1 : -ENOMEM;
 	return el;
 }
 
-static struct xml_element *plugin(struct image_builder *k, struct xml_element *in, const char *cls, const char *type,
+static struct xml_element *plugin(struct element_builder *k, struct xml_element *in, const char *cls, const char *type,
 				  const char *name, int line)
 {
 	struct xml_element *el = make_element(k, in, cls, line);
@@ -187,7 +188,7 @@ static struct xml_element *plugin(struct image_builder *k, struct xml_element *i
 	return el;
 }
 
-static void property(struct image_builder *k, struct xml_element *in, const char *element, const char *name,
+static void property(struct element_builder *k, struct xml_element *in, const char *element, const char *name,
 		     const struct mtl_value *v)
 {
 	struct xml_element *el = make_element(k, in, element, v->line);
@@ -197,7 +198,7 @@ static void property(struct image_builder *k, struct xml_element *in, const char
 	}
 }
 
-static void picture(struct image_builder *k, struct xml_element *in, const char *name, const struct mtl_value *v,
+static void picture(struct element_builder *k, struct xml_element *in, const char *name, const struct mtl_value *v,
 		    bool numbers)
 {
 	struct xml_element *texture = plugin(k, in, "texture", "bitmap", name, v->line);
@@ -207,7 +208,7 @@ static void picture(struct image_builder *k, struct xml_element *in, const char 
 }
 
 /* A colour, in sRGB as in Mitsuba, or the image given last. */
-static void colour(struct image_builder *k, struct xml_element *in, const char *name, int line,
+static void colour(struct element_builder *k, struct xml_element *in, const char *name, int line,
 		   const struct mtl_value *v, const struct mtl_value *map)
 {
 	if (map->line > v->line)
@@ -223,7 +224,7 @@ static bool is_zero(const struct mtl_value *v)
 	return n >= 0 && x[0] == 0 && x[1] == 0 && x[2] == 0;
 }
 
-static void put_lobes(struct image_builder *k, const struct mtl_material *of, struct xml_element *in)
+static void put_lobes(struct element_builder *k, const struct mtl_material *of, struct xml_element *in)
 {
 	int64_t model = 0;
 	if (of->model.line && !number_parse_int(of->model.text, &model))
@@ -247,7 +248,7 @@ static void put_lobes(struct image_builder *k, const struct mtl_material *of, st
 
 int mtl_put(const struct mtl *m, const struct mtl_material *of, struct xml_element *shape, struct arena *arena)
 {
-	struct image_builder k = {.m = m, .arena = arena};
+	struct element_builder k = {.m = m, .arena = arena};
 	struct xml_element *in = shape;
 	double opacity = 1;
 	bool mapped = of->opacity_map.line > of->opacity.line;
