@@ -8,7 +8,9 @@
 
 enum {
 	NUMBERS_MAX = 1 << 16, /* that an index of two bytes tells apart */
-	PROBES_MAX = 256,      /* a file made to collide is stored without indices instead of taking hours */
+	/* Slots looked at in vain for each place, on average: a file whose numbers collide is stored without indices
+	 * instead of taking hours. */
+	DETOUR_MAX = 8,
 };
 
 /* The different numbers of an image by their bits, -0 apart from 0: a hash table with open addressing. */
@@ -27,26 +29,32 @@ static uint32_t bits_of(float x)
 	return bits;
 }
 
-/* The number's slot or a free one; t->slots: neither is near. */
-static uint32_t slot_of(const struct number_table *t, uint32_t bits)
+static uint32_t first_slot(uint32_t bits)
 {
-	uint32_t at = bits * 0x9e3779b1u >> 15;
-	for (int probe = 0; probe < PROBES_MAX; probe++, at++) {
-		at &= t->slots - 1;
-		if (!t->slot[at].known || t->slot[at].bits == bits)
-			return at;
-	}
-	return t->slots;
+	return bits * 0x9e3779b1u >> 15;
 }
 
-/* False: there are more than an index can tell apart, or the table has no place for one. */
+/* The number's slot or a free one: half of all are. */
+static uint32_t slot_of(const struct number_table *t, uint32_t bits)
+{
+	uint32_t at = first_slot(bits) & (t->slots - 1);
+	while (t->slot[at].known && t->slot[at].bits != bits)
+		at = (at + 1) & (t->slots - 1);
+	return at;
+}
+
+/* False: there are more than an index can tell apart, or finding them again would take long. */
 static bool find_numbers(struct number_table *t, const float *x, size_t count)
 {
+	size_t detours = 0;
 	for (size_t i = 0; i < count; i++) {
 		uint32_t bits = bits_of(x[i]), at = slot_of(t, bits);
-		if (at < t->slots && t->slot[at].known)
+		detours += (at - first_slot(bits)) & (t->slots - 1);
+		if (detours > DETOUR_MAX * count)
+			return false;
+		if (t->slot[at].known)
 			continue;
-		if (at == t->slots || t->numbers == NUMBERS_MAX)
+		if (t->numbers == NUMBERS_MAX)
 			return false;
 		t->slot[at].bits = bits;
 		t->slot[at].known = ++t->numbers;

@@ -75,23 +75,46 @@ static uint32_t inverse(uint32_t odd)
 	return x;
 }
 
-/* A file whose numbers all fall on one slot of the hash table does not take time by the square of its size: it is
- * stored without indices. */
+/* Finite floats that all fall on one slot of the hash table. */
+static void collide(float *x, uint32_t count)
+{
+	uint32_t unmix = inverse(0x9e3779b1u), found = 0;
+	for (uint32_t low = 0; found < count; low++) {
+		uint32_t bits = low * unmix;
+		assert_true(low < 1u << 15);
+		if ((bits >> 23 & 0xff) != 0xff)
+			memcpy(&x[found++], &bits, sizeof bits);
+	}
+}
+
+/* A file of such numbers does not take time by the square of its size: it is stored without indices. */
 static void test_collisions(void **state)
 {
 	(void)state;
 	enum { NUMBERS = 30000, SIDE = 256 };
-	uint32_t unmix = inverse(0x9e3779b1u), found = 0;
 	struct image from = {SIDE, SIDE, 1, malloc(sizeof(float) * SIDE * SIDE)};
 	assert_non_null(from.pixels);
-	for (uint32_t low = 0; found < NUMBERS; low++) {
-		uint32_t bits = low * unmix;
-		assert_true(low < 1u << 15);
-		if ((bits >> 23 & 0xff) != 0xff) /* finite */
-			memcpy(&from.pixels[found++], &bits, sizeof bits);
-	}
+	collide(from.pixels, NUMBERS);
 	for (size_t k = NUMBERS; k < (size_t)SIDE * SIDE; k++)
 		from.pixels[k] = from.pixels[k % NUMBERS];
+	check(&from, 0);
+	free(from.pixels);
+}
+
+/* Nor is a table searched to its limit for each pixel: a few such numbers, and then only the one found last. A few
+ * pixels of it do no harm. */
+static void test_far_number(void **state)
+{
+	(void)state;
+	enum { NUMBERS = 200, SIDE = 256, FEW = 256 };
+	struct image from = {SIDE, SIDE, 1, malloc(sizeof(float) * SIDE * SIDE)};
+	assert_non_null(from.pixels);
+	collide(from.pixels, NUMBERS);
+	for (size_t k = NUMBERS; k < (size_t)SIDE * SIDE; k++)
+		from.pixels[k] = from.pixels[k < (size_t)SIDE * SIDE - FEW ? 0 : NUMBERS - 1];
+	check(&from, 1);
+	for (size_t k = NUMBERS; k < (size_t)SIDE * SIDE; k++)
+		from.pixels[k] = from.pixels[NUMBERS - 1];
 	check(&from, 0);
 	free(from.pixels);
 }
@@ -114,9 +137,8 @@ static void test_scene_limit(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_every_count),
-		cmocka_unit_test(test_odd_numbers),
-		cmocka_unit_test(test_collisions),
+		cmocka_unit_test(test_every_count), cmocka_unit_test(test_odd_numbers),
+		cmocka_unit_test(test_collisions),  cmocka_unit_test(test_far_number),
 		cmocka_unit_test(test_scene_limit),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
