@@ -51,7 +51,7 @@ struct reader {
 
 /* A snapshot that another thread makes, and the workers' line. Not one of the pool's: those may all wait for a disk,
  * and the status has to say so. */
-struct image_builder {
+struct snapshot_task {
 	uv_thread_t thread;
 	uv_async_t done;
 	bool threaded;
@@ -69,7 +69,7 @@ struct status_socket {
 	LIST_HEAD(, reader) readers; /* with those that are being closed */
 	unsigned reader_count;	     /* without */
 	bool caller_waits;
-	struct image_builder *making; /* NULL: none; meanwhile nothing else is published */
+	struct snapshot_task *making; /* NULL: none; meanwhile nothing else is published */
 	bool tick_waits;	      /* a tick found one: it is the next one's turn, before those who have just come */
 	struct job_view *shown;	      /* the jobs as last sent to subscribers */
 	size_t shown_count;
@@ -334,7 +334,7 @@ static bool wants_snapshot(const struct reader *r, unsigned changed)
 
 static void run_making(void *making)
 {
-	struct image_builder *m = making;
+	struct snapshot_task *m = making;
 	if (m->for_some)
 		m->whole = share_text(snapshot_to_json(m->snapshot));
 	if (m->changed & TOPIC_WORKERS)
@@ -349,7 +349,7 @@ static void on_making_closed(uv_handle_t *h)
 
 static void making_done(uv_async_t *done)
 {
-	struct image_builder *m = done->data;
+	struct snapshot_task *m = done->data;
 	struct status_socket *t = m->socket;
 	if (m->threaded)
 		uv_thread_join(&m->thread);
@@ -384,7 +384,7 @@ static void begin_making(struct status_socket *t, unsigned changed)
 	}
 	if (t->making || !(some || workers))
 		return;
-	struct image_builder *m = mem_alloc(1, sizeof *m);
+	struct snapshot_task *m = mem_alloc(1, sizeof *m);
 	struct snapshot *n = m ? snapshot_take(t->peers) : NULL;
 	if (!n) { /* those that are behind stay so, and the others become so */
 		for (struct reader *r = LIST_FIRST(&t->readers); r; r = LIST_NEXT(r, next))
@@ -392,7 +392,7 @@ static void begin_making(struct status_socket *t, unsigned changed)
 		mem_free(m);
 		return;
 	}
-	*m = (struct image_builder){.socket = t, .snapshot = n, .changed = changed, .for_some = some};
+	*m = (struct snapshot_task){.socket = t, .snapshot = n, .changed = changed, .for_some = some};
 	t->making = m;
 	m->done.data = m;
 	uv_async_init(t->jobs->loop, &m->done, making_done);
