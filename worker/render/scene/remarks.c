@@ -44,7 +44,11 @@ static int on_integrator(struct report *r, const struct scene_node *n, struct er
 	while (inner && integrators_show_other(inner))
 		inner = integrators_inner(inner);
 	const char *how = strcmp(n->type, "stokes") == 0 ? ", without its polarization" : "";
-	if (integrators_show_other(n) && inner)
+	if (inner && !integrators_are_known(inner))
+		rc = remark(r, n, e,
+			    "the `%s` inside it is not known: the image shows all light, on surfaces and in media%s",
+			    inner->type, how);
+	else if (integrators_show_other(n) && inner)
 		rc = remark(r, n, e, "the image shows the light that the `%s` inside it asks for%s", inner->type, how);
 	else if (integrators_show_other(n))
 		rc = remark(r, n, e, "the image shows all light, on surfaces and in media%s", how);

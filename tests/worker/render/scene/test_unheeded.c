@@ -120,6 +120,9 @@ static void test_known_integrators(void **state)
 	}
 	check("<integrator type='my_direct'/>",
 	      "<integrator type=\"my_direct\">: is not known: the image shows all light, on surfaces and in media");
+	check("<integrator type='stokes'><integrator type='my_direct'/></integrator>",
+	      "<integrator type=\"stokes\">: the `my_direct` inside it is not known: the image shows all light, on "
+	      "surfaces and in media, without its polarization");
 }
 
 /* What a filter over a pixel's footprint becomes. */
