@@ -3,13 +3,17 @@
  * path_see_through follows the ray from z to y from one surface to the next, as long as each has a straight lobe. It
  * ends when nothing is left between the last surface and y. An opaque surface blocks the view, and so do more than
  * PATH_PASSED_MOST surfaces, which bounds the work: paths through more are left to sub-paths that pass the surfaces one
- * by one.
+ * by one. Past the very edge of a surface, a ray may get by that is blocked when the ends are tested (geom/accel.h: by
+ * rounding): then it goes on to the surface on which y lies, and that blocks it, too.
  */
 #include "worker/render/path/transparent.h"
 
 #include "worker/render/path/media.h"
 #include "worker/render/path/path.h"
 #include "worker/render/path/visible.h"
+
+/* A hit this near to the end of a ray, relative to its length, is its end: far more than double rounds. */
+static const double same_point = 0x1p-24;
 
 /* The share of light that goes straight through v, which a ray along d met. If there is any, v is made a vertex that
  * the path leaves straight on. */
@@ -30,20 +34,31 @@ static bool are_apart(const struct path_vertex *from, const struct path_vertex *
 	return distance2 > 0 && fabs(vec3_dot(v->x.ng, d)) > 0;
 }
 
+/* Whether v lies before y and is not y itself, met by a ray to it. whole: squared distance from where that began. */
+static bool is_before(const struct path_vertex *v, const struct path_vertex *y, double whole)
+{
+	double distance2;
+	if (y->kind == VERTEX_INFINITE)
+		return true;
+	path_direction(v, y, &distance2);
+	return distance2 > same_point * same_point * whole;
+}
+
 bool path_see_through(struct path_context *c, const struct path_vertex *before, const struct path_vertex *z,
 		      const struct path_vertex *y, spectrum *left)
 {
-	double distance2;
-	const vec3 d = path_direction(z, y, &distance2);
+	double whole;
+	const vec3 d = path_direction(z, y, &whole);
 	const struct path_vertex *from = z;
 	double begin = path_ray_begin(c->w, z, d);
-	if (!box_is_met(&c->w->passed, z->x.p, d, y->kind == VERTEX_INFINITE ? INFINITY : sqrt(distance2)))
+	if (!box_is_met(&c->w->passed, z->x.p, d, y->kind == VERTEX_INFINITE ? INFINITY : sqrt(whole)))
 		return false;
 	*left = spectrum_of(1);
 	for (unsigned n = 0; n < PATH_PASSED_MOST; n++) {
 		struct path_vertex *v = &c->passed[n];
 		double end = y->kind == VERTEX_INFINITE ? INFINITY : vec3_length(vec3_sub(y->x.p, from->x.p));
-		if (!path_extend(c, from, d, begin, end, v) || v->kind != VERTEX_SURFACE || !are_apart(from, v, d))
+		if (!path_extend(c, from, d, begin, end, v) || v->kind != VERTEX_SURFACE || !are_apart(from, v, d) ||
+		    !is_before(v, y, whole))
 			return false;
 		*left = spectrum_mul(*left, pass(c, v, d));
 		if (spectrum_is_zero(*left))
@@ -52,10 +67,8 @@ bool path_see_through(struct path_context *c, const struct path_vertex *before, 
 				: path_pdf_passed(c, from, v, TRANSPORT_RADIANCE);
 		*left = path_absorb_share(c, from, d, *left, v);
 		c->passed_count = n + 1;
-		if (path_visible(c, v, y)) {
-			path_direction(v, y, &distance2);
-			return distance2 > 0;
-		}
+		if (path_visible(c, v, y))
+			return true;
 		from = v;
 		begin = 0;
 	}
