@@ -422,10 +422,9 @@ static __attribute__((noinline)) spectrum seen_with_effects(struct path_context 
 {
 	const struct path_vertex *z = &c->camera[t - 1];
 	spectrum left;
-	const bool through = path_sees_through(c), too_short = s + t <= c->min_depth;
-	/* If they see each other, nothing lies between them, however short the path: y itself would be passed. */
-	if ((!too_short || through) && !spectrum_is_zero(direct) && is_seen(c, z, y, joint, &direct))
-		return too_short ? spectrum_of(0) : direct;
+	const bool through = path_sees_through(c);
+	if (s + t > c->min_depth && !spectrum_is_zero(direct) && is_seen(c, z, y, joint, &direct))
+		return direct;
 	if (!through || spectrum_is_zero(l))
 		return spectrum_of(0);
 	bool open = path_see_through(c, t > 1 ? z - 1 : NULL, z, y, &left);
