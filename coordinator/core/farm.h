@@ -45,8 +45,8 @@
  *   on three such workers, or three times and on all workers present. A failure that a worker attributes to its own
  *   machine (a full disk) makes it pause and does not count; if all workers present say so, the job waits and its
  *   status names them. A worker whose memory is taken by another scene is asked again every 10 s.
- * - A worker that disappears while it holds a lease is listed with that lease (lost.h). When it reconnects it may
- *   report that the lease ended it, which is an ordinary failure. Workers that never return count only if eight in a
+ * - A worker that disappears while it holds a lease is listed with that lease (lost_holders.h). When it reconnects it
+ * may report that the lease ended it, which is an ordinary failure. Workers that never return count only if eight in a
  *   row held the same lease. After a job ended workers, its owner's jobs of which nothing was computed get one lease at
  *   a time for a while.
  *

@@ -73,7 +73,7 @@ struct late_result {
 	uint64_t peer; /* the worker that the core has given the lease to; 0: none */
 };
 
-/* Where a merged batch is in the journal (back.h). */
+/* Where a merged batch is in the journal (rollback.h). */
 struct merged_record {
 	uint32_t slot;
 	uint64_t epoch, at;

@@ -13,7 +13,7 @@
 struct age_job {
 	uint64_t id;
 	double order;			     /* later for each that ended later, whatever became of the observed time */
-	double ended;			     /* s of observed time at that moment (seen.h) */
+	double ended;			     /* s of observed time at that moment (age_clock.h) */
 	uint64_t films, result;		     /* bytes: of what only serves extensions; of result, preview and log */
 	bool busy;			     /* somebody fetches its result: it is kept this time */
 	bool no_films, no_result, no_record; /* the output */

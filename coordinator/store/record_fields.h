@@ -31,7 +31,8 @@
 	NUMBER(bool, cut, "cut", NULL, NOWHERE, KEPT)		       /* an extension was cancelled since */        \
 	NUMBER(real, submitted, "submitted", "submitted", AT(submitted), KEPT) /* s since 1970 */                    \
 	NUMBER(real, ended, "ended", "ended", NOWHERE, KEPT)		       /* s since 1970; 0: not yet */        \
-	NUMBER(known, ended_seen, "endedSeen", NULL, NOWHERE, KEPT) /* observed time in s at that moment (seen.h) */ \
+	NUMBER(known, ended_seen, "endedSeen", NULL, NOWHERE,                                                        \
+	       KEPT) /* observed time in s at that moment (age_clock.h) */                                           \
 	NUMBER(real, progress, "progress", "progress", AT(progress), LIVE)                                           \
 	NUMBER(known, rel_error, "relError", "error", AT(error), KEPT)                                               \
 	NUMBER(known, rel_error_about, "relErrorAbout", "errorAbout", AT(error_about), KEPT)   /* the estimate */    \

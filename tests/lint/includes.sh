@@ -207,6 +207,15 @@ marks() {
 	grep -nIE "$words" $(git ls-files 2>/dev/null || find $FOLDERS tests deploy proto -type f)
 }
 
+# Comments that send the reader to a header which has been renamed.
+named() {
+	known=$({ find $FOLDERS tests proto -name '*.h'; sed -n 's/^# *include <\(.*\)>.*/\1/p' $SOURCES $(find tests -name '*.[ch]'); } | sort -u)
+	grep -hvE '^[[:space:]]*# *include' $SOURCES $(find tests -name '*.[ch]') | grep -oE '[A-Za-z0-9_/-]{3,}\.h\b' | sort -u |
+		while read -r h; do
+			printf '%s\n' "$known" | grep -qE "(^|/)$h\$" || echo "$h, named in $(grep -rlF "$h" $FOLDERS tests | head -n 1)"
+		done
+}
+
 # overlong MOST FILE...
 overlong() {
 	most=$1
@@ -223,6 +232,7 @@ check "no folders in a circle" circles
 check "no files in a circle" returns
 check "each library is included only at its door" doors
 check "each header declares what its own source defines" declared
+check "every header that a comment names exists" named
 check "no unfinished marks" marks
 check "no source of more than $MOST_LINES lines" overlong $MOST_LINES $SOURCES
 check "no test of more than $MOST_LINES_TEST lines" overlong $MOST_LINES_TEST $(find tests -name '*.[ch]')

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* SQLite on the disk of lossy.h: a VFS around the system's. */
+/* SQLite on the disk of faulty_disk.h: a VFS around the system's. */
 #include "tests/support/faulty_disk.h"
 
 #include <errno.h>

@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The renderer: a library without network code. This is its only public header for the daemon and the command line: it
- * declares nothing itself. A world is immutable and shared by all threads; a lease is run by one thread.
+ * The renderer: a library without network code. This is its public header; it declares nothing itself. The daemon and
+ * the command line also include, by name, what only some of them need: accuracy_settings.h, choose.h, fingerprint.h,
+ * rays.h, unseen_light.h, and of scene/ how files are opened and what is supported. A world is immutable and shared by
+ * all threads; a lease is run by one thread.
  */
 #ifndef WORKER_RENDER_RENDER_H
 #define WORKER_RENDER_RENDER_H

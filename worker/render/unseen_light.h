@@ -11,8 +11,8 @@
 #include "worker/render/path/brightness.h"
 #include "worker/render/world/world.h"
 
-/* Fills in r->unseen. r: complete, with the integrator chosen. All 0: no lobe is narrow, so that nothing hides. For
- * chains it is what samples of bdpt hardly ever find, which begin them. Takes 0.1 to 0.3 s, however long the render.
+/* Fills in r->unseen. r: complete, with the integrator chosen. All 0 if no lobe is narrow. For chains it is the light
+ * that bdpt, whose samples they begin with, hardly ever finds. Takes 0.1 to 0.3 s, however long the render.
  * -ENOMEM, -EINVAL */
 int render_unseen_light(const struct world *w, struct plan_request *r, struct error *e);
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Faults of the disk: those of tests/coordinator/power, where the coordinator's calls go through a disk that loses what was not
+# Faults of the disk: those of tests/coordinator/power_loss, where the coordinator's calls go through a disk that loses what was not
 # synchronised. The test counts for itself: what was acknowledged and is not there, what a film holds too often, images of other bits.
 
 fault power 101 0 "power is lost at any of the coordinator's disk operations"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Computes figures from films. The errors of all settings are weighted by one image, the mean over the settings, so
- * that only their noise differs, not the weights.
+ * that only their noise differs, not the weights. Fails only if memory is out.
  */
 #include "worker/cli/accuracy/accuracy_judge.h"
 

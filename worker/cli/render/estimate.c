@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The errors estimated by a pilot (common/estimate/forecast.h) as a table of errors and their costs, as JSON and as a
- * plot. Rows beyond what the pilot can predict say so instead of giving a number.
+ * plot. Rows beyond what the pilot can predict say so instead of giving a number. Failures: those of the pilot, a plot
+ * or a stdout that cannot be written.
  */
 #include "worker/cli/render/estimate.h"
 

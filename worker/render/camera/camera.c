@@ -17,8 +17,8 @@ static double pixels_per_slope(const struct scene_settings *s)
 }
 
 /* An orthographic camera is a pinhole so far behind the scene that objects twice as far away look smaller by 2^-20
- * only: a thousandth of a pixel in a film of 1,000. A telecentric one is a lens there, of which each point of the plane
- * of focus sees as much as of the aperture in front of it. */
+ * only: a thousandth of a pixel in a film of 1,000. A telecentric camera is a lens at that distance; a point of the
+ * plane of focus sees it under the same solid angle as the real aperture. */
 static void step_back(struct camera *c, double half_width)
 {
 	double distance = 0x1p20 * fmax(1, half_width);

@@ -78,7 +78,8 @@ static void keep_own(struct beam *b)
 	b->own[2] = mat4_vector(&back, f.n);
 }
 
-/* The plane goes along: two vectors in it span its normal, and heights over it grow as that of a third one does. */
+/* The plane moves with the emitter: its normal is the cross product of two vectors in it, transformed, and heights over
+ * it scale as a third vector's does. */
 static void place(struct emitter *em, const mat4 *to_world)
 {
 	struct beam *b = em->data;

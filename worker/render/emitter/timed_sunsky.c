@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Daylight over a time, `timed_sunsky` of Mitsuba 3.7: the time of the camera's shutter, as a share of the emitter's
- * own, goes through the days from the first to the one before the last, and through the window of hours on each. The
- * image has the mean of all, so the emitter is an environment map of it: of the sky, its mean at SKIES times; of the
- * sun, its light at SUNS of them, each at a point of its disk. (One time, and DISK points, where the shutter opens and
- * closes at once.) When the sun is below the horizon there is no light.
+ * Daylight over a time, `timed_sunsky` of Mitsuba 3.7: while the camera's shutter is open, which is a share of the
+ * emitter's own time, the days pass from the first to the one before the last, and each day's window of hours. The
+ * emitter is an environment map of the mean light: the sky at SKIES times, and the sun at SUNS times, each at one point
+ * of its disk. If the shutter opens and closes at once, it is one sky and DISK points of the sun. There is no light
+ * while the sun is below the horizon.
  *
  * Failures: those of sunsky.c; times in another order, a shutter that is open beyond the emitter's, a scene of 0.6.
  */

@@ -27,7 +27,7 @@ const struct plugin_decl medium_decls[] = {
 	{PLUGIN_MEDIUM, "homogeneous",
 	 PARAMS({"sigma_a", COEFFICIENT}, {"sigma_s", COEFFICIENT}, {"sigma_t", VARIES, 1e30, NULL},
 		{"albedo", VARIES, 1, NULL}, {"scale", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, 0, 1e30, NULL},
-		{"material", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, NULL},	       /* of 0.6: measured.h */
+		{"material", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, NULL},	       /* of 0.6: measured_media.h */
 		{"g", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, -0.999, 0.999, NULL}, /* of 0.6 */
 		SAMPLING_PARAMS),
 	 1u << PLUGIN_PHASE, PARAM_UNDERSTOOD},

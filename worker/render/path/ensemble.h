@@ -3,7 +3,7 @@
  * All paths that one pair of sub-paths makes, each with its contribution by the balance heuristic: what bdpt averages,
  * seen as candidates of which one can be drawn in proportion to its contribution.
  *
- * Sub-paths beyond a few vertices go on with a fixed probability; contributions are divided by it, so that their
+ * Sub-paths have n > 5 or more vertices with probability (5 / n)^2; contributions are divided by it, so that their
  * expected sum stays the integral. That a path x is among the candidates of a random pair can be turned round:
  * ensemble_around draws a pair as it would be had x been drawn from it. One thread; nothing allocates.
  */

@@ -73,11 +73,11 @@ void path_stop_in_medium(struct path_vertex *to, const struct path_vertex *from,
 bool path_see_in_media(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
 		       struct path_edge *edge, spectrum *left);
 
-/* What the edge contributes to the density of `to` as generated from its other end: the density per length of an event
- * in `medium`, which is the one there, or the probability that there is none on the way. */
+/* What the edge contributes to the density of `to` as generated from its other end. If `to` is an event in a medium:
+ * its density per length, in `medium`. Otherwise: the probability that there is no event on the way. */
 double path_edge_pdf(const struct path_context *c, const struct path_edge *edge, uint32_t medium,
 		     const struct path_vertex *to);
-/* Multiplies that of a sub-path's last edge into its density, and with the transmittance into its beta. */
+/* Multiplies path_edge_pdf of a sub-path's last edge into its density, and transmittance over it into its beta. */
 void path_travel(const struct path_context *c, struct path_vertex *to, spectrum left);
 
 /* sigma_s times the phase function, of VERTEX_MEDIUM. 1 / length / solid angle */

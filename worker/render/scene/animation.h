@@ -11,7 +11,7 @@
  * times that do not ascend; transforms between which something would be flat. */
 int animation_read(const struct xml_element **el, struct arena *arena, const struct animation **out, struct error *e);
 
-/* What a node is that cannot move although its plug-in can, of that element; NULL: it can. */
+/* Why a node cannot be animated although its plug-in can, as a noun for the message; NULL: it can. */
 const char *animation_refused(const struct scene_node *n, const struct xml_element *el);
 
 #endif

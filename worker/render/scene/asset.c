@@ -140,8 +140,8 @@ static const char *after(const char *folder, const char *path)
 	return strncmp(path, folder, n) == 0 && path[n] == '/' ? path + n + 1 : NULL;
 }
 
-/* What follows the folder in an absolute path that lies below it, as its user called it or as it is; NULL: it does
- * not. */
+/* The part of an absolute path after the folder, compared as written or with the folder's links resolved; NULL: it is
+ * not below the folder. */
 static const char *below(const char *folder, const char *path)
 {
 	char real[PATH_MAX];

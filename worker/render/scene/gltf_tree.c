@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Members of JSON objects, and elements made from them, for the reader of glTF. After a failure nothing is added to the
- * tree until gltf_go_on has noted it.
+ * tree until gltf_go_on has noted it. Failures: members of another type or out of range, and out of memory; each names
+ * its place in the file.
  */
 #include "worker/render/scene/gltf_tree.h"
 

@@ -26,7 +26,7 @@ int substitute_cover(const struct notes *t, const struct xml_element *el, bool l
 /* A medium that `lacks` something that was left out, such as its density, goes, too. */
 int substitute_medium(const struct notes *t, const struct xml_element *el, bool lacks, const struct scene_node *node);
 
-/* In 0.6, a volume of one value goes without it, and with it the medium that it is a part of. */
+/* In 0.6, a constant volume without its value is removed, and so is the medium that uses it. */
 int substitute_volume(const struct notes *t, const struct xml_element *el, const struct scene_node *node);
 
 #endif

@@ -11,7 +11,7 @@
 /* The share of the light that has entered a flat medium and leaves it again: Jensen, Marschner, Levoy and Hanrahan
  * 2001, section 2.2, integrated over the surface. albedo: the reduced one, in [0, 1]; eta: inside over outside. */
 double subsurface_reflectance(double albedo, double eta);
-/* The diffuse reflectance of a `plastic` below its boundary with which as much leaves it. */
+/* The diffuse reflectance below the boundary of a `plastic` with which it reflects `reflectance` in all. */
 double subsurface_base(double reflectance, double eta);
 
 /* Shapes with a dipole below a `plastic` or `roughplastic` get this one with such a base instead, with a note. Other

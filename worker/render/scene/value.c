@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A table has each element's name, its attributes and its reader. Other attributes are refused with the nearest name,
- * so a typing error never silently becomes a default.
+ * so a typing error never silently becomes a default. So are values that do not parse; each error has file and line.
  */
 #include "worker/render/scene/value.h"
 

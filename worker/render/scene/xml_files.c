@@ -76,8 +76,8 @@ static int look_around(const struct xml_files *f, const char *written, const cha
 	return 0;
 }
 
-/* In those of <path>, the last one first, as in Mitsuba 3. If the file is nowhere else, and one of these folders may
- * not be read, *name is what the file would be called there: whoever opens it says which --path would allow that. */
+/* In the folders of <path>, the last one first, as in Mitsuba 3. If the file is in none that may be read, *name is its
+ * path in one that may not: opening it fails, with the --path that would allow it. */
 static int look_along_paths(const struct xml_files *f, const char *written, const char **name, bool *found)
 {
 	const char *outside = NULL;
