@@ -120,6 +120,18 @@ static int check_inputs(const struct output_file *f, const struct place *p, cons
 	return 0;
 }
 
+/* A name that promises another format of pictures than is written. */
+static int check_name(const struct output_file *f, struct error *e)
+{
+	const char *promised = picture_name_format(f->path), *own = f->format == OUTPUT_EXR   ? ".exr"
+								    : f->format == OUTPUT_PNG ? ".png"
+											      : NULL;
+	if (!promised || !own || strcmp(promised, own) == 0)
+		return 0;
+	return error_set(e, EINVAL, "%s %s: %s is written, which the name does not say%s", f->option, f->path,
+			 formats[f->format].noun, f->format == OUTPUT_EXR ? "; hslt-tonemap converts one to PNG" : "");
+}
+
 /* A file that cannot be read is not known to be of another format. */
 static int check_format(const struct output_file *f, struct error *e)
 {
@@ -145,7 +157,9 @@ int output_files_check(const struct output_files *o, const char *const *inputs, 
 	for (size_t i = 0; i < OUTPUT_FILES_MOST; i++) {
 		if (!f[i].path)
 			continue;
-		int rc = find(&places[i], f[i].path, e);
+		int rc = check_name(&f[i], e);
+		if (!rc)
+			rc = find(&places[i], f[i].path, e);
 		if (!rc)
 			rc = check_inputs(&f[i], &places[i], inputs, input_count, e);
 		for (size_t j = 0; !rc && j < i; j++)

@@ -27,7 +27,8 @@ struct output_files {
 };
 
 /* inputs: paths; those that do not exist or are "-" are left to whoever reads them. An existing regular file is
- * replaced only if it is empty or begins as files of the format do. */
+ * replaced only if it is empty or begins as files of the format do. -EINVAL: also for a name of another format of
+ * pictures. */
 int output_files_check(const struct output_files *o, const char *const *inputs, size_t input_count, struct error *e);
 
 /* Refuses a file that is read while the command runs. */

@@ -62,6 +62,10 @@ code 1 "$BIN/hslt-render" "$BOX" -o "$DIR/no/such/folder.exr" # before hours are
 code 1 "$BIN/hslt-submit" "$BOX" -o "$DIR/no/such/folder.exr" --wait
 code 1 "$BIN/hslt-submit" "$DIR/none.xml" -o "$DIR/a.exr"
 code 2 "$BIN/hslt-submit" "$BOX" -o "$DIR/a.exr" --crop 0,0,0,0,0
+code 1 "$BIN/hslt-assemble" -o "$DIR/a.png" "$DIR/a.exr"
+grep -q "hslt-tonemap" "$DIR/err.log" || fail "hslt-assemble -o a.png says: $(cat "$DIR/err.log")"
+code 1 "$BIN/hslt-job" --coordinator "$COORDINATOR" fetch j1 -o "$DIR/a.png"
+grep -q "hslt-tonemap" "$DIR/err.log" || fail "hslt-job fetch -o a.png says: $(cat "$DIR/err.log")"
 for p in render submit; do
 	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.png"
 	grep -q "hslt-tonemap" "$DIR/err.log" || fail "hslt-$p -o a.png says: $(cat "$DIR/err.log")"

@@ -133,12 +133,24 @@ static void test_formats(void **state)
 	assert_int_equal(output_format_of_plot("cost.png"), OUTPUT_PNG);
 }
 
+/* A name is not to say another format than the file has; one that says none, or in capitals, is taken. */
+static void test_names(void **state)
+{
+	(void)state;
+	refuses(&(struct output_files){{{"-o", "x.png", OUTPUT_EXR}}}, NULL, "an OpenEXR file is written");
+	refuses(&(struct output_files){{{"-o", "x.JPG", OUTPUT_EXR}}}, NULL, "hslt-tonemap");
+	refuses(&(struct output_files){{{"--heatmap", "x.exr", OUTPUT_PNG}}}, NULL, "a PNG file is written");
+	accepts(&(struct output_files){{{"-o", "x.EXR", OUTPUT_EXR}, {"--heatmap", "x.PNG", OUTPUT_PNG}}}, NULL);
+	accepts(&(struct output_files){{{"-o", "x.2", OUTPUT_EXR}, {"--plot", "x.svg", OUTPUT_SVG}}}, NULL);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_input),
 		cmocka_unit_test(test_two_outputs),
 		cmocka_unit_test(test_formats),
+		cmocka_unit_test(test_names),
 	};
 	return cmocka_run_group_tests(tests, enter, leave);
 }

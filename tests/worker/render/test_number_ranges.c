@@ -155,7 +155,7 @@ static void check_inside(const struct plugin_decl *d, const struct param *p, enu
 	int end = try_value(d, p, type, x, said, sizeof said, text);
 	if (!end)
 		return;
-	snprintf(own, sizeof own, "%s=%g is outside [", p->name, x);
+	snprintf(own, sizeof own, "%s=%.9g is outside [", p->name, x);
 	snprintf(positive, sizeof positive, "%s=%g must be positive", p->name, x);
 	c->trials++;
 	c->rendered += end == TRIAL_RENDERED;

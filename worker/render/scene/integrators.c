@@ -40,19 +40,21 @@ const struct scene_node *integrators_inner(const struct scene_node *n)
 	return node_child(n, PLUGIN_INTEGRATOR, 0);
 }
 
-/* What an integrator has that does not state it; -1: no limit. */
-static int64_t default_depth(const char *type, int64_t around)
+/* -1: no limit. around: of the integrator around it, which holds if it states none. `direct` has no such parameter in
+ * Mitsuba: what is stated can only shorten its paths. */
+static int64_t depth_of(const struct scene_node *n, int64_t around)
 {
-	if (depth_is_direct(type))
+	int64_t depth = node_int(n, "max_depth", depth_is_prb(n->type) ? SCENE_PRB_DEPTH : around);
+	if (depth_is_direct(n->type) && (depth < 0 || depth > SCENE_DIRECT_DEPTH))
 		return SCENE_DIRECT_DEPTH;
-	return depth_is_prb(type) ? SCENE_PRB_DEPTH : around;
+	return depth;
 }
 
 int64_t integrators_depth(const struct scene_node *n)
 {
 	int64_t depth = -1;
 	for (; n; n = integrators_inner(n))
-		depth = node_int(n, "max_depth", default_depth(n->type, depth));
+		depth = depth_of(n, depth);
 	return depth;
 }
 

@@ -42,7 +42,7 @@ static int check_range(const struct xml_element *el, const struct param *p, cons
 			return xml_error(el, e, ERANGE, "%s=%g must be positive", p->name, x[i]);
 	for (uint32_t i = 0; i < count; i++)
 		if (!(x[i] >= p->min && x[i] <= p->max))
-			return xml_error(el, e, ERANGE, "%s=%g is outside [%g, %g]", element_spelling(el, p->name),
+			return xml_error(el, e, ERANGE, "%s=%.9g is outside [%g, %g]", element_spelling(el, p->name),
 					 x[i], p->min, p->max);
 	return 0;
 }

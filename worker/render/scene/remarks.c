@@ -54,8 +54,10 @@ static int on_integrator(struct report *r, const struct scene_node *n, struct er
 		rc = remark(r, n, e, "the image shows all light, on surfaces and in media%s", how);
 	else if (!integrators_are_known(n))
 		rc = remark(r, n, e, "is not known: the image shows all light, on surfaces and in media");
-	if (!rc && depth_is_direct(n->type) && !node_find(n, "max_depth"))
-		rc = remark(r, n, e, "the image shows light that is scattered once; --max-depth shows more");
+	int64_t depth = node_int(n, "max_depth", SCENE_DIRECT_DEPTH);
+	if (!rc && depth_is_direct(n->type) && (depth < 0 || depth >= SCENE_DIRECT_DEPTH))
+		rc = remark(r, n, e, "the image shows light that is scattered once%s; --max-depth shows more",
+			    depth == SCENE_DIRECT_DEPTH ? "" : ", whatever max_depth says");
 	if (!rc && depth_is_prb(n->type) && !node_find(n, "max_depth"))
 		rc = remark(r, n, e, "max_depth is %d, its default in Mitsuba; --max-depth shows more",
 			    SCENE_PRB_DEPTH);

@@ -183,6 +183,14 @@ static void test_sampler_and_integrator(void **state)
 	assert_int_equal(
 		read_ok("<integrator type='direct'><integer name='max_depth' value='1'/></integrator>", "").max_depth,
 		1);
+	assert_int_equal(
+		read_ok("<integrator type='direct'><integer name='max_depth' value='-1'/></integrator>", "").max_depth,
+		2);
+	assert_int_equal(read_ok("<integrator type='aov'><integrator type='direct'><integer name='max_depth' "
+				 "value='6'/></integrator></integrator>",
+				 "")
+				 .max_depth,
+			 2);
 }
 
 static void test_camera(void **state)
