@@ -157,9 +157,7 @@ int output_files_check(const struct output_files *o, const char *const *inputs, 
 	for (size_t i = 0; i < OUTPUT_FILES_MOST; i++) {
 		if (!f[i].path)
 			continue;
-		int rc = check_name(&f[i], e);
-		if (!rc)
-			rc = find(&places[i], f[i].path, e);
+		int rc = find(&places[i], f[i].path, e);
 		if (!rc)
 			rc = check_inputs(&f[i], &places[i], inputs, input_count, e);
 		for (size_t j = 0; !rc && j < i; j++)
@@ -168,6 +166,8 @@ int output_files_check(const struct output_files *o, const char *const *inputs, 
 					       f[i].path);
 		if (!rc)
 			rc = check_format(&f[i], e);
+		if (!rc)
+			rc = check_name(&f[i], e);
 		if (!rc)
 			rc = image_file_probe(f[i].path, e);
 		if (rc)
