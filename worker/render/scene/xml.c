@@ -361,6 +361,13 @@ static int open_element(struct reader *r, const char *name, const char **attribu
 
 static int read_file(struct reader *r, const char *name);
 
+/* An element in which a file breaks off. The file of an <include> would have been read at its end. */
+static void leave_open(struct xml_element *el)
+{
+	el->told = true;
+	el->unset |= strcmp(el->name, "include") == 0;
+}
+
 /* After a file that is not well formed: whether what it holds up to there can be understood. What is still open is
  * incomplete, and not looked at. */
 static bool keep_beginning(struct reader *r)
@@ -368,8 +375,8 @@ static bool keep_beginning(struct reader *r)
 	if (!r->top || r->minor >= 0 || !xml_attribute(r->top, "version"))
 		return false;
 	for (struct xml_element *el = r->current; el && el != r->top; el = el->parent)
-		el->told = true;
-	r->top->told = true;
+		leave_open(el);
+	leave_open(r->top);
 	return true;
 }
 

@@ -95,6 +95,23 @@ static void test_files_that_break_off(void **state)
 	lists_of(S "<shape type='$kind'/>\n", unset);
 }
 
+/* An <include> that is still open there was never read: in the scene, in an object, and as the first element of a file.
+ */
+static void test_includes_that_break_off(void **state)
+{
+	(void)state;
+	static const char *const said[] = {"s.xml:1: not well-formed (invalid token) in <include>", NULL};
+	static const char *const inner[] = {"i.xml:1: not well-formed (invalid token) in <include>", NULL};
+	lists_of(S "<include filename='i.xml'><b\xff", said);
+	lists_of(S "<shape type='cube'><include filename='i.xml'><b\xff", said);
+	lists_of(S "<include filename='i.xml'><bsdf type='diffuse'/><b\xff", said);
+	static const char outer[] = S "<include filename='i.xml'/>" END,
+			  first[] = "<include filename='s.xml' version='3.0.0'><b\xff";
+	const struct memory_file files[] = {
+		{"s.xml", outer, sizeof outer - 1}, {"i.xml", first, sizeof first - 1}, {0}};
+	lists(files, false, inner);
+}
+
 /* Every duplicate and every alias; what an alias would name is not complained of. */
 static void test_ids(void **state)
 {
@@ -269,15 +286,11 @@ static void test_gltf(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_names_without_values),
-		cmocka_unit_test(test_paths_without_values),
-		cmocka_unit_test(test_files_that_are_not_there),
-		cmocka_unit_test(test_ids),
-		cmocka_unit_test(test_inside_unknown_types),
-		cmocka_unit_test(test_files_that_break_off),
-		cmocka_unit_test(test_wrong_steps),
-		cmocka_unit_test(test_values_in_unknown_types),
-		cmocka_unit_test(test_gltf),
+		cmocka_unit_test(test_names_without_values),	      cmocka_unit_test(test_paths_without_values),
+		cmocka_unit_test(test_files_that_are_not_there),      cmocka_unit_test(test_ids),
+		cmocka_unit_test(test_inside_unknown_types),	      cmocka_unit_test(test_files_that_break_off),
+		cmocka_unit_test(test_includes_that_break_off),	      cmocka_unit_test(test_wrong_steps),
+		cmocka_unit_test(test_values_in_unknown_types),	      cmocka_unit_test(test_gltf),
 		cmocka_unit_test(test_included_files_that_break_off),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
