@@ -25,8 +25,8 @@ static int decode(struct raster *r, const struct scene_node *n, const struct ass
 		code = image_power(&image, k->power, &reason);
 	if (!code && grey)
 		image_grey(&image, k->channel);
-	if (!code)
-		code = error_prefix(&reason, indexed_image_make(&image, arena, &r->image, &reason), "%s", k->name);
+	if (!code && (code = indexed_image_make(&image, arena, &r->image, &reason)))
+		error_prefix(&reason, code, "%s", k->name);
 	arena_fini(&decoded);
 	return code ? node_error(n, e, -code, "%s", reason.text) : 0;
 }
