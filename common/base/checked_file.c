@@ -11,7 +11,7 @@
 
 enum { BUFFER = 1 << 16, CRC = 4 };
 
-static int fault(const struct checked_file *s, int code, struct error *e)
+static int set_file_error(const struct checked_file *s, int code, struct error *e)
 {
 	return error_set(e, code, "%s: %s", s->path, strerror(code));
 }
@@ -20,7 +20,7 @@ static int open_file(struct checked_file *s, const char *path, int flags, struct
 {
 	*s = (struct checked_file){.path = path, .fd = disk_open(path, flags | O_CLOEXEC, 0666)};
 	if (s->fd < 0)
-		return fault(s, errno, e);
+		return set_file_error(s, errno, e);
 	s->buffer = mem_alloc(BUFFER, 1);
 	if (s->buffer)
 		return 0;
@@ -37,7 +37,7 @@ static int flush(struct checked_file *s, struct error *e)
 {
 	int rc = disk_write_all(s->fd, s->buffer, s->filled);
 	s->filled = 0;
-	return rc ? fault(s, -rc, e) : 0;
+	return rc ? set_file_error(s, -rc, e) : 0;
 }
 
 /* A number does not lie across two buffers. */
@@ -71,11 +71,11 @@ int checked_file_finish(struct checked_file *s, struct error *e)
 	if (!rc)
 		rc = flush(s, e);
 	if (!rc && disk_fsync(s->fd))
-		rc = fault(s, errno, e);
+		rc = set_file_error(s, errno, e);
 	if (!rc)
 		disk_forget(s->fd);
 	if (disk_close(s->fd) && !rc)
-		rc = fault(s, errno, e);
+		rc = set_file_error(s, errno, e);
 	mem_free(s->buffer);
 	s->buffer = NULL;
 	return rc;
@@ -92,7 +92,7 @@ static int refill_buffer(struct checked_file *s, struct error *e)
 	s->filled = n > 0 ? (size_t)n : 0;
 	s->from += s->filled;
 	if (n < 0)
-		return fault(s, errno, e);
+		return set_file_error(s, errno, e);
 	return s->progress ? s->progress(s->user, s->filled, e) : 0;
 }
 
@@ -119,7 +119,7 @@ static int check(struct checked_file *s, struct error *e)
 	unsigned char want[CRC];
 	uint32_t crc = 0;
 	if (disk_fstat(s->fd, &st))
-		return fault(s, errno, e);
+		return set_file_error(s, errno, e);
 	if ((uint64_t)st.st_size < sizeof want)
 		return error_set(e, EBADMSG, "%s: too short", s->path);
 	s->left = (uint64_t)st.st_size - sizeof want;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/base/log_limit.h"
 
-static void refill(struct log_bucket *b, double now)
+static void refill_bucket(struct log_bucket *b, double now)
 {
 	double back = now > b->at ? (now - b->at) * LOG_PER_SECOND : 0;
 	b->used = b->used > back ? b->used - back : 0;
@@ -10,7 +10,7 @@ static void refill(struct log_bucket *b, double now)
 
 bool log_bucket_take(struct log_bucket *b, double now)
 {
-	refill(b, now);
+	refill_bucket(b, now);
 	if (b->used + 1 > LOG_BURST) {
 		b->withheld++;
 		return false;
@@ -22,7 +22,7 @@ bool log_bucket_take(struct log_bucket *b, double now)
 uint64_t log_bucket_withheld(struct log_bucket *b, double now)
 {
 	uint64_t n = b->withheld;
-	refill(b, now);
+	refill_bucket(b, now);
 	if (!n || b->used + 1 > LOG_BURST)
 		return 0;
 	b->used++; /* the line that reports this */

@@ -230,7 +230,7 @@ struct reader {
 	struct error *e;
 };
 
-static int environment(const struct reader *x)
+static int apply_environment(const struct reader *x)
 {
 	const struct option_row *r;
 	for (size_t i = 0; (r = option_at(x->program, i, NULL)) != NULL; i++) {
@@ -242,7 +242,7 @@ static int environment(const struct reader *x)
 	return 0;
 }
 
-static int unknown(const struct reader *x, const char *dashes, const char *name)
+static int refuse_unknown(const struct reader *x, const char *dashes, const char *name)
 {
 	struct spelling s = {.wanted = name};
 	const struct option_row *r;
@@ -273,11 +273,11 @@ static const struct option_row *find(const struct reader *x, const char *name)
 	if (count > 1)
 		error_set(x->e, EINVAL, "option '--%s' is ambiguous: %s", name, list);
 	else if (!found)
-		unknown(x, "--", name);
+		refuse_unknown(x, "--", name);
 	return count == 1 ? found : NULL;
 }
 
-static int apply(struct reader *x, const struct option_row *r, char *arg)
+static int apply_option(struct reader *x, const struct option_row *r, char *arg)
 {
 	if (r->kind >= OPTION_IS_HELP) {
 		x->asked = r->kind;
@@ -303,7 +303,7 @@ static int read_long(struct reader *x, char *text)
 		return -EINVAL;
 	if (equals && !r->arg)
 		return error_set(x->e, EINVAL, "option '--%s' takes no argument", r->name);
-	return apply(x, r, equals ? equals + 1 : NULL);
+	return apply_option(x, r, equals ? equals + 1 : NULL);
 }
 
 static const struct option_row *find_key(const struct reader *x, char key)
@@ -321,8 +321,8 @@ static int read_short(struct reader *x, char *text)
 	for (char *k = text; !rc && x->asked == OPTION_IS_END && *k; k++) {
 		const struct option_row *r = find_key(x, *k);
 		if (!r)
-			return unknown(x, "-", text);
-		rc = apply(x, r, r->arg && k[1] ? k + 1 : NULL);
+			return refuse_unknown(x, "-", text);
+		rc = apply_option(x, r, r->arg && k[1] ? k + 1 : NULL);
 		if (r->arg)
 			break;
 	}
@@ -361,7 +361,7 @@ static int read_all(struct reader *x)
 	return rc;
 }
 
-static int needed(const struct reader *x)
+static int check_needed(const struct reader *x)
 {
 	const struct option_row *r;
 	for (size_t i = 0; (r = option_at(x->program, i, NULL)) != NULL; i++)
@@ -387,7 +387,7 @@ static int check(const struct reader *x)
 		rc = p->shared->check(x->target, x->e);
 	if (!rc && p->own.check)
 		rc = p->own.check(x->target, x->e);
-	return rc ? rc : needed(x);
+	return rc ? rc : check_needed(x);
 }
 
 int options_parse(const struct program *p, int argc, char **argv, void *target, enum option_kind *asked,
@@ -398,7 +398,7 @@ int options_parse(const struct program *p, int argc, char **argv, void *target, 
 	if (!rc && p->shared)
 		rc = option_defaults(p->shared, target, e);
 	if (!rc)
-		rc = environment(&x);
+		rc = apply_environment(&x);
 	if (!rc)
 		rc = read_all(&x);
 	if (!rc && x.asked == OPTION_IS_END)

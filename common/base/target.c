@@ -26,7 +26,7 @@ static int own_descriptor(const char *path)
 }
 
 /* Follows one link; `path` is the link. */
-static int follow(char path[TARGET_PATH], struct error *e)
+static int follow_link(char path[TARGET_PATH], struct error *e)
 {
 	char to[TARGET_PATH], next[TARGET_PATH];
 	ssize_t n = readlink(path, to, sizeof to - 1);
@@ -62,7 +62,7 @@ int target_find(struct target *t, const char *path, struct error *e)
 		t->through = !S_ISREG(st.st_mode);
 		if (!S_ISLNK(st.st_mode))
 			return 0;
-		int rc = follow(t->path, e);
+		int rc = follow_link(t->path, e);
 		if (rc)
 			return rc;
 		t->through = false;

@@ -55,7 +55,7 @@ void text_clean(char *text)
 }
 
 /* The length of a text of n bytes without an incomplete sequence at its end. */
-static size_t whole(const char *text, size_t n)
+static size_t complete_length(const char *text, size_t n)
 {
 	size_t start = n;
 	while (start && n - start < 4 && ((unsigned char)text[start - 1] & 0xC0) == 0x80)
@@ -86,7 +86,7 @@ __attribute__((format(printf, 4, 0))) static size_t print(char *out, size_t size
 	size_t used = n < 0 ? 0 : (size_t)n;
 	*cut = used >= size;
 	if (*cut && size) {
-		used = whole(out, size - 1);
+		used = complete_length(out, size - 1);
 		out[used] = 0;
 	}
 	return used;

@@ -17,7 +17,7 @@ static void remove_and_end(int number)
 	raise(number); /* SA_RESETHAND: as it was by default, when this returns */
 }
 
-static void block(sigset_t *old)
+static void block_signals(sigset_t *old)
 {
 	sigset_t all;
 	sigemptyset(&all);
@@ -30,7 +30,7 @@ int unfinished_begin(char *path, struct error *e)
 {
 	struct sigaction a = {.sa_handler = remove_and_end, .sa_flags = (int)SA_RESETHAND};
 	sigset_t old;
-	block(&old);
+	block_signals(&old);
 	int fd = mkstemp(path);
 	int rc = fd < 0 ? error_set(e, errno, "%s", strerror(errno)) : fd;
 	file = path;
@@ -45,7 +45,7 @@ int unfinished_begin(char *path, struct error *e)
 void unfinished_end(void)
 {
 	sigset_t old;
-	block(&old);
+	block_signals(&old);
 	for (int i = 0; i < NUMBERS; i++)
 		sigaction(numbers[i], &before[i], NULL);
 	sigprocmask(SIG_SETMASK, &old, NULL);

@@ -190,7 +190,7 @@ bool blob_store_evict(struct blob_store *s)
 	return true;
 }
 
-static int exceeds(const struct blob_store *s, uint64_t need, struct error *e)
+static int refuse_excess(const struct blob_store *s, uint64_t need, struct error *e)
 {
 	return error_set(e, EFBIG, "%s: %llu more bytes exceed its limit of %llu, given what is in use", s->folder,
 			 (unsigned long long)need, (unsigned long long)s->limit);
@@ -205,7 +205,7 @@ static int could_fit(const struct blob_store *s, uint64_t need, struct error *e)
 	if (need > s->limit)
 		return error_set(e, EMSGSIZE, "%s: a file of %llu bytes exceeds its limit of %llu", s->folder,
 				 (unsigned long long)need, (unsigned long long)s->limit);
-	return used > s->limit - need ? exceeds(s, need, e) : 0;
+	return used > s->limit - need ? refuse_excess(s, need, e) : 0;
 }
 
 /* Evicts blobs until `need` more bytes fit into the limit, but only as many as may have so much on the disk, where the
@@ -216,7 +216,7 @@ static int make_room(struct blob_store *s, uint64_t need, struct error *e)
 	uint64_t most = need / BLOCK + EVICTIONS;
 	while (s->limit && s->bytes + s->arrived + need > s->limit && most--)
 		if (!blob_store_evict(s))
-			return exceeds(s, need, e);
+			return refuse_excess(s, need, e);
 	return 0;
 }
 
@@ -284,7 +284,7 @@ uint64_t blob_store_bytes(const struct blob_store *s)
 	return s->bytes + s->arrived;
 }
 
-static struct blob_entry *touch(struct blob_store *s, const struct blob_hash *h)
+static struct blob_entry *use_blob(struct blob_store *s, const struct blob_hash *h)
 {
 	struct blob_entry *n = find_there(s, h);
 	if (!n)
@@ -313,7 +313,7 @@ bool blob_hold(struct blob_store *s, const struct blob_hash *h)
 	struct blob_entry *n = find_there(s, h);
 	if (n &&
 	    !n->holds) /* otherwise its first holder has: thousands of files are held by an upload, then by its job */
-		touch(s, h);
+		use_blob(s, h);
 	if (n)
 		blob_take(s, n);
 	return n != NULL;
@@ -337,7 +337,7 @@ int blob_open(struct blob_store *s, const struct blob_hash *h, uint64_t *size, s
 	char path[BLOB_PATH_MOST], hex[BLOB_HEX_SIZE];
 	blob_path(s, h, path, sizeof path);
 	blob_hex(h, hex);
-	struct blob_entry *n = touch(s, h);
+	struct blob_entry *n = use_blob(s, h);
 	int fd = n ? disk_open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW, 0) : -1;
 	if (fd < 0)
 		return error_set(e, ENOENT, "there is no blob %s", hex);
@@ -480,7 +480,7 @@ static int make_safe(struct blob_writer *w)
 	return disk_close(fd);
 }
 
-static int finish(struct blob_writer *w, struct error *e)
+static int finish_writing(struct blob_writer *w, struct error *e)
 {
 	struct blob_store *s = w->store;
 	char path[BLOB_PATH_MOST];
@@ -514,7 +514,7 @@ static void writer_free(struct blob_writer *w)
 
 int blob_write_commit(struct blob_writer *w, struct error *e)
 {
-	int rc = finish(w, e);
+	int rc = finish_writing(w, e);
 	if (rc)
 		disk_unlink(w->path);
 	writer_free(w);

@@ -15,7 +15,7 @@
 /* A channel darker than this share of its pixel's brightest one may be the remainder of colours that cancel. */
 static const double cancelled = 0.125;
 
-static size_t brightest(const double *b)
+static size_t index_of_brightest(const double *b)
 {
 	size_t most = fabs(b[1]) > fabs(b[0]) ? 1 : 0;
 	return fabs(b[2]) > fabs(b[most]) ? 2 : most;
@@ -24,13 +24,13 @@ static size_t brightest(const double *b)
 /* M */
 static double most_of(const struct tile_error *t, size_t pixel)
 {
-	return t->brightness[pixel][brightest(t->brightness[pixel])];
+	return t->brightness[pixel][index_of_brightest(t->brightness[pixel])];
 }
 
 bool cancelling_channel(const struct tile_error *t, size_t pixel, size_t k)
 {
 	const double *b = t->brightness[pixel];
-	size_t most = brightest(b);
+	size_t most = index_of_brightest(b);
 	if (t->groups < BASE_GROUPS || !(fabs(b[k]) < cancelled * fabs(b[most])) ||
 	    !brightness_is_known(t, b[most], t->square[pixel][most]))
 		return false;

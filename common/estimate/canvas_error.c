@@ -317,7 +317,7 @@ static void settle_square(struct tile_error *t, uint32_t x, uint32_t y, uint32_t
 /* ---- sums over the image */
 
 /* FOLDED groups from `first` on, or as many as remain. */
-static void fold(struct tile_error *t, uint32_t first, const float *apart, float *folded)
+static void fold_groups(struct tile_error *t, uint32_t first, const float *apart, float *folded)
 {
 	uint32_t count = t->groups - first < FOLDED ? t->groups - first : FOLDED;
 	float v[FOLDED] = {0};
@@ -362,7 +362,7 @@ static void add_row(struct tile_error *t, size_t first)
 		add_to_tail(t, apart);
 		for (size_t k = 0; k < 3; k++) {
 			for (uint32_t g = 0; g < t->groups; g += FOLDED)
-				fold(t, g, apart + k * t->groups + g, folded[k]);
+				fold_groups(t, g, apart + k * t->groups + g, folded[k]);
 		}
 		for (size_t i = 0; i < FOLDED; i++)
 			for (size_t j = i / 4 * 4; j < FOLDED; j++)

@@ -2,7 +2,8 @@
 /*
  * fit() fits a level, a trend and their uncertainty to the estimates of the error so far (looks) by generalized least
  * squares. scenario_of() and simulate() draw possible renders from that fit and simulate each until it would stop;
- * costs() sorts their costs. The random numbers have constant seeds, so equal looks give equal forecasts everywhere.
+ * summarise_costs() sorts their costs. The random numbers have constant seeds, so equal looks give equal forecasts
+ * everywhere.
  *
  * Without looks, or without one whose interval is known, there is no forecast (false). Costs that no simulated render
  * can pay are INFINITY.
@@ -64,7 +65,7 @@ void forecast_add(struct forecast_history *h, const struct plan *p, const struct
 	forecast_add_look(h, &l);
 }
 
-static const struct forecast_look *last(const struct forecast_history *h)
+static const struct forecast_look *last_look(const struct forecast_history *h)
 {
 	return h->count ? &h->looks[h->count - 1] : NULL;
 }
@@ -86,7 +87,7 @@ static double chi_square_share(double degrees, double z)
 
 bool forecast_error(const struct forecast_history *h, struct forecast_range *error)
 {
-	const struct forecast_look *l = last(h);
+	const struct forecast_look *l = last_look(h);
 	if (!l)
 		return false;
 	*error = (struct forecast_range){sqrt(l->rel_mse / chi_square_share(l->degrees, 1.6448536269514722)),
@@ -112,7 +113,7 @@ struct normal_equations { /* of level and trend */
 	double ll, lt, tt, l, t;
 };
 
-static void observe(struct normal_equations *q, double weight, double al, double at, double value)
+static void add_observation(struct normal_equations *q, double weight, double al, double at, double value)
 {
 	q->ll += weight * al * al;
 	q->lt += weight * al * at;
@@ -142,10 +143,10 @@ static void fit_level(struct fit *f, const struct forecast_history *h, uint32_t 
 {
 	struct normal_equations q = {0};
 	double variance = f->spread * f->spread;
-	observe(&q, variance / (trend_prior * trend_prior), 0, 1, 0);
+	add_observation(&q, variance / (trend_prior * trend_prior), 0, 1, 0);
 	for (uint32_t i = first; i < h->count; i++) {
 		struct innovation v = innovation_of(&h->looks[i], i > first ? &h->looks[i - 1] : NULL, f);
-		observe(&q, 1 / v.share, v.al, v.at, v.value);
+		add_observation(&q, 1 / v.share, v.al, v.at, v.value);
 	}
 	double det = q.ll * q.tt - q.lt * q.lt; /* > 0, by the prior and the first look */
 	f->level = (q.l * q.tt - q.t * q.lt) / det;
@@ -187,7 +188,7 @@ static void fit_margin(struct fit *f, const struct forecast_history *h, uint32_t
 		square += margin * margin;
 		n++;
 	}
-	f->margin = n > 0 ? sum / n : -log(chi_square_share(fmax(last(h)->degrees, 1), -1.6448536269514722));
+	f->margin = n > 0 ? sum / n : -log(chi_square_share(fmax(last_look(h)->degrees, 1), -1.6448536269514722));
 	f->margin_sd = n > 1 ? sqrt(fmax(0, square - n * f->margin * f->margin) / (n - 1)) : f->margin / 2;
 }
 
@@ -202,7 +203,7 @@ static void fit_doubt(struct fit *f, const struct forecast_history *h, uint32_t 
 	f->doubt = sum / n;
 }
 
-static double spent(const struct forecast_look *l, bool wall)
+static double seconds_spent(const struct forecast_look *l, bool wall)
 {
 	return wall ? l->seconds : l->cpu_seconds;
 }
@@ -210,14 +211,14 @@ static double spent(const struct forecast_look *l, bool wall)
 /* Seconds per sample, and how much they vary from stretch to stretch: machines are shared. */
 static void fit_price(const struct forecast_history *h, bool wall, double *price, double *sd)
 {
-	const struct forecast_look *end = last(h);
+	const struct forecast_look *end = last_look(h);
 	double square = 0, before = 0, work = 0;
-	*price = spent(end, wall) / end->work;
+	*price = seconds_spent(end, wall) / end->work;
 	for (uint32_t i = 0; i < h->count; i++) {
 		const struct forecast_look *l = &h->looks[i];
-		double d = (spent(l, wall) - before) / (l->work - work) / *price - 1;
+		double d = (seconds_spent(l, wall) - before) / (l->work - work) / *price - 1;
 		square += (l->work - work) / end->work * d * d;
-		before = spent(l, wall);
+		before = seconds_spent(l, wall);
 		work = l->work;
 	}
 	*sd = *price > 0 ? sqrt(square + price_floor * price_floor) : 0;
@@ -225,7 +226,7 @@ static void fit_price(const struct forecast_history *h, bool wall, double *price
 
 static struct fit fit(const struct forecast_history *h)
 {
-	const struct forecast_look *end = last(h);
+	const struct forecast_look *end = last_look(h);
 	uint32_t first = 0;
 	while (h->looks[first].work < used_share * end->work)
 		first++;
@@ -294,7 +295,7 @@ static bool is_in_doubt(const struct fit *f, const struct scenario *y)
 }
 
 /* Of a render whose last look was in doubt, or not. */
-static void condition(const struct fit *f, struct scenario *y, bool doubt, struct dice *d)
+static void condition_on_doubt(const struct fit *f, struct scenario *y, bool doubt, struct dice *d)
 {
 	for (int i = 0; i < TRIES_MOST && is_in_doubt(f, y) != doubt; i++) {
 		y->rare = normal(d);
@@ -303,7 +304,7 @@ static void condition(const struct fit *f, struct scenario *y, bool doubt, struc
 }
 
 /* How much log(relMSE x work) changes over t e-folds of work. */
-static double change(const struct fit *f, const struct scenario *y, double t)
+static double expected_change(const struct fit *f, const struct scenario *y, double t)
 {
 	if (t < 0)
 		return y->trend * fmax(-f->seen, t);
@@ -311,9 +312,9 @@ static double change(const struct fit *f, const struct scenario *y, double t)
 }
 
 /* The expected log(relMSE) at some work. */
-static double expected(const struct fit *f, const struct scenario *y, double work)
+static double expected_log_mse(const struct fit *f, const struct scenario *y, double work)
 {
-	return y->level + change(f, y, log(work / f->work)) - log(work);
+	return y->level + expected_change(f, y, log(work / f->work)) - log(work);
 }
 
 /* The number of rounds at which it stops. rare_stop: the estimate at which it does in doubt; 0: it is never in doubt.
@@ -329,7 +330,7 @@ static double simulate(const struct fit *f, struct scenario *y, const struct pla
 		double work = (double)rounds * round, r = before / work, news = sqrt(fmax(0, 1 - r * r));
 		deviation = r * deviation + news * normal(d);
 		before = work;
-		double estimate = expected(f, y, work) + f->shift + f->spread * deviation;
+		double estimate = expected_log_mse(f, y, work) + f->shift + f->spread * deviation;
 		if (rare_stop > 0)
 			y->seen = r * y->seen + news * normal(d);
 		if (rare_stop > 0 && is_in_doubt(f, y) ? estimate <= 2 * log(rare_stop)
@@ -356,7 +357,7 @@ bool forecast_error_at(const struct forecast_history *h, double work, struct for
 	double x[PLAYS];
 	for (int i = 0; i < PLAYS; i++) {
 		struct scenario y = scenario_of(&f, &d);
-		x[i] = exp(0.5 * expected(&f, &y, work));
+		x[i] = exp(0.5 * expected_log_mse(&f, &y, work));
 	}
 	*error = range_of(x);
 	return true;
@@ -366,7 +367,7 @@ struct plays {
 	double rounds[PLAYS], work[PLAYS], cpu[PLAYS], wall[PLAYS];
 };
 
-static void costs(struct plays *s, struct forecast_cost *c)
+static void summarise_costs(struct plays *s, struct forecast_cost *c)
 {
 	c->rounds = range_of(s->rounds);
 	c->work = range_of(s->work);
@@ -387,13 +388,13 @@ static double rare_stop_of(const struct forecast_history *h, const struct plan *
 
 double forecast_stop_in_doubt(const struct forecast_history *h, const struct plan *p, double target)
 {
-	return h->count && in_doubt(last(h)) ? rare_stop_of(h, p, target) : 0;
+	return h->count && in_doubt(last_look(h)) ? rare_stop_of(h, p, target) : 0;
 }
 
 bool forecast_target(const struct forecast_history *h, const struct plan *p, double target, enum forecast_run run,
 		     struct forecast_cost *c)
 {
-	const struct forecast_look *end = last(h);
+	const struct forecast_look *end = last_look(h);
 	if (!end)
 		return false;
 	struct fit f = fit(h);
@@ -405,24 +406,24 @@ bool forecast_target(const struct forecast_history *h, const struct plan *p, dou
 	for (int i = 0; i < PLAYS; i++) {
 		struct scenario y = scenario_of(&f, &d);
 		if (same)
-			condition(&f, &y, in_doubt(end), &d);
+			condition_on_doubt(&f, &y, in_doubt(end), &d);
 		s.rounds[i] = simulate(&f, &y, p, target, rare_stop, run, &d);
 		s.work[i] = s.rounds[i] * round;
 		double more = s.work[i] - (same ? end->work : 0);
 		s.cpu[i] = (same ? end->cpu_seconds : 0) + more * y.cpu;
 		s.wall[i] = (same ? end->seconds : 0) + more * y.wall;
 	}
-	costs(&s, c);
+	summarise_costs(&s, c);
 	return true;
 }
 
 /* e-folds of work that quarter relMSE. */
-static double quartering(const struct fit *f, const struct scenario *y)
+static double work_to_quarter(const struct fit *f, const struct scenario *y)
 {
 	double low = 0, high = 16;
 	for (int i = 0; i < 40; i++) {
 		double t = 0.5 * (low + high);
-		*(t - change(f, y, t) < log_four ? &low : &high) = t;
+		*(t - expected_change(f, y, t) < log_four ? &low : &high) = t;
 	}
 	return high < 15 ? high : INFINITY;
 }
@@ -436,11 +437,11 @@ bool forecast_halving(const struct forecast_history *h, const struct plan *p, st
 	struct plays s;
 	for (int i = 0; i < PLAYS; i++) {
 		struct scenario y = scenario_of(&f, &d);
-		s.work[i] = f.work * (exp(quartering(&f, &y)) - 1);
+		s.work[i] = f.work * (exp(work_to_quarter(&f, &y)) - 1);
 		s.rounds[i] = s.work[i] / (double)plan_round_mutations(p);
 		s.cpu[i] = s.work[i] * y.cpu;
 		s.wall[i] = s.work[i] * y.wall;
 	}
-	costs(&s, c);
+	summarise_costs(&s, c);
 	return true;
 }

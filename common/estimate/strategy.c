@@ -37,7 +37,7 @@ const char *strategy_counter_name(enum strategy_counter c)
 }
 
 /* 5210 -> "5,210". */
-static const char *thousands(uint64_t n, char out[NUMBER])
+static const char *print_thousands(uint64_t n, char out[NUMBER])
 {
 	char digits[NUMBER];
 	int length = snprintf(digits, sizeof digits, "%llu", (unsigned long long)n), at = 0;
@@ -59,7 +59,7 @@ static void put_ratio(struct text *t, int width, double factor, uint64_t a, uint
 		text_put(t, " %*s", width, "-");
 }
 
-static uint64_t failures(const uint64_t c[STRATEGY_COUNTERS])
+static uint64_t sum_failures(const uint64_t c[STRATEGY_COUNTERS])
 {
 	uint64_t n = 0;
 	for (int k = STRATEGY_FAIL_FIRST; k < STRATEGY_COUNTERS; k++)
@@ -71,7 +71,7 @@ static uint64_t failures(const uint64_t c[STRATEGY_COUNTERS])
 static void put_failures(struct text *t, const uint64_t c[STRATEGY_COUNTERS])
 {
 	text_put(t, " ");
-	if (failures(c) == 0)
+	if (sum_failures(c) == 0)
 		text_put(t, " -");
 	for (int k = STRATEGY_FAIL_FIRST; k < STRATEGY_COUNTERS; k++)
 		if (c[k])
@@ -96,13 +96,13 @@ void strategy_table(const char *mixture, const struct canvas_counts *n, char *te
 		const uint64_t *c = n->strategy[i];
 		char name[NAME + 1], number[3][NUMBER];
 		plan_strategy_name(mixture, (uint32_t)i, name, sizeof name);
-		text_put(&t, "%-*s %14s", NAME, name, thousands(c[STRATEGY_PROPOSED], number[0]));
+		text_put(&t, "%-*s %14s", NAME, name, print_thousands(c[STRATEGY_PROPOSED], number[0]));
 		put_ratio(&t, 9, 100, c[STRATEGY_ACCEPTED], c[STRATEGY_PROPOSED]);
 		put_ratio(&t, 9, 1, c[STRATEGY_RAYS], c[STRATEGY_PROPOSED]);
-		text_put(&t, " %14s", thousands(c[STRATEGY_WALKS], number[1]));
+		text_put(&t, " %14s", print_thousands(c[STRATEGY_WALKS], number[1]));
 		put_ratio(&t, 9, 1, c[STRATEGY_ITERATIONS], c[STRATEGY_WALKS]);
-		text_put(&t, " %14s", thousands(c[STRATEGY_REVERSE_WALKS], number[2]));
-		put_ratio(&t, 8, 100, failures(c), c[STRATEGY_PROPOSED]);
+		text_put(&t, " %14s", print_thousands(c[STRATEGY_REVERSE_WALKS], number[2]));
+		put_ratio(&t, 8, 100, sum_failures(c), c[STRATEGY_PROPOSED]);
 		put_failures(&t, c);
 	}
 }
@@ -139,14 +139,14 @@ void strategy_note(const struct plan *p, const struct canvas_counts *n, bool bla
 		text[0] = 0;
 	if (black && p->kind == PLAN_CHAINS && n->counters[COUNT_SAMPLES] == 0)
 		text_put(&t, "the image is black: none of the %s bootstrap samples found light",
-			 thousands(p->bootstrap, number[0]));
+			 print_thousands(p->bootstrap, number[0]));
 	else if (black)
 		text_put(&t, "the image is black: no sample found light");
 	if (black)
 		then = "; ";
 	if (bad) {
 		text_put(&t, "%s%s contributions were NaN, infinite or negative, and were left out", then,
-			 thousands(bad, number[0]));
+			 print_thousands(bad, number[0]));
 		then = "; ";
 	}
 	uint64_t lost = n->counters[COUNT_STATES_LOST];
@@ -154,13 +154,14 @@ void strategy_note(const struct plan *p, const struct canvas_counts *n, bool bla
 		text_put(&t,
 			 "%s%s of %s chain epochs ended in a state that could not be read back; the chain returned to "
 			 "the start of the epoch",
-			 then, thousands(lost, number[0]), thousands(chain_epochs(p, n), number[1]));
+			 then, print_thousands(lost, number[0]), print_thousands(chain_epochs(p, n), number[1]));
 		then = "; ";
 	}
 	if (stuck)
 		text_put(&t, "%s%s of %s chain epochs accepted nothing (%s chains); longest run: %s rejections", then,
-			 thousands(stuck, number[0]), thousands(chain_epochs(p, n), number[1]),
-			 thousands(p->chains, number[2]), thousands(n->counters[COUNT_LONGEST_STUCK], number[3]));
+			 print_thousands(stuck, number[0]), print_thousands(chain_epochs(p, n), number[1]),
+			 print_thousands(p->chains, number[2]),
+			 print_thousands(n->counters[COUNT_LONGEST_STUCK], number[3]));
 }
 
 void strategy_add_beyond(double share, char *note, size_t size)

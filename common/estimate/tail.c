@@ -25,7 +25,7 @@ void tail_clear(struct tail *t)
 	t->least = 0;
 }
 
-static int falling(const void *a, const void *b)
+static int compare_descending(const void *a, const void *b)
 {
 	double x = *(const double *)a, y = *(const double *)b;
 	return (x < y) - (x > y);
@@ -33,7 +33,7 @@ static int falling(const void *a, const void *b)
 
 void tail_settle(struct tail *t)
 {
-	qsort(t->y, t->held, sizeof *t->y, falling);
+	qsort(t->y, t->held, sizeof *t->y, compare_descending);
 	if (t->held < t->most)
 		return;
 	t->held = t->most;

@@ -133,8 +133,8 @@ static exr_result_t copy_tiles(exr_context_t from, exr_context_t to, const struc
 }
 
 /* A file with the same pixels from (0, 0) on; mem_alloc'd. */
-static int rewrite(exr_context_t from, size_t most, const struct exr_image *img, bool tiled, unsigned char **bytes,
-		   size_t *size, struct error *e)
+static int rewrite_file(exr_context_t from, size_t most, const struct exr_image *img, bool tiled, unsigned char **bytes,
+			size_t *size, struct error *e)
 {
 	exr_context_t to;
 	struct exr_stream s;
@@ -171,7 +171,7 @@ static int check_and_rewrite(const unsigned char *foreign, size_t foreign_size, 
 	if (!rc)
 		rc = check_chunks(x, img, tiled, e);
 	if (!rc)
-		rc = rewrite(x, foreign_size, img, tiled, bytes, size, e);
+		rc = rewrite_file(x, foreign_size, img, tiled, bytes, size, e);
 	exr_finish(&x);
 	return rc ? rc : choose_channels(img, e);
 }

@@ -20,7 +20,7 @@ enum { ATTRIBUTES_MOST = 256 };
 #define INFLATION_MOST INT64_C(1376)
 #define ATTRIBUTE_PREFIX "hslt:"
 
-static int32_t smaller(int32_t a, int32_t b)
+static int32_t int_min(int32_t a, int32_t b)
 {
 	return a < b ? a : b;
 }
@@ -61,8 +61,8 @@ static exr_result_t read_tiled(exr_context_t x, struct exr_image *img)
 			rc = exr_read_tile_chunk_info(x, 0, (int)(px / (uint32_t)tile_w), (int)(y / (uint32_t)tile_h),
 						      0, 0, &chunk);
 			if (rc == EXR_ERR_SUCCESS) {
-				chunk.width = smaller(chunk.width, (int32_t)(img->width - px));
-				chunk.height = smaller(chunk.height, (int32_t)(img->height - y));
+				chunk.width = int_min(chunk.width, (int32_t)(img->width - px));
+				chunk.height = int_min(chunk.height, (int32_t)(img->height - y));
 				rc = read_chunk(x, img, &chunk, px, y);
 			}
 		}

@@ -14,7 +14,7 @@ static struct exr_stream *stream_of(exr_const_context_t x)
 	return user;
 }
 
-static void complain(exr_const_context_t x, exr_result_t code, const char *message)
+static void keep_message(exr_const_context_t x, exr_result_t code, const char *message)
 {
 	struct exr_stream *s = stream_of(x);
 	(void)code;
@@ -55,7 +55,7 @@ static int64_t write_at(exr_const_context_t x, void *user, const void *from, uin
 		size_t room = end + end / 2;
 		unsigned char *bytes = mem_grow(s->bytes, s->room, room);
 		if (!bytes) {
-			complain(x, EXR_ERR_OUT_OF_MEMORY, "out of memory");
+			keep_message(x, EXR_ERR_OUT_OF_MEMORY, "out of memory");
 			return -1;
 		}
 		s->bytes = bytes;
@@ -71,7 +71,7 @@ static exr_context_initializer_t initializer(struct exr_stream *s)
 	exr_context_initializer_t i = EXR_DEFAULT_CONTEXT_INITIALIZER;
 	/* The library keeps its own allocator: 3.1.5 deadlocks if the allocation of an attribute fails, so tests
 	 * cannot make it run out of memory. */
-	i.error_handler_fn = complain;
+	i.error_handler_fn = keep_message;
 	i.user_data = s;
 	i.max_image_width = i.max_image_height = EXR_MAX_SIDE;
 	i.max_tile_width = i.max_tile_height = EXR_MAX_SIDE;

@@ -183,14 +183,14 @@ void canvas_free(struct canvas *c)
 	mem_free(c);
 }
 
-static uint32_t parity(uint64_t round)
+static uint32_t parity_of_round(uint64_t round)
 {
 	return (uint32_t)(round % OPEN_ROUNDS);
 }
 
 static uint32_t lease_set(const struct lease_key *k)
 {
-	return k->kind == LEASE_BOOTSTRAP ? 0 : 1 + parity(k->epoch);
+	return k->kind == LEASE_BOOTSTRAP ? 0 : 1 + parity_of_round(k->epoch);
 }
 
 static uint32_t *missing_of(const struct canvas *c, const struct lease_key *k)
@@ -206,12 +206,12 @@ static bool is_closed(const struct canvas *c, const struct lease_key *k)
 
 static size_t film_of(const struct canvas *c, const struct lease_key *k)
 {
-	return canvas_film(k->group, is_closed(c, k) ? FILM_PREFIX : FILM_OPEN + parity(k->epoch));
+	return canvas_film(k->group, is_closed(c, k) ? FILM_PREFIX : FILM_OPEN + parity_of_round(k->epoch));
 }
 
 static struct tally *tally_of(struct canvas *c, const struct lease_key *k)
 {
-	return is_closed(c, k) ? &c->prefix : &c->open[parity(k->epoch)];
+	return is_closed(c, k) ? &c->prefix : &c->open[parity_of_round(k->epoch)];
 }
 
 bool canvas_has(const struct canvas *c, const struct lease_key *k)
@@ -408,7 +408,7 @@ void canvas_counts(const struct canvas *c, bool open_rounds, struct canvas_count
 
 static void close_round(struct canvas *c)
 {
-	uint32_t open = parity(c->rounds), leases = c->plan.groups * c->plan.parts;
+	uint32_t open = parity_of_round(c->rounds), leases = c->plan.groups * c->plan.parts;
 	for (uint32_t g = 0; g < c->plan.groups; g++) {
 		size_t prefix = canvas_film(g, FILM_PREFIX), from = prefix + FILM_OPEN + open;
 		for (size_t t = 0; t < canvas_tiles(c); t++)
@@ -455,8 +455,8 @@ int canvas_add(struct canvas *c, const struct batch *b, struct error *e)
 		return 0;
 	}
 	*has = 1;
-	c->merged[parity(k->epoch)]++;
-	while (c->merged[parity(c->rounds)] == c->plan.groups * c->plan.parts)
+	c->merged[parity_of_round(k->epoch)]++;
+	while (c->merged[parity_of_round(c->rounds)] == c->plan.groups * c->plan.parts)
 		close_round(c);
 	return 0;
 }
@@ -480,5 +480,5 @@ void canvas_take_back(struct canvas *c, const struct batch *b)
 		return;
 	}
 	c->has[((size_t)lease_set(k) * c->plan.groups + k->group) * c->plan.parts + k->part] = 0;
-	c->merged[parity(k->epoch)]--;
+	c->merged[parity_of_round(k->epoch)]--;
 }

@@ -49,7 +49,7 @@ struct transfer {
 	struct error *e;
 };
 
-static void transfer(struct transfer *t, void *numbers, size_t width, size_t count)
+static void transfer_numbers(struct transfer *t, void *numbers, size_t width, size_t count)
 {
 	if (!t->rc)
 		t->rc = t->writes ? checked_file_write_numbers(t->file, numbers, width, count, t->e)
@@ -58,7 +58,7 @@ static void transfer(struct transfer *t, void *numbers, size_t width, size_t cou
 
 static void transfer64(struct transfer *t, void *numbers, size_t count)
 {
-	transfer(t, numbers, sizeof(uint64_t), count);
+	transfer_numbers(t, numbers, sizeof(uint64_t), count);
 }
 
 static void transfer_tally(struct transfer *t, struct tally *y)
@@ -76,8 +76,8 @@ static void transfer_tally(struct transfer *t, struct tally *y)
 static int transfer_all(struct transfer *t, struct canvas *c)
 {
 	transfer64(t, &c->rounds, 1);
-	transfer(t, c->merged, sizeof *c->merged, OPEN_ROUNDS);
-	transfer(t, c->has, sizeof *c->has, has_bytes(c));
+	transfer_numbers(t, c->merged, sizeof *c->merged, OPEN_ROUNDS);
+	transfer_numbers(t, c->has, sizeof *c->has, has_bytes(c));
 	transfer64(t, c->bound, films_of(c));
 	transfer_tally(t, &c->prefix);
 	for (int i = 0; i < OPEN_ROUNDS; i++)

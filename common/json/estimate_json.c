@@ -71,7 +71,7 @@ static double real_or_nan(const json_t *o, const char *key)
 	return json_is_number(x) ? json_number_value(x) : NAN;
 }
 
-static uint32_t whole(const json_t *x)
+static uint32_t uint32_of(const json_t *x)
 {
 	json_int_t n = json_integer_value(x);
 	return n < 0 ? 0 : n > UINT32_MAX ? UINT32_MAX : (uint32_t)n;
@@ -128,10 +128,10 @@ void convergence_from_json(const json_t *o, struct convergence *a)
 		if (strcmp(verdict, convergence_name((enum convergence_verdict)v)) == 0)
 			a->verdict = (enum convergence_verdict)v;
 	text_copy(a->text, sizeof a->text, text ? text : "");
-	a->worst_x = whole(json_array_get(worst, 0));
-	a->worst_y = whole(json_array_get(worst, 1));
-	a->tiles = whole(json_object_get(o, "tiles"));
-	a->tiles_flagged = whole(json_object_get(o, "tilesFlagged"));
+	a->worst_x = uint32_of(json_array_get(worst, 0));
+	a->worst_y = uint32_of(json_array_get(worst, 1));
+	a->tiles = uint32_of(json_object_get(o, "tiles"));
+	a->tiles_flagged = uint32_of(json_object_get(o, "tilesFlagged"));
 	a->energy_flagged = json_number_value(json_object_get(o, "energyFlagged"));
 	a->stuck_share = json_number_value(json_object_get(o, "stuckShare"));
 	a->classes_flagged = classes_named(json_object_get(o, "classesFlagged"));

@@ -77,7 +77,7 @@ static bool is_there(const char *path)
 	return disk_stat(path, &st) == 0;
 }
 
-static bool has(const struct authority *a, const char *middle, const char *name)
+static bool has_file(const struct authority *a, const char *middle, const char *name)
 {
 	char path[PATH_SIZE];
 	struct error e;
@@ -325,7 +325,7 @@ int authority_init(const char *folder, const char *name, double days, struct err
 	if (!rc && is_there(path))
 		rc = error_set(
 			e, EEXIST, "%s exists: a farm has one authority%s", path,
-			has(&a, "coordinator", "cert.pem")
+			has_file(&a, "coordinator", "cert.pem")
 				? ""
 				: ", and its coordinator lacks a certificate, which `hslt-ca coordinator coordinator` makes");
 	if (!rc) {
@@ -369,7 +369,7 @@ static int write_pair(const struct authority *a, const char *name, X509 *cert, E
 		rc = write_pem(a->folder, name, "key.pem.next", pem_key(key), 0600, e);
 	if (!rc)
 		rc = put_in_place(a, name, "key.pem.next", "key.pem", e);
-	*in_use = !rc && has(a, name, "cert.pem"); /* there is no way back to the old pair */
+	*in_use = !rc && has_file(a, name, "cert.pem"); /* there is no way back to the old pair */
 	if (!rc && !(rc = path_in(path, e, a->folder, "", name)))
 		rc = disk_sync_folder(path, e);
 	if (!rc)
@@ -409,7 +409,7 @@ static int may_renew(const struct authority *a, const char *name, enum tls_role 
 	X509 *cert;
 	struct tls_peer who;
 	int rc = path_in(path, e, a->folder, name, "cert.pem");
-	if (rc || !has(a, name, "cert.pem"))
+	if (rc || !has_file(a, name, "cert.pem"))
 		return rc;
 	rc = read_cert(path, &cert, e);
 	if (rc)
@@ -426,8 +426,8 @@ static int may_renew(const struct authority *a, const char *name, enum tls_role 
  * list of revocations, which is written first, or a part of it, or nothing. An empty folder is removed. */
 static bool is_incomplete(const struct authority *a, const char *name, const char *path)
 {
-	return !has(a, name, "cert.pem") &&
-	       (has(a, name, "crl.pem") || has(a, name, "crl.pem.tmp") || disk_rmdir(path) == 0);
+	return !has_file(a, name, "cert.pem") &&
+	       (has_file(a, name, "crl.pem") || has_file(a, name, "crl.pem.tmp") || disk_rmdir(path) == 0);
 }
 
 int authority_issue(const char *folder, const char *name, enum tls_role role, double days, bool renew, struct error *e)

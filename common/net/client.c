@@ -175,7 +175,7 @@ void client_message_fini(struct client_message *m)
 	buf_fini(&m->payload);
 }
 
-static int unwelcome(const struct client *cl, const char *host_port, struct error *e)
+static int refuse_coordinator(const struct client *cl, const char *host_port, struct error *e)
 {
 	return error_set(e, -cl->distrust, "%s: %s", host_port, cl->why);
 }
@@ -189,7 +189,7 @@ static int say_hello(struct client *cl, const char *host_port, struct error *e)
 	if (!rc)
 		rc = client_wait(cl, HELLO_SECONDS, &answer, e);
 	if (rc && cl->distrust)
-		return unwelcome(cl, host_port, e);
+		return refuse_coordinator(cl, host_port, e);
 	if (rc)
 		return rc == -EPROTO ? rc : error_set(e, ECONNREFUSED, "no coordinator answers at %s", host_port);
 	const Farm__Envelope *a = answer.envelope.message;
@@ -257,7 +257,7 @@ int client_open(struct client **out, const char *host_port, const char *tls, boo
 	for (unsigned i = 0; !rc && i < to.count && !cl->opened && !cl->distrust; i++)
 		rc = connect_to(cl, &to.all[i], e);
 	if (!rc && !cl->opened && cl->distrust)
-		rc = unwelcome(cl, host_port, e);
+		rc = refuse_coordinator(cl, host_port, e);
 	else if (!rc && !cl->opened)
 		rc = error_set(e, ECONNREFUSED, "no coordinator at %s: %s", host_port,
 			       cl->timed_out ? "no answer in time" : cl->why);

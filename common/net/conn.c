@@ -133,7 +133,7 @@ static void on_alloc(uv_handle_t *h, size_t suggested, uv_buf_t *out)
 	*out = uv_buf_init(chunk, pause ? 0 : sizeof chunk);
 }
 
-static void deliver(struct conn *c)
+static void deliver_frames(struct conn *c)
 {
 	struct envelope env;
 	struct error e;
@@ -231,7 +231,7 @@ static size_t take_frames(struct conn *c, const unsigned char *bytes, size_t siz
 			conn_close(c, e.text);
 		} else if (rc) {
 			c->frames++;
-			deliver(c);
+			deliver_frames(c);
 			frame_reader_drop(
 				&c->reader); /* now, rather than with the next frame, which may be seconds away */
 			give_back(c);

@@ -52,7 +52,7 @@ double notify_watchdog(void)
 	return 1e-6 * (double)us;
 }
 
-static int option(int fd, int name)
+static int socket_option(int fd, int name)
 {
 	int value = -1;
 	socklen_t size = sizeof value;
@@ -65,8 +65,8 @@ int notify_inherited_unix(void)
 	if (count <= 0 || env_number("LISTEN_PID") != getpid())
 		return -1;
 	for (int fd = FIRST_FD; fd < FIRST_FD + (count < FDS_MAX ? (int)count : FDS_MAX); fd++) {
-		if (option(fd, SO_DOMAIN) != AF_UNIX || option(fd, SO_TYPE) != SOCK_STREAM ||
-		    option(fd, SO_ACCEPTCONN) != 1)
+		if (socket_option(fd, SO_DOMAIN) != AF_UNIX || socket_option(fd, SO_TYPE) != SOCK_STREAM ||
+		    socket_option(fd, SO_ACCEPTCONN) != 1)
 			continue;
 		return fcntl(fd, F_SETFD, FD_CLOEXEC) ? -1 : fd;
 	}

@@ -1,19 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/net/receive_pool.h"
 
-static bool fits(const struct receive_pool *p, uint64_t bytes)
+static bool has_room(const struct receive_pool *p, uint64_t bytes)
 {
 	return p->used == 0 || (p->used <= p->limit && bytes <= p->limit - p->used);
 }
 
-static void grant(struct receive_pool *p, struct receive_turn *t)
+static void grant_bytes(struct receive_pool *p, struct receive_turn *t)
 {
 	p->used += t->bytes;
 	t->has = true;
 }
 
 /* In the present round, or that after the last in which its owner has a turn. */
-static void enter(struct receive_pool *p, struct receive_turn *t)
+static void enter_line(struct receive_pool *p, struct receive_turn *t)
 {
 	struct receive_turn **at = &p->first;
 	t->round = p->first ? p->first->round : 0;
@@ -30,15 +30,15 @@ static void enter(struct receive_pool *p, struct receive_turn *t)
 bool receive_pool_take(struct receive_pool *p, struct receive_turn *t, uint64_t bytes)
 {
 	t->bytes = bytes;
-	if (!p->first && fits(p, bytes)) {
-		grant(p, t);
+	if (!p->first && has_room(p, bytes)) {
+		grant_bytes(p, t);
 		return true;
 	}
-	enter(p, t);
+	enter_line(p, t);
 	return false;
 }
 
-static void leave(struct receive_pool *p, struct receive_turn *t)
+static void leave_line(struct receive_pool *p, struct receive_turn *t)
 {
 	struct receive_turn **at = &p->first;
 	while (*at != t)
@@ -50,14 +50,14 @@ static void leave(struct receive_pool *p, struct receive_turn *t)
 void receive_pool_give(struct receive_pool *p, struct receive_turn *t)
 {
 	if (t->waits)
-		leave(p, t);
+		leave_line(p, t);
 	else if (t->has)
 		p->used -= t->bytes;
 	t->has = false;
-	while (p->first && fits(p, p->first->bytes)) {
+	while (p->first && has_room(p, p->first->bytes)) {
 		struct receive_turn *next = p->first;
-		leave(p, next);
-		grant(p, next);
+		leave_line(p, next);
+		grant_bytes(p, next);
 		next->go(next);
 	}
 }

@@ -64,7 +64,7 @@ static void count_off(struct send_queue *q, size_t bytes)
 	send_pool_sub(&q->share, bytes, loop_ms(q));
 }
 
-static uint64_t left(const struct send_share *s)
+static uint64_t unsent_bytes(const struct send_share *s)
 {
 	const struct send_queue *q = (const struct send_queue *)((const char *)s - offsetof(struct send_queue, share));
 	return uv_stream_get_write_queue_size(q->stream);
@@ -76,7 +76,7 @@ void send_queue_init(struct send_queue *q, uv_stream_t *stream, struct tls_link 
 		     struct send_pool *pool, const struct send_events *events, void *user)
 {
 	*q = (struct send_queue){.stream = stream, .link = link, .limit = limit, .events = events, .user = user};
-	q->share = (struct send_share){.pool = pool, .left = left, .give_way = give_way};
+	q->share = (struct send_share){.pool = pool, .left = unsent_bytes, .give_way = give_way};
 	STAILQ_INIT(&q->frames);
 }
 
@@ -129,7 +129,7 @@ static void give_way(struct send_share *s)
 	fail(q, "too much waits to be sent to all peers, and this one does not read its part");
 }
 
-static void pump(struct send_queue *q);
+static void send_pending(struct send_queue *q);
 
 static void on_written(uv_write_t *r, int status)
 {
@@ -142,7 +142,7 @@ static void on_written(uv_write_t *r, int status)
 	if (status)
 		fail(q, uv_strerror(status));
 	else
-		pump(q);
+		send_pending(q);
 	if (q->state != SEND_CLOSED && send_queue_is_empty(q))
 		q->events->drained(q->user);
 }
@@ -227,7 +227,7 @@ static int encrypt_piece(struct send_queue *q)
 	return last;
 }
 
-static void pump(struct send_queue *q)
+static void send_pending(struct send_queue *q)
 {
 	if (!q->link || !tls_link_is_open(q->link))
 		return;
@@ -247,7 +247,7 @@ void send_queue_flush(struct send_queue *q)
 
 void send_queue_opened(struct send_queue *q)
 {
-	pump(q);
+	send_pending(q);
 }
 
 /* Takes the bytes, also on failure. */
@@ -261,7 +261,7 @@ static void append(struct send_queue *q, struct head head, unsigned char *bytes,
 	}
 	*f = (struct send_frame){.head = head, .bytes = bytes, .size = size, .at = skip, .plain = size + FRAME_COST};
 	STAILQ_INSERT_TAIL(&q->frames, f, next);
-	pump(q);
+	send_pending(q);
 }
 
 static void send_all(struct send_queue *q, struct head head, unsigned char *bytes, size_t size, size_t skip)

@@ -5,7 +5,8 @@
  * The verification callback checks the peer's role, revocation and expiry.
  *
  * A folder that cannot be read while it changes keeps the old context. A link that fails has an error of tls.h and, as
- * its last output, an alert for the peer; explain() puts into words why either side does not accept a certificate.
+ * its last output, an alert for the peer; explain_failure() puts into words why either side does not accept a
+ * certificate.
  */
 #include "common/net/tls.h"
 
@@ -157,7 +158,7 @@ int tls_read_peer(X509 *cert, struct tls_peer *p, struct error *e)
 
 /* ---- certificates that expire soon ---- */
 
-static bool expiry(const char *what, time_t until, time_t now, char *text, size_t size)
+static bool expiry_text(const char *what, time_t until, time_t now, char *text, size_t size)
 {
 	char when[32];
 	struct tm tm;
@@ -178,14 +179,14 @@ bool tls_expiry(const struct tls_peer *p, time_t now, char *text, size_t size)
 {
 	char what[TLS_NAME_MAX + 32];
 	snprintf(what, sizeof what, "the certificate of %s", p->name);
-	return expiry(what, p->until, now, text, size);
+	return expiry_text(what, p->until, now, text, size);
 }
 
 bool tls_warning(const struct tls *t, time_t now, char *text, size_t size)
 {
 	char own[192], authority[160];
 	bool first = tls_expiry(&t->self, now, own, sizeof own);
-	bool second = expiry("the authority's certificate", t->authority_until, now, authority, sizeof authority);
+	bool second = expiry_text("the authority's certificate", t->authority_until, now, authority, sizeof authority);
 	snprintf(text, size, "%s%s%s", own, first && second ? "; " : "", authority);
 	return first || second;
 }
@@ -225,7 +226,7 @@ static void stat_files(const struct tls *t, struct stamp *stamps)
 	}
 }
 
-static int broken(struct error *e, int code, const char *path)
+static int set_file_error(struct error *e, int code, const char *path)
 {
 	unsigned long reason = ERR_peek_last_error();
 	const char *text = reason ? ERR_reason_error_string(reason) : NULL;
@@ -274,7 +275,7 @@ static int load_store(const struct tls *t, SSL_CTX *context, bool revocations, s
 	path_of(t, 0, path, sizeof path);
 	if (!store || X509_STORE_load_file(store, path) != 1) {
 		X509_STORE_free(store);
-		return broken(e, EBADMSG, path);
+		return set_file_error(e, EBADMSG, path);
 	}
 	SSL_CTX_set_cert_store(context, store); /* which now owns it */
 	int kept = revocations || !t->context ? 0 : keep_lists(t->context, store);
@@ -285,7 +286,7 @@ static int load_store(const struct tls *t, SSL_CTX *context, bool revocations, s
 	path_of(t, 3, path, sizeof path);
 	if (revocations &&
 	    X509_load_crl_file(X509_STORE_add_lookup(store, X509_LOOKUP_file()), path, X509_FILETYPE_PEM) < 1)
-		return broken(e, EBADMSG, path);
+		return set_file_error(e, EBADMSG, path);
 	X509_STORE_set_flags(store, X509_V_FLAG_CRL_CHECK);
 	return 0;
 }
@@ -302,7 +303,7 @@ static int load_own(const struct tls *t, SSL_CTX *context, struct tls_peer *self
 	path_of(t, 1, path, sizeof path);
 	const char *bad = key_pair_use(context, key, path);
 	if (bad)
-		return broken(e, EBADMSG, bad);
+		return set_file_error(e, EBADMSG, bad);
 	int rc = tls_read_peer(SSL_CTX_get0_certificate(context), self, e);
 	return rc ? error_prefix(e, rc, "%s", path) : 0;
 }
@@ -322,7 +323,7 @@ static time_t find_authority(SSL_CTX *context)
 	return last;
 }
 
-static void harden(SSL_CTX *context)
+static void set_protocol(SSL_CTX *context)
 {
 	SSL_CTX_set_min_proto_version(context, TLS1_3_VERSION);
 	SSL_CTX_set_max_proto_version(context, TLS1_3_VERSION);
@@ -342,7 +343,7 @@ static int load(const struct tls *t, bool revocations, SSL_CTX **out, struct tls
 	SSL_CTX *context = SSL_CTX_new(TLS_method());
 	if (!context)
 		return error_set(e, ENOMEM, "no memory for TLS");
-	harden(context);
+	set_protocol(context);
 	int rc = load_own(t, context, self, e);
 	if (!rc)
 		rc = load_store(t, context, revocations, e);
@@ -505,7 +506,7 @@ static int refused(struct error *e, int alert)
 }
 
 /* OpenSSL's error, worded for the person who has to fix it. */
-static int explain(struct tls_link *l, struct error *e)
+static int explain_failure(struct tls_link *l, struct error *e)
 {
 	unsigned long code = ERR_peek_error();
 	int reason = ERR_GET_REASON(code), alert = reason - ALERT_REASON;
@@ -526,7 +527,7 @@ static int explain(struct tls_link *l, struct error *e)
 
 /* OpenSSL's buffers stay as large as they ever were: 87 KB after 64 KiB came at once, for each of thousands of peers.
  * Once *b, which `set` gives to the link, is empty, a new one takes its place. */
-static void shrink(struct tls_link *l, BIO **b, void (*set)(SSL *, BIO *))
+static void replace_large_buffer(struct tls_link *l, BIO **b, void (*set)(SSL *, BIO *))
 {
 	enum { KEPT = 4096 };
 	BUF_MEM *m = NULL;
@@ -554,12 +555,12 @@ ssize_t tls_link_read(struct tls_link *l, void *out, size_t size, struct error *
 				     limit */
 		if (!l->open && l->taken > BEFORE_OPEN_MAX)
 			return error_set(e, EPROTO, "the TLS handshake is longer than %d bytes", BEFORE_OPEN_MAX);
-		shrink(l, &l->in, SSL_set0_rbio);
+		replace_large_buffer(l, &l->in, SSL_set0_rbio);
 		return 0;
 	case SSL_ERROR_ZERO_RETURN:
 		return error_set(e, ECONNRESET, "the peer hung up");
 	default:
-		rc = explain(l, e);
+		rc = explain_failure(l, e);
 		ERR_clear_error();
 		return rc;
 	}
@@ -571,7 +572,7 @@ int tls_link_write(struct tls_link *l, const void *bytes, size_t size, struct er
 	ERR_clear_error();
 	if (SSL_write_ex(l->ssl, bytes, size, &done) == 1 && done == size)
 		return 0;
-	int rc = explain(l, e);
+	int rc = explain_failure(l, e);
 	ERR_clear_error();
 	return rc;
 }
@@ -587,7 +588,7 @@ size_t tls_link_output(struct tls_link *l, const unsigned char **bytes)
 void tls_link_output_taken(struct tls_link *l)
 {
 	(void)BIO_reset(l->out);
-	shrink(l, &l->out, SSL_set0_wbio);
+	replace_large_buffer(l, &l->out, SSL_set0_wbio);
 }
 
 bool tls_link_is_open(const struct tls_link *l)

@@ -181,7 +181,7 @@ uint64_t plan_bootstrap_room(const struct plan_request *r, double seconds)
 }
 
 /* How many times as long a mutation or a sample takes as a usual one; at least 1. */
-static double slowness(const struct plan_request *r)
+static double slowness_of(const struct plan_request *r)
 {
 	return fmax(1, r->rays.step / RAYS_USUAL);
 }
@@ -194,7 +194,7 @@ static uint64_t open_lease(const struct plan_request *r, const struct plan *p)
 	uint64_t leases = (uint64_t)p->groups * p->parts, per_pixel = crop_pixels(p) * 32 / leases,
 		 least = crop_pixels(p) / 2;
 	uint64_t lease = clamp(per_pixel > least ? per_pixel : least, LEASE_SAMPLES_LEAST, LEASE_SAMPLES_OPEN);
-	return (uint64_t)((double)lease / slowness(r));
+	return (uint64_t)((double)lease / slowness_of(r));
 }
 
 /* Samples or mutations that fit into a bound on time or error, by conservative constants, because a plan must not
@@ -202,7 +202,7 @@ static uint64_t open_lease(const struct plan_request *r, const struct plan *p)
  * sample. Infinity: no such bound. */
 static double room_in_time(const struct plan_request *r)
 {
-	return r->seconds > 0 ? SPEED_UNKNOWN / slowness(r) * r->seconds : INFINITY;
+	return r->seconds > 0 ? SPEED_UNKNOWN / slowness_of(r) * r->seconds : INFINITY;
 }
 
 static double room_for_error(const struct plan_request *r, const struct plan *p)

@@ -203,7 +203,7 @@ static struct cutter cutter_of(const unsigned char *payload, size_t size)
 	return (struct cutter){payload ? payload : nothing, size};
 }
 
-static const unsigned char *cut(struct cutter *c, size_t size)
+static const unsigned char *cut_bytes(struct cutter *c, size_t size)
 {
 	if (size > c->left)
 		return NULL;
@@ -220,7 +220,7 @@ static int cut_states(struct cutter *c, const uint32_t *sizes, size_t count, str
 	if (!states)
 		return error_set(e, ENOMEM, "no memory for %zu chain states", count);
 	for (size_t i = 0; i < count; i++) {
-		const unsigned char *from = sizes[i] <= CHAIN_STATE_MAX ? cut(c, sizes[i]) : NULL;
+		const unsigned char *from = sizes[i] <= CHAIN_STATE_MAX ? cut_bytes(c, sizes[i]) : NULL;
 		if (!from)
 			return error_set(e, EBADMSG, "chain state %zu of %u bytes does not fit", i, sizes[i]);
 		if (sizes[i] == 0)
@@ -241,7 +241,7 @@ static int cut_tiles(struct cutter *c, const Farm__LeaseResult *m, const struct 
 	if (!b->tiles)
 		return error_set(e, ENOMEM, "no memory for %zu tiles", m->n_tile_sizes);
 	for (size_t i = 0; i < m->n_tile_sizes; i++) {
-		const unsigned char *from = cut(c, m->tile_sizes[i]);
+		const unsigned char *from = cut_bytes(c, m->tile_sizes[i]);
 		if (!from)
 			return error_set(e, EBADMSG, "tile %zu of %u bytes does not fit", i, m->tile_sizes[i]);
 		int rc = exr_tile_read(from, m->tile_sizes[i], p->width, p->height, &b->tiles[i], e);
@@ -262,7 +262,7 @@ static int cut_floats(struct cutter *c, const char *what, uint64_t count, float 
 	*out = mem_alloc(count, sizeof **out);
 	if (!*out)
 		return error_set(e, ENOMEM, "no memory for %llu %s", (unsigned long long)count, what);
-	copy_numbers(*out, cut(c, count * sizeof(float)), sizeof(float), count);
+	copy_numbers(*out, cut_bytes(c, count * sizeof(float)), sizeof(float), count);
 	*out_count = count;
 	return 0;
 }

@@ -85,7 +85,7 @@ void frame_reader_drop(struct frame_reader *r)
 	r->prefix_size = r->header_size = r->payload_size = r->sum = 0;
 }
 
-static int changed(struct error *e)
+static int refuse_changed(struct error *e)
 {
 	return error_set(e, EILSEQ, "data was changed in transit: the checksum of a message does not match");
 }
@@ -93,7 +93,7 @@ static int changed(struct error *e)
 static int take_prefix(struct frame_reader *r, struct error *e)
 {
 	if (r->checked && crc32c(0, r->prefix, 12) != read_u32(r->prefix + 12))
-		return changed(e);
+		return refuse_changed(e);
 	frame_prefix_read(r->prefix, &r->header_size, &r->payload_size);
 	if (r->header_size == 0)
 		return error_set(e, EBADMSG, "a frame without a header");
@@ -140,5 +140,5 @@ int frame_reader_take(struct frame_reader *r, const unsigned char *bytes, size_t
 		rc = take_part(r, &r->payload, r->payload_size, bytes, count, used, e);
 	if (rc || !is_whole(r))
 		return rc;
-	return r->checked && r->sum != read_u32(r->prefix + 8) ? changed(e) : 1;
+	return r->checked && r->sum != read_u32(r->prefix + 8) ? refuse_changed(e) : 1;
 }

@@ -147,7 +147,7 @@ static int cancel(struct client *cl, const struct job_options *o, struct error *
 	return take_done(cl, ENVELOPE(CANCEL, cancel, .job = o->job), o, e);
 }
 
-static int control(struct client *cl, const struct job_options *o, struct error *e)
+static int send_control(struct client *cl, const struct job_options *o, struct error *e)
 {
 	static const Farm__Verb verbs[] = {[JOB_HOLD] = FARM__VERB__VERB_HOLD,
 					   [JOB_RELEASE] = FARM__VERB__VERB_RELEASE,
@@ -181,11 +181,17 @@ static int print_log(struct client *cl, const struct job_options *o, struct erro
 }
 
 /* -ENOENT: the coordinator refuses. */
-static int ask(struct client *cl, const struct job_options *o, struct error *e)
+static int run_verb(struct client *cl, const struct job_options *o, struct error *e)
 {
 	static int (*const verbs[])(struct client *, const struct job_options *, struct error *) = {
-		[JOB_LIST] = list,    [JOB_CANCEL] = cancel,   [JOB_FETCH] = fetch,	 [JOB_LOG] = print_log,
-		[JOB_HOLD] = control, [JOB_RELEASE] = control, [JOB_PRIORITY] = control, [JOB_EXTEND] = control,
+		[JOB_LIST] = list,
+		[JOB_CANCEL] = cancel,
+		[JOB_FETCH] = fetch,
+		[JOB_LOG] = print_log,
+		[JOB_HOLD] = send_control,
+		[JOB_RELEASE] = send_control,
+		[JOB_PRIORITY] = send_control,
+		[JOB_EXTEND] = send_control,
 	};
 	return verbs[o->verb](cl, o, e);
 }
@@ -199,7 +205,7 @@ int main(int argc, char **argv)
 	int rc = client_open(&cl, o.coordinator, o.tls, o.insecure, "hslt-job", &e);
 	if (!rc) {
 		client_print_notes(cl, "hslt-job");
-		rc = ask(cl, &o, &e);
+		rc = run_verb(cl, &o, &e);
 		client_close(cl);
 	}
 	if (rc)

@@ -79,7 +79,7 @@ static const struct program program = {
 	.word = take_word,
 };
 
-static FILE *reach(const char *path, struct error *e)
+static FILE *connect_socket(const char *path, struct error *e)
 {
 	struct sockaddr_un a = {.sun_family = AF_UNIX};
 	if (strlen(path) >= sizeof a.sun_path) {
@@ -144,7 +144,7 @@ static const char *bound_of(const json_t *job)
 }
 
 /* null or negative: open-ended */
-static double span(const json_t *range, const char *key)
+static double range_bound(const json_t *range, const char *key)
 {
 	const json_t *x = json_object_get(range, key);
 	return json_is_number(x) && json_number_value(x) >= 0 ? json_number_value(x) : HUGE_VAL;
@@ -197,14 +197,14 @@ static void print_forecast(const json_t *job)
 	if (number_of(job, "targetError") > 0)
 		printf(", target %.3g %%", 100 * number_of(job, "targetError"));
 	if (json_is_object(half)) {
-		progress_duration(span(json_object_get(half, "cpuSeconds"), "expected"), a, sizeof a);
-		progress_duration(span(json_object_get(half, "wallSeconds"), "expected"), b, sizeof b);
+		progress_duration(range_bound(json_object_get(half, "cpuSeconds"), "expected"), a, sizeof a);
+		progress_duration(range_bound(json_object_get(half, "wallSeconds"), "expected"), b, sizeof b);
 		printf("; halving it costs %s of CPU time, %s more", a, b);
 	}
 	if (json_is_object(eta)) {
-		progress_duration(span(eta, "expected"), a, sizeof a);
-		progress_duration(span(eta, "low"), b, sizeof b);
-		progress_duration(span(eta, "high"), c, sizeof c);
+		progress_duration(range_bound(eta, "expected"), a, sizeof a);
+		progress_duration(range_bound(eta, "low"), b, sizeof b);
+		progress_duration(range_bound(eta, "high"), c, sizeof c);
 		printf("; done in %s (%s - %s)", a, b, c);
 	}
 	printf("\n");
@@ -389,18 +389,18 @@ static json_t *next_line(struct reading *r)
 }
 
 /* It may have hung up already: what it said before is still there to be read. */
-static bool say(const struct reading *r, const char *text)
+static bool send_text(const struct reading *r, const char *text)
 {
 	return send(fileno(r->f), text, strlen(text), MSG_NOSIGNAL) >= 0 || errno == EPIPE;
 }
 
 /* Sends a question, and reads on to its answer, of that type or an error. NULL: an error was printed. */
-static json_t *ask(struct reading *r, const char *type, json_t *question)
+static json_t *ask_for(struct reading *r, const char *type, json_t *question)
 {
 	char *text = json_dumps(question, JSON_COMPACT);
 	json_t *o = NULL;
 	json_decref(question);
-	if (!text || !say(r, text) || !say(r, "\n"))
+	if (!text || !send_text(r, text) || !send_text(r, "\n"))
 		fprintf(stderr, "hslt-status: %s\n", strerror(errno));
 	else
 		while ((o = next_line(r)) && strcmp(text_of(o, "type"), type) != 0 &&
@@ -424,7 +424,7 @@ static int complete_job(const struct arguments *a, struct reading *r, json_t *sn
 	json_t *jobs = json_object_get(snapshot, "jobs"), *job = json_array_get(jobs, place_of(jobs, a->job));
 	if (job && !is_ended(job))
 		return 0;
-	json_t *answer = ask(r, "job", json_pack("{s:s}", "job", a->job));
+	json_t *answer = ask_for(r, "job", json_pack("{s:s}", "job", a->job));
 	if (!answer)
 		return EXIT_UNREACHABLE;
 	bool known = json_is_object(json_object_get(answer, "job"));
@@ -467,7 +467,7 @@ static int complete_list(struct reading *r, json_t *snapshot)
 	size_t i;
 	int code = 0;
 	while (before && !code) {
-		json_t *page = ask(r, "ended", json_pack("{s:o}", "endedBefore", before));
+		json_t *page = ask_for(r, "ended", json_pack("{s:o}", "endedBefore", before));
 		if (strcmp(text_of(page, "type"), "ended") != 0)
 			code = EXIT_UNREACHABLE;
 		if (*text_of(page, "text"))
@@ -504,12 +504,12 @@ static bool show(const struct arguments *a, const json_t *snapshot, bool first)
 	return !fflush(stdout) && !ferror(stdout) && a->watch && !(job && is_ended(job));
 }
 
-static int follow(const struct arguments *a, FILE *f)
+static int follow_lines(const struct arguments *a, FILE *f)
 {
 	struct reading r = {.f = f};
 	int code = 0;
 	bool first = true, more = true;
-	if (a->watch && !say(&r, "{\"subscribe\":[\"snapshot\"]}\n")) {
+	if (a->watch && !send_text(&r, "{\"subscribe\":[\"snapshot\"]}\n")) {
 		fprintf(stderr, "hslt-status: %s\n", strerror(errno));
 		return EXIT_UNREACHABLE;
 	}
@@ -538,12 +538,12 @@ int main(int argc, char **argv)
 	struct arguments a = {0};
 	struct error e;
 	program_options(&program, argc, argv, &a);
-	FILE *f = reach(a.socket, &e);
+	FILE *f = connect_socket(a.socket, &e);
 	if (!f) {
 		fprintf(stderr, "hslt-status: %s\n", e.text);
 		return EXIT_UNREACHABLE;
 	}
-	int code = follow(&a, f);
+	int code = follow_lines(&a, f);
 	fclose(f);
 	return code;
 }

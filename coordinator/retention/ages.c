@@ -10,7 +10,7 @@
 
 static const char note[] = "clock"; /* in the ledger */
 
-static struct age_clock clocks(void)
+static struct age_clock read_clocks(void)
 {
 	struct age_clock now = {.up = clock_seconds_of(CLOCK_BOOTTIME), .wall = clock_wall_seconds()};
 	int fd = disk_open("/proc/sys/kernel/random/boot_id", O_RDONLY | O_CLOEXEC, 0);
@@ -37,7 +37,7 @@ void ages_open(struct jobs *jobs)
 	}
 	if (rc && rc != -ENOENT)
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
-	jobs->seen = clocks();
+	jobs->seen = read_clocks();
 	age_clock_advance(&jobs->seen, rc ? NULL : &last, age_clock_credit(jobs->config.clear_seconds));
 	ages_keep(jobs);
 }
@@ -52,7 +52,7 @@ void ages_keep(const struct jobs *jobs)
 {
 	char text[AGE_CLOCK_TEXT];
 	struct error e;
-	struct age_clock now = clocks();
+	struct age_clock now = read_clocks();
 	now.seconds = ages_now(jobs);
 	age_clock_to_text(&now, text);
 	if (ledger_set(jobs->ledger, note, text, &e))

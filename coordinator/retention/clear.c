@@ -177,7 +177,7 @@ static void clear_job(struct jobs *jobs, struct clearing *c, const struct age_jo
 	jobs->changes++;
 }
 
-static void choose(const struct jobs *jobs, struct clearing *c)
+static void choose_jobs(const struct jobs *jobs, struct clearing *c)
 {
 	struct age_limits limits = {jobs->config.clear_seconds, jobs->config.clear_bytes};
 	c->now = clock_wall_seconds();
@@ -190,7 +190,7 @@ static bool step(struct jobs *jobs, struct clearing *c)
 	if (!c->whole)
 		look_at_next(jobs, c);
 	else if (!(c->now > 0))
-		choose(jobs, c);
+		choose_jobs(jobs, c);
 	else if (c->cleared < c->jobs.count)
 		clear_job(jobs, c, (const struct age_job *)c->jobs.items + c->cleared++);
 	else

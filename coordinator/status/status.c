@@ -125,7 +125,7 @@ static void on_reader_closed(uv_handle_t *h)
 	mem_free(r);
 }
 
-static void drop(struct reader *r)
+static void drop_reader(struct reader *r)
 {
 	if (r->closing)
 		return;
@@ -135,19 +135,19 @@ static void drop(struct reader *r)
 	uv_close((uv_handle_t *)&r->pipe, on_reader_closed);
 }
 
-static size_t waiting(const struct reader *r)
+static size_t bytes_waiting(const struct reader *r)
 {
 	return uv_stream_get_write_queue_size((const uv_stream_t *)&r->pipe);
 }
 
-static uint64_t left(const struct send_share *s)
+static uint64_t unsent_bytes(const struct send_share *s)
 {
-	return waiting((const struct reader *)((const char *)s - offsetof(struct reader, share)));
+	return bytes_waiting((const struct reader *)((const char *)s - offsetof(struct reader, share)));
 }
 
 static void give_way(struct send_share *s)
 {
-	drop((struct reader *)((char *)s - offsetof(struct reader, share)));
+	drop_reader((struct reader *)((char *)s - offsetof(struct reader, share)));
 }
 
 static uint64_t loop_ms(const struct reader *r)
@@ -164,7 +164,7 @@ static void on_written(uv_write_t *w, int status)
 	release(s->line);
 	mem_free(s);
 	if (status)
-		drop(r);
+		drop_reader(r);
 }
 
 /* At most one tick's lines about changes wait for a reader (status_tick); answers are bounded here. */
@@ -173,7 +173,7 @@ static void send_line(struct reader *r, struct shared *l, bool answer)
 	struct sending *s = l ? mem_alloc(1, sizeof *s) : NULL;
 	size_t size = l ? l->size : 0;
 	if (!s || (answer && r->unread > UNREAD_MAX))
-		drop(r);
+		drop_reader(r);
 	if (r->closing || !send_pool_add(&r->share, size, loop_ms(r))) {
 		mem_free(s);
 		return;
@@ -188,7 +188,7 @@ static void send_line(struct reader *r, struct shared *l, bool answer)
 		send_pool_sub(&r->share, size, loop_ms(r));
 		release(l);
 		mem_free(s);
-		drop(r);
+		drop_reader(r);
 	}
 	send_pool_look(&r->share, loop_ms(r));
 }
@@ -208,7 +208,7 @@ static void send_answer(struct reader *r, json_t *o)
 
 /* ---- reading ---- */
 
-static void subscribe(struct reader *r, const json_t *list)
+static void set_subscription(struct reader *r, const json_t *list)
 {
 	static const struct {
 		const char *name;
@@ -238,7 +238,7 @@ static void take_line(struct reader *r, size_t size)
 	const json_t *list = json_object_get(o, "subscribe"), *job = json_object_get(o, "job"),
 		     *before = json_object_get(o, "endedBefore");
 	if (json_is_array(list))
-		subscribe(r, list);
+		set_subscription(r, list);
 	else if (json_is_string(job))
 		send_answer(r, line_job(r->socket->jobs, json_string_value(job)));
 	else if (json_is_string(before) || json_is_null(before))
@@ -261,7 +261,7 @@ static void on_read(uv_stream_t *stream, ssize_t count, const uv_buf_t *b)
 	(void)b;
 	struct reader *r = stream->data;
 	if (count < 0) {
-		drop(r);
+		drop_reader(r);
 		return;
 	}
 	r->line_size += (size_t)count;
@@ -272,7 +272,7 @@ static void on_read(uv_stream_t *stream, ssize_t count, const uv_buf_t *b)
 		memmove(r->line, end + 1, r->line_size);
 	}
 	if (!r->closing && r->line_size == LINE_BYTES)
-		drop(r);
+		drop_reader(r);
 }
 
 static void begin_making(struct status_socket *t, unsigned changed);
@@ -289,18 +289,18 @@ static void on_connection(uv_stream_t *listener, int status)
 	uv_pipe_init(listener->loop, &r->pipe, 0);
 	r->pipe.data = r;
 	r->socket = t;
-	r->share = (struct send_share){.pool = &t->peers->sending, .left = left, .give_way = give_way};
+	r->share = (struct send_share){.pool = &t->peers->sending, .left = unsent_bytes, .give_way = give_way};
 	LIST_INSERT_HEAD(&t->readers, r, next);
 	t->reader_count++;
 	if (uv_accept(listener, (uv_stream_t *)&r->pipe)) {
-		drop(r);
+		drop_reader(r);
 		return;
 	}
 	int room = KERNEL_BYTES; /* some systems would hold hundreds of snapshots that are old when they are read */
 	uv_send_buffer_size((uv_handle_t *)&r->pipe, &room);
 	if (t->reader_count > READERS_MAX) { /* the kernel takes the line at once */
 		send_answer(r, line_error("the status has too many readers: 64 others are connected to its socket"));
-		drop(r);
+		drop_reader(r);
 		return;
 	}
 	r->behind = true;
@@ -329,7 +329,7 @@ static void publish_object(struct status_socket *t, enum topic topic, json_t *o)
 
 static bool wants_snapshot(const struct reader *r, unsigned changed)
 {
-	return !r->closing && (r->behind ? waiting(r) == 0 : changed & r->topics & TOPIC_SNAPSHOT);
+	return !r->closing && (r->behind ? bytes_waiting(r) == 0 : changed & r->topics & TOPIC_SNAPSHOT);
 }
 
 static void run_making(void *making)
@@ -361,7 +361,7 @@ static void making_done(uv_async_t *done)
 		r->behind = false;
 		send_line(r, m->whole, false);
 		if (!r->heard && !r->closing && uv_read_start((uv_stream_t *)&r->pipe, on_alloc, on_read))
-			drop(r);
+			drop_reader(r);
 		r->heard = true;
 	}
 	if (t)
@@ -515,7 +515,7 @@ void status_tick(struct status_socket *t)
 		topics |= r->topics;
 	bool changed = topics && t->shown_changes != t->jobs->changes;
 	for (struct reader *r = LIST_FIRST(&t->readers); changed && r; r = LIST_NEXT(r, next))
-		r->behind = r->behind || (r->topics && waiting(r));
+		r->behind = r->behind || (r->topics && bytes_waiting(r));
 	if (changed)
 		t->shown_changes = t->jobs->changes;
 	if (changed && (topics & TOPIC_JOBS))
@@ -559,7 +559,7 @@ void status_close(struct status_socket *t)
 	if (!t)
 		return;
 	for (struct reader *r; (r = LIST_FIRST(&t->readers));) {
-		drop(r);
+		drop_reader(r);
 		LIST_REMOVE(r, next);
 		r->socket = NULL;
 	}

@@ -219,7 +219,7 @@ void agent_settle(struct agent *a)
 		disconnect_for_good(a);
 }
 
-static void leave(struct agent *a)
+static void begin_leaving(struct agent *a)
 {
 	notify_send("STOPPING=1");
 	a->leaving = true;
@@ -236,7 +236,7 @@ static void on_watch(uv_timer_t *t)
 	log_event(LOG_STOP, "text=\"a thread hangs: the others finish, then the worker exits to be restarted\"");
 	a->hung = true;
 	if (!a->leaving)
-		leave(a);
+		begin_leaving(a);
 }
 
 static void on_signal(uv_signal_t *h, int number)
@@ -247,7 +247,7 @@ static void on_signal(uv_signal_t *h, int number)
 		_exit(0);
 	}
 	log_event(LOG_STOP, "signal=%d grace=%g", number, a->config.grace_seconds);
-	leave(a);
+	begin_leaving(a);
 }
 
 /* ---- start and end ---- */
@@ -263,7 +263,7 @@ static void on_pulse(uv_timer_t *t)
 	if (a->leaving || !(a->config.idle_seconds > 0) || (double)(now - a->busy_at) < 1000 * a->config.idle_seconds)
 		return;
 	log_event(LOG_STOP, "text=\"no lease for %g s\"", a->config.idle_seconds);
-	leave(a);
+	begin_leaving(a);
 }
 
 /* Often enough for whoever watches; not at all if nobody does. */

@@ -257,7 +257,7 @@ static void take_job_end(struct agent *a, uint64_t job)
 
 /* The coordinator has started over, and the job's number is now another job's: the results of the old one are
  * useless. What it has granted meanwhile is of the new one, and is given back; it ignores what it has not granted. */
-static void disown(struct agent *a, struct job_cache *b)
+static void drop_old_job(struct agent *a, struct job_cache *b)
 {
 	log_event(LOG_JOB_NOTE, "job=j%llu text=\"the coordinator has another job with this number\"", log_u64(b->job));
 	for (struct lease_task *l = a->leases, *next; l; l = next) {
@@ -280,7 +280,7 @@ static void take_job_info(struct agent *a, struct envelope *env)
 	if (!b)
 		return;
 	if (!job_cache_is_of(b, env->message->job_info)) {
-		disown(a, b);
+		drop_old_job(a, b);
 		return;
 	}
 	b->confirmed = true;

@@ -79,7 +79,7 @@ void work_end(void)
 		atomic_store(&own->busy, false);
 }
 
-static void lose(const struct work *w, const char *text, bool machine)
+static void add_lost_lease(const struct work *w, const char *text, bool machine)
 {
 	const struct lease_key *k = &w->key;
 	if (shared->lost_count == WORK_THREADS)
@@ -114,7 +114,7 @@ unsigned work_lose(int number, double now)
 		for (unsigned i = 0; i < WORK_THREADS; i++) {
 			const struct work *w = &shared->of[i];
 			if (atomic_load(&w->busy) && (hit < 0 || (unsigned)hit == i))
-				lose(w, said ? shared->text : crash_signal_name(number), !said);
+				add_lost_lease(w, said ? shared->text : crash_signal_name(number), !said);
 		}
 	for (unsigned i = 0; i < WORK_THREADS; i++)
 		atomic_store(&shared->of[i].busy, false);

@@ -127,7 +127,7 @@ static void add_pixel(struct tally *t, const struct parts *of)
 
 static const struct render_found render_found_none = {INFINITY, 0, 1, 1, 1, 0};
 
-static struct render_found found(const struct tally *t)
+static struct render_found found_light(const struct tally *t)
 {
 	struct render_found f = render_found_none;
 	const struct tail *tail = t->tail;
@@ -358,7 +358,7 @@ static struct render_found look_on(struct pilot *p, uint64_t stream, uint64_t fi
 	}
 	t->samples = (double)(end / IN_PIXEL * IN_PIXEL);
 	t->rays = (double)batch_rays(p->counters);
-	return found(t);
+	return found_light(t);
 }
 
 static struct tally begin_look(struct pilot *p)
@@ -499,7 +499,7 @@ int render_choose(const struct world *w, struct plan_request *r, struct render_c
 	return chosen->has_mutations ? render_mutations(NULL, &summary, r->mixture, e) : 0;
 }
 
-static const char *reason(const char *integrator, const struct render_choice *c)
+static const char *reason_of(const char *integrator, const struct render_choice *c)
 {
 	if (strcmp(integrator, "hslt") == 0)
 		return isinf(c->path.cost) ? "paths from the camera find next to no light; chains search for it longest"
@@ -528,5 +528,5 @@ static const char *reason(const char *integrator, const struct render_choice *c)
 
 void render_choice_text(const char *integrator, const struct render_choice *c, char *text, size_t size)
 {
-	snprintf(text, size, "%s, by a pilot: %s", integrator, reason(integrator, c));
+	snprintf(text, size, "%s, by a pilot: %s", integrator, reason_of(integrator, c));
 }

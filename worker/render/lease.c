@@ -47,7 +47,7 @@ struct job {
 enum { STOP_INTERVAL = 16 };   /* samples between looks at the stop flag; one may take 10 ms */
 enum { BEYOND_INTERVAL = 16 }; /* one bootstrap sample in so many also estimates paths that are too long to simulate */
 
-static bool stopped(const struct job *j)
+static bool is_stopped(const struct job *j)
 {
 	tick();
 	return j->stop && atomic_load_explicit(j->stop, memory_order_relaxed);
@@ -106,7 +106,7 @@ static enum lease_end sample_pixel(struct job *j, uint64_t column, uint64_t row)
 				  .width = 1 / w->width,
 				  .height = 1 / w->height};
 	for (uint64_t i = 0; i < p->epoch; i++) {
-		if (j->out->counters[COUNT_SAMPLES] % STOP_INTERVAL == 0 && stopped(j))
+		if (j->out->counters[COUNT_SAMPLES] % STOP_INTERVAL == 0 && is_stopped(j))
 			return LEASE_STOPPED;
 		uint64_t sample = j->key->epoch * p->epoch + i;
 		sampler_sobol_init(&s.sobol, p->seed, j->integrator->stream, pixel, j->key->group, sample);
@@ -136,7 +136,7 @@ static enum lease_end run_bootstrap(struct job *j)
 	struct batch *out = j->out;
 	uint32_t longest = j->plan->max_depth < PATH_MAX_EDGES ? j->plan->max_depth : LONGER_EDGES;
 	for (uint64_t i = r.begin; i < r.end; i++) {
-		if ((i - r.begin) % STOP_INTERVAL == 0 && stopped(j))
+		if ((i - r.begin) % STOP_INTERVAL == 0 && is_stopped(j))
 			return LEASE_STOPPED;
 		j->index = i;
 		struct sampler_random s;
@@ -185,7 +185,7 @@ static int run_chain(struct job *j, const struct lease_input *in, uint32_t k, ui
 	struct chain_sums sums = {0, 0};
 	uint64_t accepted = j->out->counters[COUNT_ACCEPTED];
 	for (uint64_t i = 0; i < j->plan->epoch; i++) {
-		if (i % STOP_INTERVAL == 0 && stopped(j)) {
+		if (i % STOP_INTERVAL == 0 && is_stopped(j)) {
 			*end = LEASE_STOPPED;
 			return 0;
 		}

@@ -23,7 +23,7 @@ static void add_plugin(struct plugin_decl d)
 	decls[count++] = d;
 }
 
-static void gather(void)
+static void gather_plugins(void)
 {
 	for (size_t i = 0; shape_registry[i]; i++)
 		add_plugin(shape_registry[i]->decl);
@@ -46,7 +46,7 @@ static void gather(void)
 const struct plugin_decl *render_plugins(void)
 {
 	static pthread_once_t once = PTHREAD_ONCE_INIT;
-	pthread_once(&once, gather);
+	pthread_once(&once, gather_plugins);
 	return decls;
 }
 

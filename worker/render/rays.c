@@ -45,7 +45,7 @@ static int make_plan(const struct plan_request *r, struct plan *p, struct error 
 	return plan_make(&q, p, e);
 }
 
-static void add(struct counted *c, const struct batch *b)
+static void add_counts(struct counted *c, const struct batch *b)
 {
 	c->rays += (double)batch_rays(b->counters);
 	c->steps += (double)b->counters[COUNT_SAMPLES];
@@ -71,7 +71,7 @@ static int count_chain(struct counter *c, uint32_t group, uint64_t seed)
 	batch_fini(&first);
 	if (rc)
 		return rc;
-	add(&c->chain, &second);
+	add_counts(&c->chain, &second);
 	batch_fini(&second);
 	return 0;
 }
@@ -83,7 +83,7 @@ static int count_group(struct counter *c, uint32_t group)
 	int rc = run_lease(c, LEASE_BOOTSTRAP, group, 0, NULL, &b);
 	if (rc)
 		return rc;
-	add(&c->bootstrap, &b);
+	add_counts(&c->bootstrap, &b);
 	bool lit =
 		plan_resample(&c->plan, group, b.weights, b.weight_count, plan_resample_u(&c->plan, group), 1, &seed);
 	batch_fini(&b);

@@ -109,7 +109,7 @@ static bool add_value(struct accuracy_sweep *s, const char *value, size_t settin
 	return true;
 }
 
-static struct accuracy_setting *swept(struct planner *p, struct accuracy_sweep *s, const char *value)
+static struct accuracy_setting *add_swept_setting(struct planner *p, struct accuracy_sweep *s, const char *value)
 {
 	if (!add_value(s, value, p->d->count))
 		return NULL;
@@ -129,7 +129,7 @@ static bool with_setting(const char *base, const char *name, const char *value, 
 }
 
 /* Why a parameter of the renderer has no effect here; NULL: it has one. */
-static const char *idle(const struct planner *p, const struct render_setting *k)
+static const char *why_no_effect(const struct planner *p, const struct render_setting *k)
 {
 	if (!k->sweep[0])
 		return "it determines what is rendered, not how accurately";
@@ -162,7 +162,7 @@ static void sweep_setting(struct planner *p, const struct render_setting *k)
 			placed |= add_value(s, standard, ACCURACY_DEFAULT);
 			continue;
 		}
-		struct accuracy_setting *setting = swept(p, s, k->sweep[i]);
+		struct accuracy_setting *setting = add_swept_setting(p, s, k->sweep[i]);
 		if (!setting)
 			continue;
 		memcpy(setting->accuracy, accuracy, sizeof accuracy);
@@ -179,7 +179,7 @@ static void sweep_depth(struct planner *p)
 	struct accuracy_sweep *s = new_sweep(p, DEPTH, "Longest paths, in edges; longer ones are missing in the image");
 	for (size_t i = 0; s && i < sizeof depths / sizeof *depths && depths[i] < p->base->max_depth; i++) {
 		snprintf(value, sizeof value, "%u", depths[i]);
-		struct accuracy_setting *setting = swept(p, s, value);
+		struct accuracy_setting *setting = add_swept_setting(p, s, value);
 		if (!setting)
 			continue;
 		setting->max_depth = depths[i];
@@ -261,7 +261,8 @@ static void sweep_share(struct planner *p)
 			changed[i].weight *= base[i].independent ? shares[k] / now : (1 - shares[k]) / (1 - now);
 		}
 		snprintf(value, sizeof value, "%.2g", shares[k]);
-		struct accuracy_setting *setting = print_entries(p, changed, n, mixture) ? swept(p, s, value) : NULL;
+		struct accuracy_setting *setting =
+			print_entries(p, changed, n, mixture) ? add_swept_setting(p, s, value) : NULL;
 		if (setting)
 			memcpy(setting->mixture, mixture, sizeof mixture);
 	}
@@ -276,7 +277,7 @@ static void try_mixture(struct planner *p, struct accuracy_sweep *s, const struc
 	char mixture[PLAN_MUTATIONS_MAX];
 	if (n > PLAN_MAX_STRATEGIES || !print_entries(p, entry, n, mixture) || strcmp(mixture, p->base->mixture) == 0)
 		return;
-	struct accuracy_setting *setting = swept(p, s, value);
+	struct accuracy_setting *setting = add_swept_setting(p, s, value);
 	if (setting)
 		memcpy(setting->mixture, mixture, sizeof mixture);
 }
@@ -327,14 +328,15 @@ static void sweep_presets(struct planner *p)
 		char text[2 * PLAN_ACCURACY_MAX], accuracy[PLAN_ACCURACY_MAX];
 		snprintf(text, sizeof text, "%s%s%s", p->base->accuracy, *p->base->accuracy ? "," : "",
 			 presets[i].accuracy);
-		struct accuracy_setting *setting =
-			render_settings_canonical(text, accuracy, p->e) == 0 ? swept(p, s, presets[i].name) : NULL;
+		struct accuracy_setting *setting = render_settings_canonical(text, accuracy, p->e) == 0
+							   ? add_swept_setting(p, s, presets[i].name)
+							   : NULL;
 		if (setting)
 			memcpy(setting->accuracy, accuracy, sizeof accuracy);
 	}
 	if (s) {
 		add_value(s, "default", ACCURACY_DEFAULT);
-		struct accuracy_setting *same = swept(p, s, "careful");
+		struct accuracy_setting *same = add_swept_setting(p, s, "careful");
 		if (same)
 			memcpy(same->accuracy, p->d->settings[ACCURACY_REFERENCE].accuracy, sizeof same->accuracy);
 	}
@@ -347,7 +349,8 @@ static void add_reference(struct planner *p)
 	for (size_t i = 0; i < sizeof careful / sizeof *careful; i++) {
 		const struct render_setting *k = setting_find(careful[i].parameter);
 		char accuracy[PLAN_ACCURACY_MAX];
-		if (k && !idle(p, k) && with_setting(s->accuracy, careful[i].parameter, careful[i].value, accuracy))
+		if (k && !why_no_effect(p, k) &&
+		    with_setting(s->accuracy, careful[i].parameter, careful[i].value, accuracy))
 			memcpy(s->accuracy, accuracy, sizeof accuracy);
 	}
 }
@@ -396,7 +399,7 @@ int accuracy_design(struct accuracy_design *d, const struct plan_request *base, 
 	add_reference(&p);
 	const struct render_setting *k;
 	for (size_t i = 0; (k = render_setting_at(i)) != NULL; i++) {
-		const char *why = idle(&p, k);
+		const char *why = why_no_effect(&p, k);
 		if (!listed(only, k->name))
 			continue;
 		if (why)

@@ -22,7 +22,7 @@ struct pilot {				   /* of the default, used only for the sizes of rounds */
 	double rate;			   /* CPU seconds per second: what other programs leave of the processors */
 };
 
-static double shares(const struct accuracy_design *d)
+static double sum_of_shares(const struct accuracy_design *d)
 {
 	double sum = 0;
 	for (size_t i = 0; i < d->count; i++)
@@ -33,7 +33,7 @@ static double shares(const struct accuracy_design *d)
 /* CPU seconds for a setting of share 1, before the cost of bootstrap and worlds is known. */
 static double expected_seconds(const struct accuracy_run *r, const struct pilot *pilot)
 {
-	return r->setting_seconds > 0 ? r->setting_seconds : 0.85 * r->seconds * pilot->rate / shares(r->design);
+	return r->setting_seconds > 0 ? r->setting_seconds : 0.85 * r->seconds * pilot->rate / sum_of_shares(r->design);
 }
 
 /* Memory in file caches counts as available: on a machine that has been up for a while little else is free. If the
@@ -123,7 +123,7 @@ static int find_world(struct accuracy_run *r, struct accuracy_job *j, struct err
 	return rc;
 }
 
-static bool stopped(const struct accuracy_run *r)
+static bool is_stopped(const struct accuracy_run *r)
 {
 	return r->stop && atomic_load(r->stop);
 }
@@ -161,7 +161,7 @@ static int run_round(struct accuracy_run *r, size_t i, struct error *e)
 }
 
 /* What setting i has used of its share: CPU seconds or rounds. */
-static double had(const struct accuracy_run *r, size_t i)
+static double share_used(const struct accuracy_run *r, size_t i)
 {
 	const struct accuracy_job *j = &r->jobs[i];
 	return (r->setting_rounds ? (double)canvas_rounds(j->run.canvas) : j->cpu) / r->design->settings[i].share;
@@ -172,7 +172,7 @@ static size_t next_setting(const struct accuracy_run *r)
 {
 	size_t best = 0;
 	for (size_t i = 1; i < r->design->count; i++)
-		if (had(r, i) < had(r, best))
+		if (share_used(r, i) < share_used(r, best))
 			best = i;
 	return best;
 }
@@ -183,17 +183,19 @@ static void show(const struct accuracy_run *r, double fraction, const char *stat
 		r->progress(r->user, fraction, state);
 }
 
-static int rounds(struct accuracy_run *r, double begin, struct error *e)
+static int render_rounds(struct accuracy_run *r, double begin, struct error *e)
 {
 	double first = clock_seconds(), wanted = r->setting_rounds ? (double)r->setting_rounds : r->setting_seconds;
 	for (;;) {
 		size_t i = next_setting(r);
 		double wall = clock_seconds();
-		bool enough = wanted > 0 ? had(r, i) >= wanted : wall >= begin + r->seconds;
+		bool enough = wanted > 0 ? share_used(r, i) >= wanted : wall >= begin + r->seconds;
 		/* At least two rounds, however short the time. */
-		if ((enough && canvas_rounds(r->jobs[i].run.canvas) >= 2) || stopped(r))
+		if ((enough && canvas_rounds(r->jobs[i].run.canvas) >= 2) || is_stopped(r))
 			return 0;
-		show(r, fmin(wanted > 0 ? had(r, i) / wanted : (wall - first) / fmax(begin + r->seconds - first, 1), 1),
+		show(r,
+		     fmin(wanted > 0 ? share_used(r, i) / wanted : (wall - first) / fmax(begin + r->seconds - first, 1),
+			  1),
 		     "rendering");
 		int rc = run_round(r, i, e);
 		if (rc)
@@ -210,7 +212,7 @@ static void end_job(struct accuracy_job *j)
 }
 
 /* Renders the default briefly, to measure its speed. */
-static int fly(struct accuracy_run *r, struct pilot *pilot, struct error *e)
+static int render_pilot(struct accuracy_run *r, struct pilot *pilot, struct error *e)
 {
 	struct accuracy_job *j = &r->jobs[ACCURACY_DEFAULT];
 	*pilot = (struct pilot){1, 1, 1}; /* so slow that all sizes are the minimum */
@@ -222,7 +224,7 @@ static int fly(struct accuracy_run *r, struct pilot *pilot, struct error *e)
 	double begin = clock_seconds();
 	if (!rc)
 		rc = start(r, ACCURACY_DEFAULT, e);
-	if (!rc && !stopped(r))
+	if (!rc && !is_stopped(r))
 		rc = run_round(r, ACCURACY_DEFAULT, e);
 	if (!rc && j->cost_count > 0) {
 		pilot->bootstrap_sample = fmax(j->run.bootstrap_cpu_seconds / (double)j->plan.bootstrap, 1e-9);
@@ -243,10 +245,10 @@ int accuracy_render(struct accuracy_run *r, struct error *e)
 		return error_set(e, ENOMEM, "no memory for %zu settings", d->count);
 	struct pilot pilot;
 	show(r, 0, "pilot");
-	rc = fly(r, &pilot, e);
+	rc = render_pilot(r, &pilot, e);
 	for (size_t i = 0; !rc && i < d->count; i++)
 		rc = make_plan(r, i, &pilot, e);
-	for (size_t i = 0; !rc && !stopped(r) && i < d->count; i++) {
+	for (size_t i = 0; !rc && !is_stopped(r) && i < d->count; i++) {
 		show(r, (double)i / (double)d->count, "bootstrap");
 		rc = start(r, i, e);
 		if (rc) {
@@ -255,10 +257,10 @@ int accuracy_render(struct accuracy_run *r, struct error *e)
 			error_prefix(e, rc, "%s", name);
 		}
 	}
-	if (!rc && !stopped(r))
-		rc = rounds(r, begin, e);
+	if (!rc && !is_stopped(r))
+		rc = render_rounds(r, begin, e);
 	r->wall_seconds = clock_seconds() - begin;
-	r->interrupted = stopped(r);
+	r->interrupted = is_stopped(r);
 	for (size_t i = 0; !rc && i < d->count; i++)
 		if (!r->jobs[i].run.canvas || canvas_rounds(r->jobs[i].run.canvas) < 1)
 			rc = error_set(e, EINTR, "interrupted before each setting had a round: no report");

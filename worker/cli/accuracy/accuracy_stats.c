@@ -59,7 +59,7 @@ struct interval stats_median(double *x, size_t count)
 	return (struct interval){middle, x[k], x[count - 1 - k]};
 }
 
-static bool beats(const struct stats_point *j, const struct stats_point *i, double z)
+static bool is_better(const struct stats_point *j, const struct stats_point *i, double z)
 {
 	if (j->other_image)
 		return false;
@@ -76,7 +76,7 @@ void stats_front(const struct stats_point *p, size_t n, double level, size_t *by
 	for (size_t i = 0; i < n; i++) {
 		by[i] = i;
 		for (size_t j = 0; j < n; j++)
-			if (j != i && beats(&p[j], &p[i], z) && (by[i] == i || p[j].log_error < p[by[i]].log_error))
+			if (j != i && is_better(&p[j], &p[i], z) && (by[i] == i || p[j].log_error < p[by[i]].log_error))
 				by[i] = j;
 	}
 }

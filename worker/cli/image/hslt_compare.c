@@ -96,7 +96,7 @@ static void print_json(json_t *o)
 }
 
 /* JSON has no infinity. */
-static json_t *real(double x)
+static json_t *json_of(double x)
 {
 	return isfinite(x) ? json_real(x) : json_null();
 }
@@ -107,21 +107,21 @@ static json_t *text(const char *s)
 	return t ? t : json_string("(not UTF-8)");
 }
 
-static json_t *three(const double x[3])
+static json_t *json_of_three(const double x[3])
 {
-	return json_pack("[o,o,o]", real(x[0]), real(x[1]), real(x[2]));
+	return json_pack("[o,o,o]", json_of(x[0]), json_of(x[1]), json_of(x[2]));
 }
 
 static void print_figures(const struct arguments *a, const struct compare_result *r)
 {
 	if (a->json) {
 		print_json(json_pack("{s:i s:o s:o s:o s:o s:o s:o s:o s:o s:o s:o s:o s:I s:I s:I s:s}", "schema", 1,
-				     "a", text(a->path[0]), "b", text(a->path[1]), "relMSE", real(r->rel_mse),
-				     "relativeError", real(r->relative_error), "rmse", real(r->rmse), "psnr",
-				     real(r->psnr), "peak", real(r->peak), "meanA", three(r->mean_a), "meanB",
-				     three(r->mean_b), "meanRatio", three(r->ratio), "luminanceRatio",
-				     real(r->luminance_ratio), "pixels", (json_int_t)r->pixels, "leftOut",
-				     (json_int_t)r->left_out, "notFinite", (json_int_t)r->not_finite,
+				     "a", text(a->path[0]), "b", text(a->path[1]), "relMSE", json_of(r->rel_mse),
+				     "relativeError", json_of(r->relative_error), "rmse", json_of(r->rmse), "psnr",
+				     json_of(r->psnr), "peak", json_of(r->peak), "meanA", json_of_three(r->mean_a),
+				     "meanB", json_of_three(r->mean_b), "meanRatio", json_of_three(r->ratio),
+				     "luminanceRatio", json_of(r->luminance_ratio), "pixels", (json_int_t)r->pixels,
+				     "leftOut", (json_int_t)r->left_out, "notFinite", (json_int_t)r->not_finite,
 				     "relMSEDefinition", REL_MSE_DEFINITION));
 		return;
 	}

@@ -240,7 +240,7 @@ static int read_whole(int fd, char **bytes, size_t *size, struct error *e)
 	return error_set(e, EIO, "reading gnuplot's output: %s", n < 0 ? strerror((int)-n) : "it became shorter");
 }
 
-static void complain(int fd, const struct plot *p, struct error *e)
+static void report_gnuplot(int fd, const struct plot *p, struct error *e)
 {
 	char text[400];
 	ssize_t n = pread(fd, text, sizeof text - 1, 0);
@@ -266,7 +266,7 @@ static int draw(const struct plot *p, bool png, char **bytes, size_t *size, stru
 	if (!rc) {
 		rc = spawn(fd, e);
 		if (rc == -EIO)
-			complain(fd[2], p, e);
+			report_gnuplot(fd[2], p, e);
 	}
 	if (!rc)
 		rc = read_whole(fd[1], bytes, size, e);

@@ -56,7 +56,7 @@ static void place_tics(struct plot_axis *a)
 }
 
 /* Margin around the points; a range of amounts starts at 0 if that costs little, so that lengths can be compared. */
-static void widen(struct plot_axis *a, bool amounts)
+static void widen_axis(struct plot_axis *a, bool amounts)
 {
 	if (a->log) {
 		double factor = pow(a->high / a->low, 0.06);
@@ -91,7 +91,7 @@ bool plot_axes(const struct plot *p, struct plot_axis *x, struct plot_axis *y)
 	}
 	if (!(x->low <= x->high && y->low <= y->high))
 		return false;
-	widen(x, false);
-	widen(y, true);
+	widen_axis(x, false);
+	widen_axis(y, true);
 	return true;
 }

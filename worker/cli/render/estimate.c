@@ -30,7 +30,7 @@ static double bootstrap_ratio(const struct estimate *s)
 	return (double)s->plan->bootstrap / (double)s->pilot->bootstrap;
 }
 
-static void raise(struct forecast_range *r, double more)
+static void shift_range(struct forecast_range *r, double more)
 {
 	r->low += more;
 	r->middle += more;
@@ -53,8 +53,8 @@ static size_t rows_of(const struct estimate *s, struct row row[TARGETS_MOST])
 		struct row *r = &row[i];
 		r->reached = forecast_reached(s->looks, r->target);
 		forecast_target(s->looks, s->plan, r->target, FORECAST_NEW, &r->cost);
-		raise(&r->cost.cpu_seconds, s->bootstrap_cpu * bootstrap_ratio(s));
-		raise(&r->cost.seconds, s->bootstrap_seconds * bootstrap_ratio(s));
+		shift_range(&r->cost.cpu_seconds, s->bootstrap_cpu * bootstrap_ratio(s));
+		shift_range(&r->cost.seconds, s->bootstrap_seconds * bootstrap_ratio(s));
 	}
 	return count;
 }

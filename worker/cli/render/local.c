@@ -36,14 +36,14 @@ struct local_job {
 	struct thread_pool thread_pool;
 };
 
-static double since(const struct timespec *begin)
+static double seconds_since(const struct timespec *begin)
 {
 	struct timespec now;
 	clock_gettime(CLOCK_MONOTONIC, &now);
 	return (double)(now.tv_sec - begin->tv_sec) + 1e-9 * (double)(now.tv_nsec - begin->tv_nsec);
 }
 
-static bool stopped(const struct thread_pool *c)
+static bool is_stopped(const struct thread_pool *c)
 {
 	return c->run->stop && atomic_load(c->run->stop);
 }
@@ -71,7 +71,7 @@ static void show(struct thread_pool *c)
 	uint64_t per_round = (uint64_t)r->plan->groups * r->plan->parts;
 	struct local_progress p = {.state = c->kind == LEASE_BOOTSTRAP ? "bootstrap" : "running",
 				   .done = c->finished,
-				   .seconds = since(&c->begin)};
+				   .seconds = seconds_since(&c->begin)};
 	p.total = r->plan->rounds == UINT64_MAX ? UINT64_MAX : (r->plan->rounds + 1) * per_round;
 	if (c->kind == LEASE_RENDER) {
 		p.rounds = (double)c->finished / (double)per_round - 1;
@@ -150,7 +150,7 @@ static void *run_leases(void *arg)
 	crash_thread();
 	for (;;) {
 		pthread_mutex_lock(&c->lock);
-		uint32_t i = c->rc || stopped(c) ? c->leases : take_lease(c);
+		uint32_t i = c->rc || is_stopped(c) ? c->leases : take_lease(c);
 		pthread_mutex_unlock(&c->lock);
 		if (i == c->leases || lease(c, i))
 			return NULL;
@@ -197,7 +197,7 @@ static int check_target(struct thread_pool *c, uint64_t rounds, enum merge_end *
 {
 	struct local_run *r = c->run;
 	struct canvas_image img;
-	double seconds = since(&c->begin);
+	double seconds = seconds_since(&c->begin);
 	/* The target may be reached even if another bound ends the render. */
 	bool ends = merge_end_of(r->plan, rounds, seconds, NULL) != MERGE_GOES_ON && r->plan->target_error > 0;
 	bool due = ends || merge_error_due(r->plan, rounds);
@@ -236,10 +236,10 @@ static int run_bootstrap(struct thread_pool *c)
 		return rc;
 	c->finished = r->plan->groups * r->plan->parts - bootstrap_missing(c->bootstrap);
 	rc = phase(c, LEASE_BOOTSTRAP, 0);
-	if (rc || stopped(c))
+	if (rc || is_stopped(c))
 		return rc;
 	r->bootstrap_cpu_seconds = r->cpu_seconds;
-	r->bootstrap_seconds = since(&c->begin);
+	r->bootstrap_seconds = seconds_since(&c->begin);
 	rc = begin_rounds(c);
 	if (r->lit.black)
 		r->end = MERGE_ROUNDS;
@@ -274,7 +274,7 @@ int local_start(struct local_run *r, struct local_job **out, struct error *e)
 					 : bootstrap_new(&c->bootstrap, p, &c->error);
 	if (!rc)
 		rc = run_bootstrap(c);
-	r->seconds = since(&c->begin);
+	r->seconds = seconds_since(&c->begin);
 	if (rc) {
 		fail(j, rc, e);
 		local_end(j);
@@ -286,10 +286,10 @@ int local_start(struct local_run *r, struct local_job **out, struct error *e)
 int local_step(struct local_job *j, struct error *e)
 {
 	struct thread_pool *c = &j->thread_pool;
-	if (!c->run->canvas || c->run->lit.black || stopped(c))
+	if (!c->run->canvas || c->run->lit.black || is_stopped(c))
 		return 0;
 	int rc = phase(c, LEASE_RENDER, canvas_rounds(c->run->canvas));
-	c->run->seconds = since(&c->begin);
+	c->run->seconds = seconds_since(&c->begin);
 	return rc ? fail(j, rc, e) : 0;
 }
 
@@ -313,7 +313,7 @@ int local_run(struct local_run *r, struct error *e)
 	int rc = local_start(r, &j, e);
 	if (rc)
 		return rc;
-	while (!rc && r->canvas && r->end == MERGE_GOES_ON && !stopped(&j->thread_pool)) {
+	while (!rc && r->canvas && r->end == MERGE_GOES_ON && !is_stopped(&j->thread_pool)) {
 		uint64_t before = canvas_rounds(r->canvas);
 		rc = local_step(j, e);
 		if (rc || canvas_rounds(r->canvas) == before)
@@ -322,7 +322,7 @@ int local_run(struct local_run *r, struct error *e)
 		if (rc)
 			fail(j, rc, e);
 	}
-	r->seconds = since(&j->thread_pool.begin);
+	r->seconds = seconds_since(&j->thread_pool.begin);
 	if (!rc && r->keep && !r->lit.black && (!r->canvas || canvas_rounds(r->canvas) == 0))
 		r->keep(r->user, j->thread_pool.bootstrap);
 	local_end(j);

@@ -14,7 +14,7 @@ enum {
 static const double enough_seconds = 0.25;
 
 /* Samples are measured on a smaller film of the same view. */
-static void shrink(struct render_options *o, struct plan_request *r)
+static void shrink_film(struct render_options *o, struct plan_request *r)
 {
 	double scale = sqrt(SMALL_FILM / ((double)r->width * r->height));
 	r->crop_x = r->crop_y = r->crop_width = r->crop_height = 0;
@@ -72,7 +72,7 @@ int speed_measure(const struct render_arguments *a, const char *folder, const ch
 	struct world *w;
 	*speed = 0;
 	if (r.kind == PLAN_SAMPLES)
-		shrink(&o, &r);
+		shrink_film(&o, &r);
 	struct asset_folders folders = option_folders(a, folder);
 	struct asset_source assets = asset_search(&folders);
 	int rc = render_scene_read(&scene, &assets, name, a->defines, a->define_count, &o, e);

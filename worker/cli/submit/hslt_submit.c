@@ -239,7 +239,7 @@ static void measure(struct arguments *a, const struct scene_bundle *b)
 
 /* Checks that a coordinator accepts us before a pilot is rendered. The connection is closed again, since nothing would
  * keep it alive during the pilot. */
-static int knock(const struct arguments *a, struct error *e)
+static int check_access(const struct arguments *a, struct error *e)
 {
 	struct client *cl;
 	int rc = client_open(&cl, a->coordinator, a->tls, a->insecure, "hslt-submit", e);
@@ -291,7 +291,7 @@ int main(int argc, char **argv)
 		place_print(stderr, "hslt-submit: note: ", a.render.scene, note);
 	a.request.output = a.estimate ? "" : last_part(a.render.output);
 	a.request.name = a.name ? a.name : name_of_file(b.scene, name);
-	if ((rc = knock(&a, &e))) {
+	if ((rc = check_access(&a, &e))) {
 		fprintf(stderr, "hslt-submit: %s\n", e.text);
 		scene_bundle_fini(&b);
 		return client_exit_code(rc);

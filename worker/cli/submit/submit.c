@@ -30,7 +30,7 @@ struct opened {
 	struct scene_bundle *bundle;
 };
 
-static int remember(struct scene_bundle *b, const char *name, const struct asset *a, struct error *e)
+static int add_file(struct scene_bundle *b, const char *name, const struct asset *a, struct error *e)
 {
 	for (size_t i = 0; i < b->count; i++)
 		if (strcmp(b->files[i].name, name) == 0)
@@ -52,7 +52,7 @@ static int open_remembered(void *user, const char *name, struct asset *out, stru
 {
 	struct opened *o = user;
 	int rc = o->folder.open(o->folder.user, name, out, e);
-	if (!rc && (rc = remember(o->bundle, name, out, e)))
+	if (!rc && (rc = add_file(o->bundle, name, out, e)))
 		o->folder.close(o->folder.user, out);
 	return rc;
 }

@@ -47,7 +47,7 @@ static struct layer layer_at(const struct bsdf *b, const struct bsdf_point *p)
 	return l;
 }
 
-static vec3 upright(vec3 v)
+static vec3 facing_up(vec3 v)
 {
 	return (vec3){v.x, v.y, fabs(v.z)};
 }
@@ -59,7 +59,7 @@ static double transmitted_at(const struct layer *l, double cosine)
 }
 
 /* false: no light gets in from there. */
-static bool enter(const struct layer *l, vec3 w, struct passage *out)
+static bool refract_into(const struct layer *l, vec3 w, struct passage *out)
 {
 	struct fresnel f = fresnel_dielectric(fmin(fabs(w.z), 1), l->c->eta);
 	if (!(f.transmitted > 0 && f.cos_t > 0))
@@ -81,14 +81,14 @@ static spectrum absorbed_by(const struct coat *c, const struct bsdf_point *p, ve
 }
 
 /* wo and wi on one side of the surface, one that scatters. */
-static bool meets(const struct bsdf *b, vec3 wo, vec3 wi)
+static bool is_same_side(const struct bsdf *b, vec3 wo, vec3 wi)
 {
 	return wo.z * wi.z > 0 && (wo.z > 0 || b->two_sided);
 }
 
 static spectrum coat_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
-	if (!meets(b, wo, wi))
+	if (!is_same_side(b, wo, wi))
 		return spectrum_of(0);
 	struct layer l = layer_at(b, p);
 	const struct coat *c = l.c;
@@ -96,9 +96,9 @@ static spectrum coat_eval(const struct bsdf *b, const struct bsdf_point *p, vec3
 	struct passage o, i;
 	double pdf;
 	if (c->rough)
-		f = spectrum_scale(boundary_reflect(&l.boundary, upright(wo), upright(wi), &pdf),
+		f = spectrum_scale(boundary_reflect(&l.boundary, facing_up(wo), facing_up(wi), &pdf),
 				   texture_eval(&c->specular, &p->where, p->w));
-	if (!c->inner.has_smooth || !enter(&l, wo, &o) || !enter(&l, wi, &i))
+	if (!c->inner.has_smooth || !refract_into(&l, wo, &o) || !refract_into(&l, wi, &i))
 		return f;
 	spectrum below = spectrum_mul(c->inner.ops->eval(&c->inner, p, o.inside, i.inside),
 				      absorbed_by(c, p, o.inside, i.inside));
@@ -114,15 +114,15 @@ static double boundary_chance(const struct layer *l, vec3 wo)
 
 static double coat_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
-	if (!meets(b, wo, wi))
+	if (!is_same_side(b, wo, wi))
 		return 0;
 	struct layer l = layer_at(b, p);
 	const struct coat *c = l.c;
 	struct passage o, i;
 	double chance = boundary_chance(&l, wo), lobe = 0, below = 0;
 	if (c->rough)
-		boundary_reflect(&l.boundary, upright(wo), upright(wi), &lobe);
-	if (c->inner.has_smooth && enter(&l, wo, &o) && enter(&l, wi, &i))
+		boundary_reflect(&l.boundary, facing_up(wo), facing_up(wi), &lobe);
+	if (c->inner.has_smooth && refract_into(&l, wo, &o) && refract_into(&l, wi, &i))
 		below = c->inner.ops->pdf_solid(&c->inner, p, o.inside, i.inside) *
 			(wi.z / i.inside.z / (c->eta * c->eta));
 	return chance * lobe + (1 - chance) * below;
@@ -145,7 +145,7 @@ static spectrum coat_eval_delta(const struct bsdf *b, const struct bsdf_point *p
 		all = first;
 		f = spectrum_scale(1 - transmitted_at(&l, fabs(wo.z)), texture_eval(&c->specular, &p->where, p->w));
 	}
-	if (c->inner.has_delta && enter(&l, wo, &o)) {
+	if (c->inner.has_delta && refract_into(&l, wo, &o)) {
 		spectrum below = bsdf_eval_delta(&c->inner, p, o.inside, BSDF_REFLECT, &unused, &one);
 		if (!spectrum_is_zero(below)) {
 			all += (1 - first) * one;
@@ -158,7 +158,7 @@ static spectrum coat_eval_delta(const struct bsdf *b, const struct bsdf_point *p
 }
 
 /* Out through the boundary; false: total reflection. */
-static bool leave(const struct coat *c, vec3 inside, vec3 *out)
+static bool refract_out(const struct coat *c, vec3 inside, vec3 *out)
 {
 	double x = c->eta * inside.x, y = c->eta * inside.y, cos2 = 1 - x * x - y * y;
 	if (!(cos2 > 0))
@@ -168,8 +168,8 @@ static bool leave(const struct coat *c, vec3 inside, vec3 *out)
 }
 
 /* The direction of a lobe that is not specular. false: specular if *delta is set, absorbed otherwise. */
-static bool follow(const struct bsdf *b, const struct layer *l, const struct bsdf_point *p, vec3 wo, const double u[3],
-		   bool *delta, vec3 *wi)
+static bool sample_lobe(const struct bsdf *b, const struct layer *l, const struct bsdf_point *p, vec3 wo,
+			const double u[3], bool *delta, vec3 *wi)
 {
 	const struct coat *c = l->c;
 	struct bsdf_sample inner;
@@ -180,15 +180,15 @@ static bool follow(const struct bsdf *b, const struct layer *l, const struct bsd
 		*delta = !c->rough;
 		if (*delta)
 			return false;
-		*wi = microfacet_sample_mirrored(&l->boundary.facets, upright(wo), u[0], u[1]);
+		*wi = microfacet_sample_mirrored(&l->boundary.facets, facing_up(wo), u[0], u[1]);
 		wi->z = copysign(1, wo.z) * wi->z;
-		return meets(b, wo, *wi);
+		return is_same_side(b, wo, *wi);
 	}
 	const double rest[3] = {u[0], u[1], fmin((u[2] - chance) / (1 - chance), 1 - 0x1p-53)};
-	if (!enter(l, wo, &o) || !c->inner.ops->sample(&c->inner, p, o.inside, rest, &inner))
+	if (!refract_into(l, wo, &o) || !c->inner.ops->sample(&c->inner, p, o.inside, rest, &inner))
 		return false;
 	*delta = inner.mode & BSDF_DELTA;
-	return !*delta && leave(c, inner.wi, wi) && meets(b, wo, *wi);
+	return !*delta && refract_out(c, inner.wi, wi) && is_same_side(b, wo, *wi);
 }
 
 static bool coat_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
@@ -196,10 +196,10 @@ static bool coat_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 {
 	bool delta;
 	vec3 wi;
-	if (!meets(b, wo, wo))
+	if (!is_same_side(b, wo, wo))
 		return false;
 	struct layer l = layer_at(b, p);
-	if (follow(b, &l, p, wo, u, &delta, &wi))
+	if (sample_lobe(b, &l, p, wo, u, &delta, &wi))
 		return bsdf_sample_smooth(b, p, wo, wi, out);
 	return delta && bsdf_sample_delta(b, p, wo, BSDF_REFLECT, out) && !spectrum_is_zero(out->f);
 }

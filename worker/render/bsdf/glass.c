@@ -2,7 +2,7 @@
 #include "worker/render/bsdf/glass.h"
 
 /* Equal laws on both sides, or coefficients of zero, refract all wavelengths alike. */
-static bool varies(const struct ior side[2], double eta)
+static bool varies_with_wavelength(const struct ior side[2], double eta)
 {
 	for (double nm = WAVELENGTH_MIN; nm <= WAVELENGTH_MAX; nm++)
 		if (ior_eta(side, nm) != eta)
@@ -27,7 +27,7 @@ static int read_index(struct glass *g, struct bsdf *b, const struct scene_node *
 	}
 	b->ior = g->side;
 	b->eta = ior_eta(b->ior, IOR_NM);
-	b->dispersive = varies(b->ior, b->eta);
+	b->dispersive = varies_with_wavelength(b->ior, b->eta);
 	if (b->dispersive)
 		bsdf_add_shape(b, COLOR_SHAPE_OTHER);
 	return 0;

@@ -191,7 +191,7 @@ static double hair_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo
 }
 
 /* Which of these probabilities u falls in; *u is then uniform again. */
-static int pick(const double *chance, int count, double *u)
+static int pick_index(const double *chance, int count, double *u)
 {
 	int k = 0;
 	while (k + 1 < count && *u >= chance[k])
@@ -205,7 +205,7 @@ static vec3 sample_radiance(const struct hair *h, const struct bsdf_point *p, ve
 	struct seen s = seen_from(h, wo);
 	double chance[HAIR_LOBES], rest = u[2];
 	find_chances(h, p, &s, chance);
-	int k = pick(chance, HAIR_LOBES, &rest);
+	int k = pick_index(chance, HAIR_LOBES, &rest);
 	double turn = k < HAIR_LOBES - 1 ? hair_turn(k, s.gamma, s.entry.gamma_t) + hair_around_sample(&h->fibre, rest)
 					 : 2 * WARP_PI * rest;
 	double phi = s.from.phi + turn;
@@ -216,16 +216,16 @@ static vec3 sample_importance(const struct hair *h, vec3 wo, const double u[2], 
 {
 	static const double halves[2] = {0.5, 0.5};
 	struct angles from = angles_of(wo);
-	int k = pick(adjoint_chance, HAIR_LOBES, &rest);
+	int k = pick_index(adjoint_chance, HAIR_LOBES, &rest);
 	struct hair_angle theta = hair_along_sample(&h->fibre, k, from.theta, u[0], u[1]);
-	if (k == 0 && wo.z > 0 && pick(halves, 2, &rest) == 0) {
+	if (k == 0 && wo.z > 0 && pick_index(halves, 2, &rest) == 0) {
 		double phi = WARP_PI - from.phi + hair_around_sample(&h->fibre, rest);
 		return direction_of(theta, cos(phi), sin(phi));
 	}
 	return direction_of(theta, 1 - 2 * rest, 2 * sqrt(rest * (1 - rest)));
 }
 
-static bool passes(const struct bsdf_point *p, vec3 wo)
+static bool is_on_side(const struct bsdf_point *p, vec3 wo)
 {
 	return !p->culled && (p->transport == TRANSPORT_RADIANCE ? wo.z <= -DBL_MIN : wo.z >= DBL_MIN);
 }
@@ -234,7 +234,7 @@ static spectrum hair_eval_delta(const struct bsdf *b, const struct bsdf_point *p
 				double *chance)
 {
 	(void)b;
-	if (!(mode & BSDF_STRAIGHT) || !passes(p, wo))
+	if (!(mode & BSDF_STRAIGHT) || !is_on_side(p, wo))
 		return spectrum_of(0);
 	*wi = vec3_neg(wo);
 	*chance = p->transport == TRANSPORT_RADIANCE ? 1 : PASSING;
@@ -247,9 +247,9 @@ static bool hair_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 	const struct hair *h = b->data;
 	bool radiance = p->transport == TRANSPORT_RADIANCE;
 	double rest = u[2];
-	if (passes(p, wo)) {
+	if (is_on_side(p, wo)) {
 		static const double ways[2] = {PASSING, 1 - PASSING};
-		if (radiance || pick(ways, 2, &rest) == 0)
+		if (radiance || pick_index(ways, 2, &rest) == 0)
 			return bsdf_sample_delta(b, p, wo, BSDF_TRANSMIT | BSDF_STRAIGHT, out);
 	} else if (!(radiance || p->culled ? wo.z >= LEAST_COSINE : wo.z < 0)) {
 		return false;
@@ -259,7 +259,7 @@ static bool hair_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 }
 
 /* d'Eon 2011, sec. 6.1: per unit of concentration. */
-static int pigment(struct color *c, const double rgb[3], double concentration)
+static int set_pigment(struct color *c, const double rgb[3], double concentration)
 {
 	int code = color_from_rgb(rgb, COLOR_UNBOUNDED, c);
 	c->scale *= concentration;
@@ -283,9 +283,9 @@ static int read_absorption(struct hair *h, struct bsdf *b, const struct scene_no
 		b->textured = !texture_is_constant(&h->sigma_a);
 		bsdf_add_shape(b, texture_shape(&h->sigma_a));
 	} else {
-		int code = pigment(&h->eumelanin, eumelanin, node_float(n, "eumelanin", 1.3));
+		int code = set_pigment(&h->eumelanin, eumelanin, node_float(n, "eumelanin", 1.3));
 		if (!code)
-			code = pigment(&h->pheomelanin, pheomelanin, node_float(n, "pheomelanin", 0.2));
+			code = set_pigment(&h->pheomelanin, pheomelanin, node_float(n, "pheomelanin", 0.2));
 		if (code)
 			return node_error(n, e, -code, "pigments");
 		bsdf_add_shape(b, COLOR_SHAPE_OTHER);

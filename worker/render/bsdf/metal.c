@@ -55,7 +55,8 @@ static int refuse_name(const char *name, const struct scene_node *n, struct erro
 			  spelling_hint(&s, hint, sizeof hint), list);
 }
 
-static int named(struct metal *m, const char *name, const struct scene_node *n, struct arena *arena, struct error *e)
+static int set_named_metal(struct metal *m, const char *name, const struct scene_node *n, struct arena *arena,
+			   struct error *e)
 {
 	if (strcasecmp(name, "none") == 0) {
 		m->eta.color = color_constant(0);
@@ -79,8 +80,8 @@ static int named(struct metal *m, const char *name, const struct scene_node *n, 
 	return refuse_name(name, n, e);
 }
 
-static int given(struct texture *t, const struct scene_node *n, const char *name, const struct bsdf_build *build,
-		 struct error *e)
+static int read_if_given(struct texture *t, const struct scene_node *n, const char *name,
+			 const struct bsdf_build *build, struct error *e)
 {
 	const struct texture_build inner = bsdf_texture_build(build);
 	return node_find(n, name) ? texture_from_node(t, n, name, 0, COLOR_UNBOUNDED, &inner, e) : 0;
@@ -99,11 +100,11 @@ int metal_read(struct metal *m, struct bsdf *b, const struct scene_node *n, cons
 	       struct error *e)
 {
 	double outside;
-	int code = named(m, node_string(n, "material", build->dialect_3 ? "none" : "Cu"), n, build->arena, e);
+	int code = set_named_metal(m, node_string(n, "material", build->dialect_3 ? "none" : "Cu"), n, build->arena, e);
 	if (!code)
-		code = given(&m->eta, n, "eta", build, e);
+		code = read_if_given(&m->eta, n, "eta", build, e);
 	if (!code)
-		code = given(&m->k, n, "k", build, e);
+		code = read_if_given(&m->k, n, "k", build, e);
 	if (!code)
 		code = ior_read(n, "ext_eta", build->dialect_3 ? 1 : IOR_AIR_DEFAULT, &outside, e);
 	if (!code)

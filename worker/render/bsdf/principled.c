@@ -341,7 +341,7 @@ static vec3 clearcoat_normal(const struct principled_point *s, double u0, double
 }
 
 /* From above. false: this facet transmits nothing. */
-static bool follow(const struct principled_point *s, int lobe, vec3 wo, double eta, const double u[3], vec3 *wi)
+static bool sample_lobe(const struct principled_point *s, int lobe, vec3 wo, double eta, const double u[3], vec3 *wi)
 {
 	if (lobe == LOBE_DIFFUSE) {
 		*wi = warp_cosine_hemisphere(u[0], u[1]);
@@ -375,7 +375,7 @@ static bool principled_sample(const struct bsdf *b, const struct bsdf_point *at,
 	int lobe = 0;
 	while (lobe < LOBES - 1 && rest >= chance[lobe])
 		rest -= chance[lobe++];
-	if (!(chance[lobe] > 0) || !follow(&s, lobe, mirror(wo, below), eta, u, &wi))
+	if (!(chance[lobe] > 0) || !sample_lobe(&s, lobe, mirror(wo, below), eta, u, &wi))
 		return false;
 	wi = mirror(wi, below);
 	struct pair pair = pair_of(&s, wo, wi, at->transport, true, chance);

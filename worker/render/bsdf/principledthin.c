@@ -69,7 +69,7 @@ static struct thin_point thin_at(const struct bsdf *b, const struct bsdf_point *
 	return x;
 }
 
-static vec3 upright(vec3 v)
+static vec3 facing_up(vec3 v)
 {
 	return (vec3){v.x, v.y, fabs(v.z)};
 }
@@ -86,7 +86,7 @@ static struct pair pair_of(const struct thin_point *x, vec3 wo, vec3 wi)
 	const struct thin *t = x->t;
 	bool reflect = wo.z * wi.z > 0;
 	const struct microfacet *m = reflect ? &x->s.facets : &x->passing;
-	vec3 h, o = upright(wo), i = upright(wi);
+	vec3 h, o = facing_up(wo), i = facing_up(wi);
 	double length;
 	if (!(o.z > 0 && i.z > 0) || !microfacet_half(o, 1, i, &h, &length))
 		return out;
@@ -122,7 +122,7 @@ static bool thin_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 			struct bsdf_sample *out)
 {
 	struct thin_point x = thin_at(b, p, wo);
-	vec3 o = upright(wo), wi;
+	vec3 o = facing_up(wo), wi;
 	double rest = u[2];
 	int lobe = 0;
 	if (wo.z == 0)

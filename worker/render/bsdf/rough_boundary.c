@@ -112,7 +112,7 @@ struct boundary_point rough_boundary_at(const struct rough_boundary *r, const st
 	return at;
 }
 
-static double between(double rest, double here, double next)
+static double lerp(double rest, double here, double next)
 {
 	return rest > 0 ? (1 - rest) * here + rest * next : here;
 }
@@ -121,13 +121,13 @@ double boundary_transmitted(const struct boundary_point *at, double cosine)
 {
 	const struct boundary_row *r = &at->of->row[at->row];
 	double here = look_up(r->transmitted, cosine);
-	return at->rest > 0 ? between(at->rest, here, look_up(r[1].transmitted, cosine)) : here;
+	return at->rest > 0 ? lerp(at->rest, here, look_up(r[1].transmitted, cosine)) : here;
 }
 
 double boundary_escape(const struct boundary_point *at)
 {
 	const struct boundary_row *r = &at->of->row[at->row];
-	return at->rest > 0 ? between(at->rest, r->escape, r[1].escape) : r->escape;
+	return at->rest > 0 ? lerp(at->rest, r->escape, r[1].escape) : r->escape;
 }
 
 double boundary_reflect(const struct boundary_point *at, vec3 wo, vec3 wi, double *pdf)

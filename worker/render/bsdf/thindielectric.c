@@ -17,7 +17,7 @@ struct thin {
 };
 
 /* 2 R / (1 + R) and (1 - R) / (1 + R); neither loses precision where it is small. */
-static struct fresnel sheet(const struct thin *t, vec3 wo)
+static struct fresnel fresnel_of_sheet(const struct thin *t, vec3 wo)
 {
 	struct fresnel f = fresnel_dielectric(fmin(fabs(wo.z), 1), t->eta);
 	double both = 1 / (1 + f.reflected);
@@ -28,7 +28,7 @@ static spectrum thin_eval_delta(const struct bsdf *b, const struct bsdf_point *p
 				double *chance)
 {
 	const struct thin *t = b->data;
-	struct fresnel f = sheet(t, wo);
+	struct fresnel f = fresnel_of_sheet(t, wo);
 	bool reflect = mode & BSDF_REFLECT;
 	double share = reflect ? f.reflected : f.transmitted;
 	if (!(fabs(wo.z) >= DBL_MIN && share > 0)) /* 1 / wo.z must be finite */
@@ -41,7 +41,7 @@ static spectrum thin_eval_delta(const struct bsdf *b, const struct bsdf_point *p
 static bool thin_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
 			struct bsdf_sample *out)
 {
-	struct fresnel f = sheet(b->data, wo);
+	struct fresnel f = fresnel_of_sheet(b->data, wo);
 	bool reflect = u[2] < fresnel_chance(&f, true);
 	return bsdf_sample_delta(b, p, wo, reflect ? BSDF_REFLECT : BSDF_TRANSMIT | BSDF_STRAIGHT, out);
 }

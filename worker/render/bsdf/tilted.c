@@ -98,7 +98,7 @@ static bool needs_normal(const struct bsdf *part)
 	return part->has_smooth || (part->has_delta && !(part->only_straight && !(part->modes & BSDF_REFLECT)));
 }
 
-static const struct bsdf *narrowest(const struct bsdf *part, uint32_t count)
+static const struct bsdf *narrowest_part(const struct bsdf *part, uint32_t count)
 {
 	const struct bsdf *found = NULL;
 	for (uint32_t k = 0; k < count; k++) {
@@ -112,7 +112,7 @@ static const struct bsdf *narrowest(const struct bsdf *part, uint32_t count)
 int bsdf_share_relief(struct bsdf *b, struct bsdf *part, uint32_t count, const struct scene_node *n,
 		      const struct bsdf_build *build, struct error *e)
 {
-	const struct bsdf *first = narrowest(part, count);
+	const struct bsdf *first = narrowest_part(part, count);
 	b->relief = first ? first->relief : NULL;
 	for (uint32_t k = 0; k < count; k++) {
 		b->uses_place |= part[k].uses_place;

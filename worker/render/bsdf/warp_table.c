@@ -88,7 +88,7 @@ int warp_table_make(struct warp_table *t, uint32_t slices, uint32_t width, uint3
 }
 
 /* Numbers of one node or row, mixed. stride: what a slice takes. */
-static double mixed(const struct warp_mix *mix, const double *table, size_t stride, size_t i)
+static double mix_slices(const struct warp_mix *mix, const double *table, size_t stride, size_t i)
 {
 	double sum = 0;
 	for (int k = 0; k < mix->count; k++)
@@ -106,14 +106,14 @@ struct row {
 static double row_mixed(const struct row *r, const double *table, uint32_t x)
 {
 	size_t stride = (size_t)r->t->width * r->t->height, i = (size_t)r->y.i * r->t->width + x;
-	double near = mixed(r->mix, table, stride, i), far = mixed(r->mix, table, stride, i + r->t->width);
+	double near = mix_slices(r->mix, table, stride, i), far = mix_slices(r->mix, table, stride, i + r->t->width);
 	return near + r->y.part * (far - near);
 }
 
 /* The integral over x at grid row y. */
 static double row_total(const struct warp_table *t, const struct warp_mix *mix, uint32_t y)
 {
-	return mixed(mix, t->below_node, (size_t)t->width * t->height, (size_t)y * t->width + t->width - 1);
+	return mix_slices(mix, t->below_node, (size_t)t->width * t->height, (size_t)y * t->width + t->width - 1);
 }
 
 /* Where the integral of a density that goes from a to b across a cell of width 1 is `area`. */
@@ -129,12 +129,12 @@ double warp_table_sample(const struct warp_table *t, const struct warp_mix *mix,
 	uint32_t high = t->height - 1;
 	while (high - r.y.i > 1) {
 		uint32_t middle = r.y.i + (high - r.y.i) / 2;
-		if (mixed(mix, t->below_row, t->height, middle) <= u[1])
+		if (mix_slices(mix, t->below_row, t->height, middle) <= u[1])
 			r.y.i = middle;
 		else
 			high = middle;
 	}
-	double rest = u[1] - mixed(mix, t->below_row, t->height, r.y.i);
+	double rest = u[1] - mix_slices(mix, t->below_row, t->height, r.y.i);
 	r.y.part = cross(row_total(t, mix, r.y.i), row_total(t, mix, r.y.i + 1), max_of(rest, 0) * (t->height - 1));
 
 	struct warp_cell x = {0, 0};
@@ -161,7 +161,7 @@ double warp_table_invert(const struct warp_table *t, const struct warp_mix *mix,
 	struct warp_cell x = warp_cell_at(t->width, where[0]);
 	double near = row_total(t, mix, r.y.i), far = row_total(t, mix, r.y.i + 1);
 	double part = r.y.part * (near + 0.5 * r.y.part * (far - near));
-	u[1] = min_of(mixed(mix, t->below_row, t->height, r.y.i) + part / (t->height - 1), 1);
+	u[1] = min_of(mix_slices(mix, t->below_row, t->height, r.y.i) + part / (t->height - 1), 1);
 
 	double a = row_mixed(&r, t->value, x.i), b = row_mixed(&r, t->value, x.i + 1),
 	       total = row_mixed(&r, t->below_node, t->width - 1);

@@ -11,7 +11,7 @@
 #include "worker/render/camera/camera.h"
 #include "worker/render/camera/projection.h"
 
-static double stretch(const struct camera *c, double r2)
+static double radial_factor(const struct camera *c, double r2)
 {
 	return 1 + r2 * (c->kc[0] + r2 * c->kc[1]);
 }
@@ -22,7 +22,7 @@ static double derivative(const struct camera *c, double r2)
 }
 
 /* The least positive r2 at which the derivative is 0. */
-static double fold(const struct camera *c)
+static double fold_radius(const struct camera *c)
 {
 	double a = 5 * c->kc[1], b = 3 * c->kc[0], root = b * b - 4 * a;
 	if (!(root >= 0))
@@ -37,10 +37,10 @@ static int init(struct camera *c, const struct scene_settings *s, struct error *
 {
 	c->kc[0] = s->kc[0];
 	c->kc[1] = s->kc[1];
-	c->fold = fold(c);
+	c->fold = fold_radius(c);
 	double x = fmax(c->center_x, c->width - c->center_x) + s->border,
 	       y = fmax(c->center_y, c->height - c->center_y) + s->border, corner = hypot(x, y) / c->scale,
-	       end = isfinite(c->fold) ? sqrt(c->fold) * stretch(c, c->fold) : INFINITY;
+	       end = isfinite(c->fold) ? sqrt(c->fold) * radial_factor(c, c->fold) : INFINITY;
 	return corner < end ? 0
 			    : error_set(e, EINVAL,
 					"the sensor's kc folds the image over at the slope %g, but its corner is at %g",
@@ -56,11 +56,11 @@ static bool direction(const struct camera *c, double film_x, double film_y, vec3
 	}
 	/* Newton's steps, kept between what is too small and what is too large. */
 	double low = 0, high = isfinite(c->fold) ? sqrt(c->fold) : 2 * d, r = fmin(d, high);
-	while (!isfinite(c->fold) && high * stretch(c, high * high) < d)
+	while (!isfinite(c->fold) && high * radial_factor(c, high * high) < d)
 		high *= 2;
 	enum { STEPS = 100 };
 	for (int i = 0; i < STEPS && low < high; i++) {
-		double off = r * stretch(c, r * r) - d, next = r - off / derivative(c, r * r);
+		double off = r * radial_factor(c, r * r) - d, next = r - off / derivative(c, r * r);
 		if (off > 0)
 			high = r;
 		else
@@ -80,15 +80,15 @@ static bool project(const struct camera *c, vec3 l, double *film_x, double *film
 	double x = l.x / l.z, y = l.y / l.z, r2 = x * x + y * y;
 	if (!(r2 < c->fold))
 		return false;
-	*film_x = c->center_x + c->scale * stretch(c, r2) * x;
-	*film_y = c->center_y + c->scale * stretch(c, r2) * y;
+	*film_x = c->center_x + c->scale * radial_factor(c, r2) * x;
+	*film_y = c->center_y + c->scale * radial_factor(c, r2) * y;
 	return isfinite(*film_x) && isfinite(*film_y);
 }
 
 static double jac_film_from_solid(const struct camera *c, vec3 l)
 {
 	double r2 = (l.x * l.x + l.y * l.y) / (l.z * l.z);
-	return c->scale * c->scale / (l.z * l.z * l.z) * stretch(c, r2) * derivative(c, r2);
+	return c->scale * c->scale / (l.z * l.z * l.z) * radial_factor(c, r2) * derivative(c, r2);
 }
 
 const struct camera_projection camera_projection_rdist = {

@@ -62,7 +62,7 @@ static bool start(struct chain *base, uint64_t bootstrap_index)
 }
 
 /* Evaluates a point that is all there: a large step's sampler that finds every block in place. */
-static void revisit(struct pss_chain *c)
+static void reevaluate(struct pss_chain *c)
 {
 	struct pss_point copy = c->current->point;
 	struct pss_sampler s;
@@ -98,7 +98,7 @@ static bool resume(struct chain *base, const struct chain_state *state)
 		set_black(c->current);
 		return true;
 	}
-	revisit(c);
+	reevaluate(c);
 	return c->current->sample.intensity > 0;
 }
 

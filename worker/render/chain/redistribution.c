@@ -2,7 +2,7 @@
 /*
  * bdpt calls keep() for each contribution of a sample. Nearly all are below the threshold and are left as they are. For
  * the others, keep() builds the full path x, because its share depends on the path alone, not on the roulette of the
- * sub-paths, which stays a factor of the weight. Then spread() runs the chains: it proposes y by a local mutation,
+ * sub-paths, which stays a factor of the weight. Then run_chain() runs the chains: it proposes y by a local mutation,
  * accepts it with probability min(1, h(y) T(y -> x) / (h(x) T(x -> y))), and splats both states with their expected
  * weights.
  *
@@ -54,7 +54,7 @@ static bool is_scattered(const struct full_path *x)
 }
 
 /* Computes w and the share of chains in the contribution of this path. */
-static void weigh(struct redistribution *r, struct spread_place *at)
+static void compute_weight(struct redistribution *r, struct spread_place *at)
 {
 	double log_pdf[FULL_PATH_MAX_VERTICES];
 	struct full_path *x = &at->place.path;
@@ -90,7 +90,7 @@ static double propose(struct redistribution *r, const struct mixture_entry *entr
 	double to_y = entry->ops->log_weight(m, &y->place.path, move, X_TO_Y);
 	if (!(to_y > -INFINITY && path_place_is_sound(m->path, to_y, false)))
 		return 0;
-	weigh(r, y);
+	compute_weight(r, y);
 	if (!(y->share > 0))
 		return 0;
 	double to_x = entry->ops->log_weight(m, &x->place.path, move, Y_TO_X);
@@ -100,7 +100,7 @@ static double propose(struct redistribution *r, const struct mixture_entry *entr
 }
 
 /* One chain from the path `from`; each mutation splats `unit` times the brightness of its place. */
-static void spread(struct redistribution *r, const struct spread_place *from, double unit)
+static void run_chain(struct redistribution *r, const struct spread_place *from, double unit)
 {
 	struct spread_place *x = &r->places[0], *y = &r->places[1];
 	struct mutation_ctx *m = &r->mutation;
@@ -153,7 +153,7 @@ static spectrum keep(struct path_split *split, struct path_context *c, unsigned 
 	if (!isgreater(relative, r->rule.threshold) || !isfinite(relative) ||
 	    !full_path_from_subpaths(c, s, c->passed_count, s + t - 1 + c->passed_count, &x->place.path))
 		return l;
-	weigh(r, x);
+	compute_weight(r, x);
 	if (!(x->share > 0))
 		return l;
 	const double share = x->share, carries = r->rule.length / r->rule.mutations;
@@ -170,7 +170,7 @@ static spectrum keep(struct path_split *split, struct path_context *c, unsigned 
 	const uint64_t rays = batch_rays(c->counters);
 	for (unsigned k = 0; k < n; k++) {
 		r->mutation.chain = id[0] + k;
-		spread(r, x, each / r->rule.mutations / (c->window.width * c->window.height));
+		run_chain(r, x, each / r->rule.mutations / (c->window.width * c->window.height));
 	}
 	c->counters[COUNT_SPREAD_RAYS] += batch_rays(c->counters) - rays;
 	return spectrum_scale(1 - share, l);

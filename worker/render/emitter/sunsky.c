@@ -37,7 +37,7 @@ static float *pixel(const struct image *m, uint32_t x, uint32_t y)
 }
 
 /* The part of the horizon's light that `extend` sends up from below it: all at the horizon, none from the nadir. */
-static double extended(double angle)
+static double extension_below_horizon(double angle)
 {
 	double t = fmin(2 - 2 * angle / M_PI, 1);
 	return t * t * (3 - 2 * t);
@@ -54,7 +54,7 @@ static void bake_sky(const struct baking *b, double scale, double stretch, bool 
 			break;
 		if (extend) {
 			model = fmin(model, horizon);
-			factor *= extended(angle);
+			factor *= extension_below_horizon(angle);
 		}
 		for (uint32_t x = 0; x < m->width; x++) {
 			vec3 d = direction(m, x + 0.5, model * m->height / M_PI);
@@ -67,7 +67,7 @@ static void bake_sky(const struct baking *b, double scale, double stretch, bool 
 }
 
 /* Share of a pixel that the disk covers. */
-static double covered(const struct baking *b, uint32_t x, uint32_t y)
+static double covered_share(const struct baking *b, uint32_t x, uint32_t y)
 {
 	enum { PARTS = 8 };
 	double reach = b->radius + 2 * M_PI / b->image.height;
@@ -90,13 +90,13 @@ static void bake_sun(const struct baking *b, const double rgb[3])
 	uint32_t first = (uint32_t)fmax(row - reach, 0), last = (uint32_t)fmin(row + reach, m->height - 1.0);
 	for (uint32_t y = first; y <= last; y++)
 		for (uint32_t x = 0; x < m->width; x++)
-			solid += covered(b, x, y) * pixel_row * sin(M_PI * (y + 0.5) / m->height);
+			solid += covered_share(b, x, y) * pixel_row * sin(M_PI * (y + 0.5) / m->height);
 	/* Solid angles of the true disk, without cancellation. */
 	double whole = 4 * M_PI * pow(sin(0.5 * DAYLIGHT_SUN_RADIUS), 2), factor = solid > 0 ? whole / solid : 0;
 	for (uint32_t y = first; y <= last; y++)
 		for (uint32_t x = 0; x < m->width; x++)
 			for (int k = 0; k < 3; k++)
-				pixel(m, x, y)[k] += (float)(covered(b, x, y) * factor * rgb[k]);
+				pixel(m, x, y)[k] += (float)(covered_share(b, x, y) * factor * rgb[k]);
 }
 
 static int days_of(int month, int year)
@@ -173,7 +173,7 @@ int sunsky_albedo(const struct scene_node *n, const struct emitter_build *build,
 }
 
 /* Down from the zenith to so many times the angle. */
-static vec3 stretched(vec3 d, double by)
+static vec3 stretch_from_zenith(vec3 d, double by)
 {
 	double angle = by * vec3_angle(d, (vec3){0, 1, 0}), across = hypot(d.x, d.z);
 	double part = across > 0 ? sin(angle) / across : 0;
@@ -233,7 +233,7 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 		return code;
 	b.sky = daylight_of(turbidity, albedo, sun);
 	b.radius = disk_radius(n);
-	b.disk = stretched(b.towards, stretch);
+	b.disk = stretch_from_zenith(b.towards, stretch);
 	b.image.pixels = arena_alloc(build->arena, (size_t)b.image.width * b.image.height, 3 * sizeof *b.image.pixels);
 	if (!b.image.pixels)
 		return node_error(n, e, ENOMEM, "out of memory");

@@ -143,7 +143,7 @@ static void add_pixel(struct film_sums *f, uint32_t i, uint32_t j, const double 
 }
 
 /* First and last pixel (relative to the crop) whose centre is within the radius; false: none inside the crop. */
-static bool reach(double position, double radius, uint32_t size, uint32_t *first, uint32_t *last)
+static bool pixels_within(double position, double radius, uint32_t size, uint32_t *first, uint32_t *last)
 {
 	double lo = fmax(ceil(position - radius - 0.5), 0), hi = fmin(floor(position + radius - 0.5), (double)size - 1);
 	if (!(lo <= hi))
@@ -164,7 +164,7 @@ static void splat_at(struct film_sums *f, double x, double y, const struct splat
 		return;
 	}
 	uint32_t i0, i1, j0, j1;
-	if (!reach(x, f->radius, f->width, &i0, &i1) || !reach(y, f->radius, f->height, &j0, &j1) ||
+	if (!pixels_within(x, f->radius, f->width, &i0, &i1) || !pixels_within(y, f->radius, f->height, &j0, &j1) ||
 	    i1 - i0 >= KERNEL_MAX)
 		return;
 	double kx[KERNEL_MAX];

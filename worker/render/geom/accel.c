@@ -408,7 +408,7 @@ static double part_end(const struct accel *a, vec3 o, vec3 d, double t0, double 
 }
 
 /* Lifted to the side that d leaves for. */
-static vec3 lifted(const struct accel *a, vec3 p, vec3 ng, vec3 d)
+static vec3 lift_off_surface(const struct accel *a, vec3 p, vec3 ng, vec3 d)
 {
 	return vec3_madd(p, copysign(reach_at(a, p), vec3_dot(ng, d)), ng);
 }
@@ -471,7 +471,8 @@ static void fill_ray(const struct accel *a, struct RTCRay *ray, struct query *q,
 	check_ray(ray);
 }
 
-static bool closest(const struct accel *a, struct query *q, struct RTCRayHit *rh, vec3 o, double t_min, double t_max)
+static bool trace_closest(const struct accel *a, struct query *q, struct RTCRayHit *rh, vec3 o, double t_min,
+			  double t_max)
 {
 	double t0 = 0, t1 = 0;
 	do {
@@ -498,7 +499,7 @@ bool accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, do
 	q.start = enter > 0 ? NULL : from;
 	q.low = enter > 0 ? 1 : query_lowness(from->ng, d);
 	struct RTCRayHit rh;
-	if (!closest(a, &q, &rh, lifted(a, q.o, from->ng, d), fmax(t_min - enter, 0), t_max - enter))
+	if (!trace_closest(a, &q, &rh, lift_off_surface(a, q.o, from->ng, d), fmax(t_min - enter, 0), t_max - enter))
 		return false;
 	double t = enter + fmax((double)rh.ray.tfar - q.back, 0);
 	*hit = (struct ray_hit){query_there(&q, (struct prim_ref){rh.hit.geomID, rh.hit.primID, q.from.time}), t,
@@ -549,7 +550,7 @@ bool accel_occluded(const struct accel *a, const struct ray_end *from, const str
 	q.beyond = query_lowness(to->ng, d);
 	if (!(vec3_length(q.d) > 0))
 		return false;
-	vec3 o = lifted(a, q.o, from->ng, d), end = lifted(a, to->p, to->ng, vec3_neg(d));
+	vec3 o = lift_off_surface(a, q.o, from->ng, d), end = lift_off_surface(a, to->p, to->ng, vec3_neg(d));
 	return occluded(a, &q, o, vec3_sub(end, o), 1);
 }
 
@@ -561,5 +562,5 @@ bool accel_occluded_to_infinity(const struct accel *a, const struct ray_end *fro
 	q.from = from->prim;
 	q.start = from;
 	q.low = query_lowness(from->ng, d);
-	return occluded(a, &q, lifted(a, from->p, from->ng, d), d, INFINITY);
+	return occluded(a, &q, lift_off_surface(a, from->p, from->ng, d), d, INFINITY);
 }

@@ -17,7 +17,7 @@ struct polygon {
 };
 
 /* The part with side.(p - at) >= 0. */
-static void cut(struct polygon *a, vec3 at, vec3 side)
+static void cut_polygon(struct polygon *a, vec3 at, vec3 side)
 {
 	struct polygon out = {.n = 0};
 	for (unsigned i = 0; i < a->n; i++) {
@@ -44,7 +44,7 @@ static double rounded_along(const struct triangle *t, vec3 n)
 			      fabs(n.z) * largest(t->v[0].z, t->v[1].z, t->v[2].z));
 }
 
-static double farthest(const struct triangle *t)
+static double largest_coordinate(const struct triangle *t)
 {
 	double far = 0;
 	for (int i = 0; i < 3; i++)
@@ -73,7 +73,7 @@ bool coincide_triangles(const struct triangle *a, const struct triangle *b, doub
 	struct polygon over = {{a->v[0], a->v[1], a->v[2]}, 3};
 	for (int i = 0; i < 3 && over.n > 0; i++) {
 		vec3 from = b->v[i], to = b->v[(i + 1) % 3];
-		cut(&over, from, vec3_cross(n, vec3_sub(to, from)));
+		cut_polygon(&over, from, vec3_cross(n, vec3_sub(to, from)));
 	}
 	/* Twice the rounding error, for the earlier roundings in double and for the sums here. */
 	double within = 2 * (rounded_along(a, n) + rounded_along(b, n) + off);
@@ -82,11 +82,11 @@ bool coincide_triangles(const struct triangle *a, const struct triangle *b, doub
 			return false;
 	*wholly = over.n == 3 && vec3_length(vec3_sub(over.p[0], a->v[0])) == 0 &&
 		  vec3_length(vec3_sub(over.p[1], a->v[1])) == 0 && vec3_length(vec3_sub(over.p[2], a->v[2])) == 0;
-	return over.n >= 3 && has_width(&over, n, fmax(farthest(a), farthest(b)));
+	return over.n >= 3 && has_width(&over, n, fmax(largest_coordinate(a), largest_coordinate(b)));
 }
 
 /* As seen along n. */
-static bool covers(const struct accel_shape *s, uint32_t prim, vec3 p, vec3 n)
+static bool is_covered_by(const struct accel_shape *s, uint32_t prim, vec3 p, vec3 n)
 {
 	const struct triangle t = accel_triangle(s, prim, 0);
 	double unused;
@@ -108,8 +108,8 @@ static const struct coincide_pair *find_first(const struct coincidence *c, struc
 }
 
 /* One that hides it there; false: none. */
-static bool hides(const struct coincidence *c, const struct accel_shape *shapes, struct prim_ref prim, vec3 p,
-		  struct prim_ref *by)
+static bool find_hiding(const struct coincidence *c, const struct accel_shape *shapes, struct prim_ref prim, vec3 p,
+			struct prim_ref *by)
 {
 	const struct coincide_pair *end = c->pairs + c->first[prim.shape + 1], *at = find_first(c, prim, end);
 	if (at == end || at->hidden.prim != prim.prim)
@@ -117,7 +117,7 @@ static bool hides(const struct coincidence *c, const struct accel_shape *shapes,
 	const struct accel_shape *s = &shapes[prim.shape];
 	vec3 n = s->is_sphere ? (vec3){0, 0, 0} : accel_triangle(s, prim.prim, 0).n;
 	for (; at < end && at->hidden.prim == prim.prim; at++)
-		if (at->wholly || covers(&shapes[at->by.shape], at->by.prim, p, n)) {
+		if (at->wholly || is_covered_by(&shapes[at->by.shape], at->by.prim, p, n)) {
 			*by = (struct prim_ref){at->by.shape, at->by.prim, prim.time};
 			return true;
 		}
@@ -129,7 +129,7 @@ struct prim_ref coincide_there(const struct coincidence *c, const struct accel_s
 {
 	/* What hides it may be hidden itself; ranks end the recursion. */
 	while (c && prim.shape != PRIM_NONE.shape && c->first[prim.shape] < c->first[prim.shape + 1] &&
-	       hides(c, shapes, prim, p, &prim))
+	       find_hiding(c, shapes, prim, p, &prim))
 		;
 	return prim;
 }

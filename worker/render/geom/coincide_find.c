@@ -113,7 +113,7 @@ static bool choose_cut(const struct search *f, const struct prim_ref *items, siz
 	return least < SIZE_MAX && (n < MANY ? least * 5 <= count * 7 : least * 3 <= count * 5);
 }
 
-static bool shines(const struct search *f, struct prim_ref p)
+static bool is_emitter(const struct search *f, struct prim_ref p)
 {
 	return f->shapes[p.shape].rank == SURFACE_SHINES;
 }
@@ -124,10 +124,10 @@ static bool nothing_to_find(const struct search *f, const struct prim_ref *items
 	for (size_t i = 1; i < n; i++)
 		if (items[i].shape != items[0].shape)
 			return false;
-	return n < 2 || !shines(f, items[0]);
+	return n < 2 || !is_emitter(f, items[0]);
 }
 
-static double farthest(const struct accel_shape *s)
+static double largest_coordinate(const struct accel_shape *s)
 {
 	return fmax(fabs(s->center.x), fmax(fabs(s->center.y), fabs(s->center.z))) + s->radius;
 }
@@ -135,7 +135,7 @@ static double farthest(const struct accel_shape *s)
 static bool spheres_coincide(const struct accel_shape *a, const struct accel_shape *b)
 {
 	vec3 between = vec3_sub(a->center, b->center);
-	double within = 0x1p-23 * fmax(farthest(a), farthest(b));
+	double within = 0x1p-23 * fmax(largest_coordinate(a), largest_coordinate(b));
 	return triangle_norm1(between) + fabs(a->radius - b->radius) <= within;
 }
 
@@ -171,7 +171,7 @@ static int add_pair(struct search *f, const struct coincide_pair *p)
 
 static bool may_meet(const struct search *f, const struct member *a, const struct member *b)
 {
-	if (a->prim.shape == b->prim.shape && !shines(f, a->prim))
+	if (a->prim.shape == b->prim.shape && !is_emitter(f, a->prim))
 		return false;
 	for (int k = 0; k < 3; k++)
 		if (a->high[k] < b->low[k] || b->high[k] < a->low[k])

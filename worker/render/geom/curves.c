@@ -48,7 +48,7 @@ void curves_box_of_all(const struct curves *c, vec3 *low, vec3 *high)
 	}
 }
 
-static bool opens(const struct curves *c, uint32_t prim, uint32_t end)
+static bool is_open_at(const struct curves *c, uint32_t prim, uint32_t end)
 {
 	return c->open && (c->cone[prim] & end);
 }
@@ -56,15 +56,15 @@ static bool opens(const struct curves *c, uint32_t prim, uint32_t end)
 static bool has_part(const struct curves *c, uint32_t prim, enum cone_part part)
 {
 	if (part == CONE_START)
-		return !opens(c, prim, CURVE_BEGINS);
+		return !is_open_at(c, prim, CURVE_BEGINS);
 	return part == CONE_SIDE || (!c->open && (c->cone[prim] & CURVE_ENDS));
 }
 
 /* ---- neighbours ---- */
 
-static bool inside(const struct curves *c, uint32_t prim, const struct cone *k, vec3 p, double slack)
+static bool is_inside(const struct curves *c, uint32_t prim, const struct cone *k, vec3 p, double slack)
 {
-	return cone_distance(k, p, opens(c, prim, CURVE_BEGINS), opens(c, prim, CURVE_ENDS)) < -slack;
+	return cone_distance(k, p, is_open_at(c, prim, CURVE_BEGINS), is_open_at(c, prim, CURVE_ENDS)) < -slack;
 }
 
 /* Whether p, of this primitive, lies inside one that follows (step 1) or precedes it (step -1). */
@@ -77,14 +77,14 @@ static bool hidden_along(const struct curves *c, uint32_t prim, double radius, v
 		struct cone k = curves_cone(c, prim);
 		if (gap > 2 * (radius + (double)c->thickest))
 			return false;
-		if (gap <= 2 * (radius + fmax(k.r0, k.r1)) && inside(c, prim, &k, p, slack))
+		if (gap <= 2 * (radius + fmax(k.r0, k.r1)) && is_inside(c, prim, &k, p, slack))
 			return true;
 		gap += k.length;
 	}
 	return false;
 }
 
-static bool hidden(const struct curves *c, uint32_t prim, const struct cone *k, vec3 p, double slack)
+static bool is_hidden(const struct curves *c, uint32_t prim, const struct cone *k, vec3 p, double slack)
 {
 	double radius = fmax(k->r0, k->r1);
 	return hidden_along(c, prim, radius, p, slack, 1) || hidden_along(c, prim, radius, p, slack, -1);
@@ -154,7 +154,7 @@ static void find_candidates(struct meeting *m)
 
 /* Whether the ray's line passes the axis' line at more than the larger radius. Most of the boxes that a ray enters are
  * left here. */
-static bool passes(const struct curves *c, uint32_t prim, const struct curve_ray *r)
+static bool misses_cone(const struct curves *c, uint32_t prim, const struct curve_ray *r)
 {
 	uint32_t i = c->cone[prim] >> CURVE_SHIFT;
 	vec3 p = curves_center(c, i), away = vec3_sub(p, r->o),
@@ -178,7 +178,7 @@ static void begin(struct meeting *m, const struct curves *c, uint32_t prim, cons
 }
 
 /* Whether the ray goes along the outward normal at a point of that part. */
-static bool leaves(const struct meeting *m, enum cone_part part, vec3 p)
+static bool is_leaving(const struct meeting *m, enum cone_part part, vec3 p)
 {
 	const struct cone *k = &m->cone;
 	vec3 q = vec3_sub(p, k->p0), d = m->ray->d;
@@ -195,15 +195,15 @@ static bool leaves(const struct meeting *m, enum cone_part part, vec3 p)
 static bool is_there(const struct meeting *m, const struct curve_crossing *x)
 {
 	vec3 p = vec3_madd(m->ray->o, x->t, m->ray->d);
-	return cone_has(&m->cone, x->part, p, m->slack) && !(m->ray->culled && leaves(m, x->part, p)) &&
-	       !hidden(m->curves, m->prim, &m->cone, p, m->slack);
+	return cone_has(&m->cone, x->part, p, m->slack) && !(m->ray->culled && is_leaving(m, x->part, p)) &&
+	       !is_hidden(m->curves, m->prim, &m->cone, p, m->slack);
 }
 
 bool curves_meet_near(const struct curves *c, uint32_t prim, const struct curve_ray *r, double t_near,
 		      struct curve_crossing *x)
 {
 	struct meeting m;
-	if (passes(c, prim, r))
+	if (misses_cone(c, prim, r))
 		return false;
 	begin(&m, c, prim, r);
 	while (m.count > 0) {

@@ -142,15 +142,15 @@ static vec3 normal_at(const struct placement *m, const struct ray_end *end)
 }
 
 /* Lifts from a surface with normal n to the side that d leaves for; the ray is longer by query_lowness. */
-static vec3 lifted(vec3 p, vec3 n, vec3 d, double reach, double *longer)
+static vec3 lift_off_surface(vec3 p, vec3 n, vec3 d, double reach, double *longer)
 {
 	*longer = reach * query_lowness(n, d);
 	return vec3_madd(p, copysign(reach, vec3_dot(n, d)), n);
 }
 
 /* The part of the query up to t_max that is inside the instance's box; false: none. */
-static bool enter(struct within *w, const struct instances *s, const struct instance *it, const struct query *q,
-		  double t_max)
+static bool enter_instance(struct within *w, const struct instances *s, const struct instance *it,
+			   const struct query *q, double t_max)
 {
 	const struct placement *m = placement_at(s->shapes[it->shape].place, q->from.time, &w->room);
 	const struct instance_tree *tree = &s->trees[it->tree];
@@ -170,10 +170,10 @@ static bool enter(struct within *w, const struct instances *s, const struct inst
 	w->before = w->beyond = w->reach;
 	vec3 to = vec3_madd(o, w->t1, d);
 	if (w->t0 == 0)
-		w->from = lifted(w->from, normal_at(m, q->start), d, w->reach, &w->before);
+		w->from = lift_off_surface(w->from, normal_at(m, q->start), d, w->reach, &w->before);
 	if (q->segment && w->t1 == 1)
-		to = lifted(placement_point_back(m, q->end), normal_at(m, q->finish), vec3_neg(d), w->reach,
-			    &w->beyond);
+		to = lift_off_surface(placement_point_back(m, q->end), normal_at(m, q->finish), vec3_neg(d), w->reach,
+				      &w->beyond);
 	vec3 along = vec3_sub(to, w->from);
 	w->length = vec3_length(along);
 	w->d = vec3_scale(1 / w->length, along);
@@ -216,7 +216,7 @@ static void intersect(const struct RTCIntersectFunctionNArguments *args)
 	struct RTCRayHit *rh = (struct RTCRayHit *)(void *)args->rayhit, inner;
 	struct within w;
 	double t_max = (double)rh->ray.tfar - q->back;
-	if (!enter(&w, s, it, q, t_max))
+	if (!enter_instance(&w, s, it, q, t_max))
 		return;
 	fill_ray(&w, &inner.ray);
 	inner.hit.geomID = inner.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
@@ -244,7 +244,7 @@ static void occluded(const struct RTCOccludedFunctionNArguments *args)
 	const struct query *q = (const struct query *)(const void *)args->context;
 	struct within w;
 	struct RTCRay inner;
-	if (!enter(&w, s, it, q, q->segment ? 1 : INFINITY))
+	if (!enter_instance(&w, s, it, q, q->segment ? 1 : INFINITY))
 		return;
 	fill_ray(&w, &inner);
 	EMBREE_INIT_CONTEXT(&w.context);

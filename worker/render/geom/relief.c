@@ -9,8 +9,8 @@ struct bent {
 };
 
 /* The tangent t made orthogonal to n and lifted by the slope; and its derivative. */
-static void lift(const struct relief_site *s, const struct relief_step *d, vec3 t, vec3 dt, double slope, double dslope,
-		 struct bent *out)
+static void lift_tangent(const struct relief_site *s, const struct relief_step *d, vec3 t, vec3 dt, double slope,
+			 double dslope, struct bent *out)
 {
 	double rise = slope - vec3_dot(s->n, t);
 	out->m = vec3_madd(t, rise, s->n);
@@ -26,8 +26,8 @@ static void bend_height(const struct relief_site *s, const struct relief_step *d
 	struct bent a = {.dm = {0, 0, 0}}, b = {.dm = {0, 0, 0}};
 	vec3 change = d ? vec3_scale(s->unit, vec3_madd(vec3_scale(d->du, h->du), d->dv, h->dv)) : (vec3){0, 0, 0},
 	     none = {0, 0, 0};
-	lift(s, d, s->tu, d ? d->dtu : none, s->unit * h->x.x, change.x, &a);
-	lift(s, d, s->tv, d ? d->dtv : none, s->unit * h->x.y, change.y, &b);
+	lift_tangent(s, d, s->tu, d ? d->dtu : none, s->unit * h->x.x, change.x, &a);
+	lift_tangent(s, d, s->tv, d ? d->dtv : none, s->unit * h->x.y, change.y, &b);
 	/* Texture coordinates may be mirrored. */
 	double hand = vec3_dot(vec3_cross(s->tu, s->tv), s->n) < 0 ? -1 : 1;
 	out->m = vec3_scale(hand, vec3_cross(a.m, b.m));
@@ -36,7 +36,7 @@ static void bend_height(const struct relief_site *s, const struct relief_step *d
 }
 
 /* Whether texture coordinates are mirrored, seen from outside with v pointing down. */
-static bool mirrored(const struct relief_site *s)
+static bool is_mirrored(const struct relief_site *s)
 {
 	return vec3_dot(vec3_cross(s->tu, s->tv), s->n) > 0;
 }
@@ -63,7 +63,8 @@ static void bend_normal(const struct relief_site *s, const struct relief_step *d
 }
 
 /* false: the surface keeps its normal. */
-static bool bend(const struct relief *r, const struct relief_site *s, const struct relief_step *d, struct bent *out)
+static bool apply_relief(const struct relief *r, const struct relief_site *s, const struct relief_step *d,
+			 struct bent *out)
 {
 	struct relief_value x;
 	if (!(vec3_dot(s->tu, s->tu) > 0) || !(vec3_dot(s->tv, s->tv) > 0))
@@ -72,7 +73,7 @@ static bool bend(const struct relief *r, const struct relief_site *s, const stru
 	if (r->kind == RELIEF_HEIGHT)
 		bend_height(s, d, &x, out);
 	else
-		bend_normal(s, d, &x, r->handed && mirrored(s), out);
+		bend_normal(s, d, &x, r->handed && is_mirrored(s), out);
 	double square = vec3_dot(out->m, out->m);
 	return vec3_dot(out->m, s->ng) > 0 && square > 0x1p-900 && isfinite(square);
 }
@@ -80,14 +81,14 @@ static bool bend(const struct relief *r, const struct relief_site *s, const stru
 vec3 relief_normal(const struct relief *r, const struct relief_site *s)
 {
 	struct bent b;
-	vec3 n = bend(r, s, NULL, &b) ? vec3_normalize(b.m) : s->n;
+	vec3 n = apply_relief(r, s, NULL, &b) ? vec3_normalize(b.m) : s->n;
 	return vec3_is_finite(n) ? n : s->n;
 }
 
 vec3 relief_turn(const struct relief *r, const struct relief_site *s, const struct relief_step *d)
 {
 	struct bent b;
-	if (!bend(r, s, d, &b))
+	if (!apply_relief(r, s, d, &b))
 		return d->dn;
 	vec3 n = vec3_normalize(b.m);
 	vec3 turn = vec3_scale(1 / vec3_length(b.m), vec3_madd(b.dm, -vec3_dot(n, b.dm), n));

@@ -113,7 +113,7 @@ __attribute__((noinline)) static const struct geom_shape *pose_moving(const stru
 	return &room->shape;
 }
 
-static inline const struct geom_shape *pose(const struct geom_shape *s, double time, struct posed *room)
+static inline const struct geom_shape *shape_at(const struct geom_shape *s, double time, struct posed *room)
 {
 	return surface_moves(s) ? pose_moving(s, time, room) : s;
 }
@@ -226,7 +226,7 @@ void surface_on_triangle(const struct geom_shape *s, struct prim_ref prim, doubl
 			 struct surface_point *x)
 {
 	struct posed room;
-	const struct geom_shape *now = pose(s, prim.time, &room);
+	const struct geom_shape *now = shape_at(s, prim.time, &room);
 	const uint32_t *i = s->index[prim.prim];
 	struct corner c = corner_of(now, i);
 	x->prim = prim;
@@ -249,7 +249,7 @@ void surface_uv(const struct geom_shape *s, struct surface_point *x)
 	struct posed room;
 	if (!s->is_sphere)
 		return;
-	s = pose(s, x->prim.time, &room);
+	s = shape_at(s, x->prim.time, &room);
 	sphere_uv(&s->sphere_axes, vec3_scale(s->normal_sign, x->ng), &x->u, &x->v);
 }
 
@@ -287,7 +287,7 @@ static void on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, 
 void surface_on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, struct surface_point *x)
 {
 	struct posed room;
-	const struct geom_shape *now = pose(s, prim.time, &room);
+	const struct geom_shape *now = shape_at(s, prim.time, &room);
 	x->shape = s;
 	on_sphere(now, prim, w, x);
 	surface_uv(now, x);
@@ -296,7 +296,7 @@ void surface_on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w,
 static struct relief_site site_of(const struct surface_point *x)
 {
 	struct posed room;
-	const struct geom_shape *s = pose(x->shape, x->prim.time, &room);
+	const struct geom_shape *s = shape_at(x->shape, x->prim.time, &room);
 	if (s->curves)
 		return curve_relief_site(s, x);
 	if (s->is_sphere) {
@@ -313,7 +313,7 @@ static struct relief_site site_of(const struct surface_point *x)
 static vec3 normal_with(const struct surface_point *x, const struct relief *r)
 {
 	struct posed room;
-	const struct geom_shape *s = pose(x->shape, x->prim.time, &room);
+	const struct geom_shape *s = shape_at(x->shape, x->prim.time, &room);
 	if (!r && s->curves)
 		return curve_smooth_normal(s, x);
 	if (!r)
@@ -351,7 +351,7 @@ static vec3 sphere_direction(const struct geom_shape *s, vec3 o, vec3 d, double 
 void surface_from_hit(const struct geom_shape *s, vec3 o, vec3 d, const struct ray_hit *hit, struct surface_point *x)
 {
 	struct posed room;
-	const struct geom_shape *now = pose(s, hit->prim.time, &room);
+	const struct geom_shape *now = shape_at(s, hit->prim.time, &room);
 	if (s->is_sphere) {
 		surface_on_sphere(now, hit->prim, sphere_direction(now, o, d, hit->t), x);
 		x->shape = s;
@@ -509,7 +509,7 @@ void surface_change_of(const struct geom_shape *s, const struct surface_point *x
 	*c = (struct surface_change){.dn = {{0, 0, 0}}};
 	surface_tangents(x, &c->du, &c->dv);
 	c->axis = c->du;
-	s = pose(s, x->prim.time, &room);
+	s = shape_at(s, x->prim.time, &room);
 	if (s->curves) {
 		curve_change(s, x, c);
 	} else if (s->is_sphere) {
@@ -565,7 +565,7 @@ bool surface_reproject(const struct geom_shape *s, struct prim_ref prim, struct 
 		       double t_near, struct surface_point *x)
 {
 	struct posed room;
-	const struct geom_shape *now = pose(s, prim.time, &room);
+	const struct geom_shape *now = shape_at(s, prim.time, &room);
 	bool same = prim.shape == from.shape && prim.prim == from.prim;
 	x->shape = s;
 	if (s->is_sphere)
@@ -578,7 +578,7 @@ bool surface_reproject(const struct geom_shape *s, struct prim_ref prim, struct 
 bool surface_near(const struct geom_shape *s, struct prim_ref prim, vec3 p, struct surface_point *x)
 {
 	struct posed room;
-	const struct geom_shape *now = pose(s, prim.time, &room);
+	const struct geom_shape *now = shape_at(s, prim.time, &room);
 	if (s->is_sphere) {
 		vec3 d = vec3_sub(p, now->center);
 		if (!(vec3_dot(d, d) > 0))

@@ -28,7 +28,7 @@ static bool leaves_denser(const struct path_vertex *v, vec3 d)
 }
 
 /* The direction from `from` to y; returns the distance. */
-static double toward(const struct path_vertex *from, const struct path_vertex *y, vec3 *d)
+static double distance_to(const struct path_vertex *from, const struct path_vertex *y, vec3 *d)
 {
 	double distance2;
 	*d = path_direction(from, y, &distance2);
@@ -54,14 +54,14 @@ static bool cross(struct path_context *c, const struct path_vertex *z, const str
 		if (path_visible(c, v, y))
 			return true;
 		from = v;
-		end = toward(v, y, &d);
+		end = distance_to(v, y, &d);
 	}
 	return false;
 }
 
 /* Moves the guess to where light is refracted. */
-static bool walk(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
-		 struct path_refraction *out)
+static bool walk_to_refraction(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
+			       struct path_refraction *out)
 {
 	struct full_path x;
 	struct walk_scratch s;
@@ -97,10 +97,10 @@ static vec3 bent_at(const struct refracting_point *q, const struct path_vertex *
 	return vec3_normalize(vec3_madd(vec3_scale(e, in), sqrt(1 - e * e * (1 - cosine * cosine)) - e * cosine, q->n));
 }
 
-static bool guess(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y, vec3 d,
-		  struct path_refraction *out)
+static bool refract_along(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y, vec3 d,
+			  struct path_refraction *out)
 {
-	return cross(c, z, y, d, INFINITY, true, out) && walk(c, z, y, out);
+	return cross(c, z, y, d, INFINITY, true, out) && walk_to_refraction(c, z, y, out);
 }
 
 /* Where z is in a denser medium, light that was bent arrives from other directions. */
@@ -110,10 +110,10 @@ static bool guess_bent(struct path_context *c, const struct path_vertex *z, cons
 	const struct refracting_end from = {y->x.p, y->kind == VERTEX_INFINITE};
 	const struct refracting_point *by[REFRACTING_RANKED];
 	const uint32_t count = refracting_points_rank(c->w, z->x.p, &from, by);
-	if (count > 0 && guess(c, z, y, bent_at(by[0], y), out))
+	if (count > 0 && refract_along(c, z, y, bent_at(by[0], y), out))
 		return true;
 	for (uint32_t i = 0; i < count; i++)
-		if (guess(c, z, y, vec3_normalize(vec3_sub(by[i]->p, z->x.p)), out))
+		if (refract_along(c, z, y, vec3_normalize(vec3_sub(by[i]->p, z->x.p)), out))
 			return true;
 	return false;
 }
@@ -134,10 +134,11 @@ bool halfvec_refract(struct path_context *c, const struct path_vertex *z, const 
 		     struct path_refraction *out)
 {
 	vec3 d;
-	const double end = toward(z, y, &d);
+	const double end = distance_to(z, y, &d);
 	if (!(end > 0))
 		return false;
-	if (box_is_met(&c->w->refracting, z->x.p, d, end) && cross(c, z, y, d, end, false, out) && walk(c, z, y, out))
+	if (box_is_met(&c->w->refracting, z->x.p, d, end) && cross(c, z, y, d, end, false, out) &&
+	    walk_to_refraction(c, z, y, out))
 		return true;
 	return guess_bent(c, z, y, out) && !is_open(c, z, y, d, end);
 }

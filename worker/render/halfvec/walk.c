@@ -36,7 +36,7 @@ struct walk {
 	vec3 move[FULL_PATH_MAX_VERTICES]; /* a full Newton step from the kept state */
 };
 
-static uint64_t bit(unsigned i)
+static uint64_t bit_of(unsigned i)
 {
 	return (uint64_t)1 << i;
 }
@@ -81,7 +81,7 @@ static enum walk_end cast(struct walk *m, unsigned j, vec3 d)
 	if (&w->bsdfs[part->bsdf] != to->bsdf)
 		return WALK_BLOCKED;
 	to->emitter = part->emitter;
-	m->seen |= bit(j);
+	m->seen |= bit_of(j);
 	return WALK_OK;
 }
 
@@ -174,7 +174,7 @@ static enum walk_end start(struct walk *m)
 		if (!mode_holds(y, j))
 			return WALK_MODE;
 		if (light_above(y, j))
-			m->above |= bit(j);
+			m->above |= bit_of(j);
 	}
 	return WALK_OK;
 }
@@ -184,26 +184,26 @@ static bool all_visible(const struct walk *m)
 {
 	uint64_t seen = EFFECT_IS_ON(m->c->w, scattering) ? 0 : m->seen;
 	for (unsigned e = m->b; e-- > m->end;)
-		if (!(seen & bit(e)) && !full_path_visible(m->c, m->y, e))
+		if (!(seen & bit_of(e)) && !full_path_visible(m->c, m->y, e))
 			return false;
 	return true;
 }
 
-static void constrain(struct walk *m, unsigned b, unsigned end)
+static void compute_constraints(struct walk *m, unsigned b, unsigned end)
 {
 	constraints_of(m->c->w, m->y, b, end, m->s->k);
 }
 
-static void refresh(struct walk *m, unsigned stale)
+static void refresh_constraints(struct walk *m, unsigned stale)
 {
 	if (stale & WALK_STALE) {
-		constrain(m, m->b, m->end);
+		compute_constraints(m, m->b, m->end);
 		return;
 	}
 	if (stale & WALK_STALE_B)
-		constrain(m, m->b, m->b - 2);
+		compute_constraints(m, m->b, m->b - 2);
 	if (stale & WALK_STALE_C)
-		constrain(m, m->end + 2, m->end);
+		compute_constraints(m, m->end + 2, m->end);
 }
 
 /* Evaluates the trial: half vectors alone are cheap, derivatives are only computed if the walk continues or the
@@ -219,7 +219,7 @@ static struct nearness evaluate_trial(struct walk *m)
 static enum walk_end iterate(struct walk *m, const struct walk_limits *limits, unsigned stale)
 {
 	struct walk_scratch *s = m->s;
-	refresh(m, stale);
+	refresh_constraints(m, stale);
 	double error = residuals(m).error, step = 1;
 	unsigned most = limits->iterations;
 	enum walk_end last = isfinite(error) ? accept_trial(m, !stale) : WALK_SINGULAR;
@@ -231,7 +231,7 @@ static enum walk_end iterate(struct walk *m, const struct walk_limits *limits, u
 		if (last == WALK_OK) {
 			struct nearness now = evaluate_trial(m);
 			if (now.within ? !m->back : now.error < error)
-				constrain(m, m->b, m->end);
+				compute_constraints(m, m->b, m->end);
 			if (now.within)
 				return WALK_OK;
 			if (now.forward)

@@ -17,13 +17,13 @@ jmp_buf *fptrap_catch(jmp_buf *back)
 #if defined(__x86_64__)
 _Thread_local bool fptrap_watching;
 
-static void forget(void)
+static void clear_exceptions(void)
 {
 	fptrap_watching = false;
 	_mm_setcsr(_mm_getcsr() & ~(unsigned)_MM_EXCEPT_MASK);
 }
 #else
-static void forget(void)
+static void clear_exceptions(void)
 {
 }
 #endif
@@ -33,7 +33,7 @@ void fptrap_fault(void)
 	jmp_buf *back = catcher;
 	if (back) {
 		catcher = NULL;
-		forget();
+		clear_exceptions();
 		longjmp(*back, 1);
 	}
 	raise(SIGFPE);

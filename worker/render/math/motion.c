@@ -232,7 +232,7 @@ struct sweep {
 	vec3 low, high;
 };
 
-static void grow(struct sweep *w, const mat4 *m, double off)
+static void grow_sweep(struct sweep *w, const mat4 *m, double off)
 {
 	vec3 c = mat4_point(m, w->middle);
 	const double at[3] = {c.x, c.y, c.z}, half[3] = {w->half.x, w->half.y, w->half.z};
@@ -262,7 +262,7 @@ static void sweep_between(struct sweep *w, const struct motion_key *a, const str
 	double off = (f * f * q + 2 * f * dq) / 8;
 	for (int i = 0; i <= (int)parts; i++) {
 		mat4 m = mat4_mul(place_at(a, b, begin + (end - begin) * i / parts), *w->before);
-		grow(w, &m, off);
+		grow_sweep(w, &m, off);
 	}
 }
 

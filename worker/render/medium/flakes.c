@@ -26,7 +26,7 @@ static double least_eigenvalue(const double s[FLAKES_NUMBERS])
 }
 
 /* Makes a matrix definite enough. false: it is not nearly. */
-static bool mend(double s[FLAKES_NUMBERS])
+static bool make_definite(double s[FLAKES_NUMBERS])
 {
 	double trace = s[0] + s[1] + s[2];
 	if (trace == 0)
@@ -62,7 +62,7 @@ static int split(struct flakes *f, const struct scene_node *n, const struct grid
 		double s[FLAKES_NUMBERS];
 		for (int k = 0; k < FLAKES_NUMBERS; k++)
 			s[k] = (double)file->value[FLAKES_NUMBERS * i + (size_t)k];
-		if (!mend(s))
+		if (!make_definite(s))
 			return refuse(n, s, e);
 		for (int k = 0; k < FLAKES_NUMBERS; k++)
 			part[k / 3][3 * i + (size_t)k % 3] = (float)s[k];
@@ -111,7 +111,7 @@ int flakes_create(struct flakes *f, const struct scene_node *n, const struct vol
 	for (int k = 0; k < FLAKES_NUMBERS; k++)
 		if (!(fabs(f->even[k]) <= LARGEST))
 			return node_error(inner, e, ERANGE, "S: %g is outside [-%g, %g]", f->even[k], LARGEST, LARGEST);
-	return mend(f->even) ? 0 : refuse(inner, f->even, e);
+	return make_definite(f->even) ? 0 : refuse(inner, f->even, e);
 }
 
 void flakes_at(const struct flakes *f, vec3 at, double s[FLAKES_NUMBERS])

@@ -113,7 +113,7 @@ static double tolerance_of(const struct mutation_ctx *m, const struct path_verte
 }
 
 /* Steps of the half vectors, and their targets. */
-static void aim(struct mutation_ctx *m, const struct breakup *how, const struct full_path *x)
+static void set_targets(struct mutation_ctx *m, const struct breakup *how, const struct full_path *x)
 {
 	struct mutation_scratch *s = &m->scratch;
 	for (unsigned j = how->c + 1; j < how->b; j++) {
@@ -191,8 +191,8 @@ static bool leads_back(struct mutation_ctx *m, const struct breakup *how, const 
 }
 
 /* Between x_b and x_c by half vectors. */
-static enum proposal_end walk(struct mutation_ctx *m, const struct breakup *how, struct full_path *x,
-			      struct full_path *y, struct move *move)
+static enum proposal_end walk_between(struct mutation_ctx *m, const struct breakup *how, struct full_path *x,
+				      struct full_path *y, struct move *move)
 {
 	struct mutation_scratch *s = &m->scratch;
 	struct path_context *c = m->path;
@@ -201,7 +201,7 @@ static enum proposal_end walk(struct mutation_ctx *m, const struct breakup *how,
 		return PROPOSAL_SINGULAR;
 	move->log_transfer[Y_TO_X] = s->walk.system.log_transfer;
 	halfvec_steps(c, x, s->k, how->b, how->c, s->step[X_TO_Y]);
-	aim(m, how, x);
+	set_targets(m, how, x);
 	memcpy(&s->walk.k[how->c + 1], &s->k[how->c + 1], (how->b - how->c - 1) * sizeof s->k[0]);
 	enum walk_end end =
 		halfvec_walk(c, y, how->b, how->c, s->target, false, &m->limits, stale_of(m, how, x, y), &s->walk);
@@ -284,7 +284,7 @@ enum proposal_end breakup_propose(struct mutation_ctx *m, const struct breakup *
 	if (!end && how->emitter && !move_emitter(m, x, y, move))
 		end = PROPOSAL_OUTSIDE;
 	if (!end && b > 0)
-		end = b - c_end >= 2 ? walk(m, how, x, y, move) : join(m, c_end, y);
+		end = b - c_end >= 2 ? walk_between(m, how, x, y, move) : join(m, c_end, y);
 	move->first = c_end;
 	if (end)
 		return end;

@@ -49,8 +49,8 @@ static double log_choice(const struct strategy *s, const struct choice *forced, 
 	return log(p);
 }
 
-static bool choose(const struct strategy *s, const struct choice *forced, struct mutation_ctx *m,
-		   const struct full_path *x, struct breakup *out)
+static bool choose_breakup(const struct strategy *s, const struct choice *forced, struct mutation_ctx *m,
+			   const struct full_path *x, struct breakup *out)
 {
 	double *weight = m->scratch.weight, r[4];
 	unsigned k = x->edges;
@@ -87,7 +87,7 @@ enum proposal_end strategy_propose(const struct mutation_ops *self, struct mutat
 	struct breakup br = {.halfvecs = s->halfvecs, .wavelength = s->wavelength, .aperture = s->aperture};
 	if (EFFECT_IS_ON(m->path->w, scattering))
 		br.wavelength = s->wavelength_in_media;
-	if (!choose(s, &forced, m, x, &br))
+	if (!choose_breakup(s, &forced, m, x, &br))
 		return PROPOSAL_INAPPLICABLE;
 	const struct world *w = m->path->w;
 	br.emitter = s->emitter && w->effects.emitter_move && br.b > 0 && br.c == 0 &&

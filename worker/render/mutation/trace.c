@@ -51,7 +51,7 @@ static void rotate_half_vector(const struct path_vertex *from, const struct path
 }
 
 /* The direction to the light for light leaving along o with half vector h; eta = n_o / n_i. false: total reflection. */
-static bool follow(vec3 o, vec2 h, bool transmit, double eta, vec3 *i)
+static bool direction_of_halfvec(vec3 o, vec2 h, bool transmit, double eta, vec3 *i)
 {
 	if (transmit && eta == 1) { /* matched: h is (i + o)_xy */
 		double x = h.x - o.x, y = h.y - o.y, z2 = 1 - x * x - y * y;
@@ -118,7 +118,7 @@ static bool scatter_on(struct mutation_ctx *m, unsigned j, const struct full_pat
 		rotate_half_vector(from, v, &h);
 		h = vec2_add(h, (vec2){sigma * g[0], sigma * g[1]});
 		move->log_symmetric -= 0.5 * (g[0] * g[0] + g[1] * g[1]) + log(2 * M_PI * sigma * sigma);
-		if (!follow(o, h, v->mode & BSDF_TRANSMIT, full_path_eta(y, j), &i))
+		if (!direction_of_halfvec(o, h, v->mode & BSDF_TRANSMIT, full_path_eta(y, j), &i))
 			return false;
 	}
 	*d = vec3_normalize(frame_to_world(&v->x.sh, i));
@@ -126,7 +126,7 @@ static bool scatter_on(struct mutation_ctx *m, unsigned j, const struct full_pat
 }
 
 /* y_b as the end of the traced part. */
-static enum proposal_end arrive(struct path_context *c, unsigned b, struct path_vertex *v)
+static enum proposal_end end_trace(struct path_context *c, unsigned b, struct path_vertex *v)
 {
 	v->delta = false;
 	v->mode = 0;
@@ -194,5 +194,5 @@ enum proposal_end trace_chain(struct mutation_ctx *m, unsigned b, bool aperture,
 		if (j < k && full_path_mode(y, j) != (y->v[j].mode & (BSDF_REFLECT | BSDF_TRANSMIT)))
 			return PROPOSAL_MODE;
 	}
-	return arrive(c, b, &y->v[b]);
+	return end_trace(c, b, &y->v[b]);
 }

@@ -57,7 +57,7 @@ void brightness_fini(struct brightness *b)
 	*b = (struct brightness){.across = 0};
 }
 
-static uint32_t along(double position, double size, uint32_t cells)
+static uint32_t cell_along(double position, double size, uint32_t cells)
 {
 	double cell = position / size * cells;
 	return cell > 0 ? cell < cells ? (uint32_t)cell : cells - 1 : 0;
@@ -65,8 +65,8 @@ static uint32_t along(double position, double size, uint32_t cells)
 
 static size_t cell_at(const struct brightness *b, double x, double y)
 {
-	return (size_t)along(y - b->window.y, b->window.height, b->across) * b->across +
-	       along(x - b->window.x, b->window.width, b->across);
+	return (size_t)cell_along(y - b->window.y, b->window.height, b->across) * b->across +
+	       cell_along(x - b->window.x, b->window.width, b->across);
 }
 
 void brightness_add(struct brightness *b, const struct splat *s, double weight)
@@ -132,7 +132,7 @@ static double share_of(const struct brightness *b, struct block q)
 }
 
 /* The square of a sum, with the minimum for a block of that size. */
-static double lifted(const struct brightness *b, double all, struct sums s, struct block q)
+static double squared_with_floor(const struct brightness *b, double all, struct sums s, struct block q)
 {
 	double floor = least * all * share_of(b, q);
 	return s.sum * s.sum + floor * floor;
@@ -140,22 +140,22 @@ static double lifted(const struct brightness *b, double all, struct sums s, stru
 
 static double scale_of(const struct brightness *b, double all, double samples, struct sums s, struct block q)
 {
-	double scale = samples * share_of(b, q) / sqrt(lifted(b, all, s, q));
+	double scale = samples * share_of(b, q) / sqrt(squared_with_floor(b, all, s, q));
 	return isfinite(scale) ? scale : 0; /* fainter than squares of doubles can tell */
 }
 
 /* ---- known squares */
 
-static struct block quarter(struct block q, uint32_t k)
+static struct block quarter_of(struct block q, uint32_t k)
 {
 	uint32_t half = (q.x1 - q.x0) / 2, x = q.x0 + k % 2 * half, y = q.y0 + k / 2 * half;
 	return (struct block){x, y, x + half, y + half};
 }
 
-static bool knows(const struct brightness *b, double all, struct block q)
+static bool is_known(const struct brightness *b, double all, struct block q)
 {
 	struct sums s = sums_of(b, q);
-	return s.square <= believed * lifted(b, all, s, q);
+	return s.square <= believed * squared_with_floor(b, all, s, q);
 }
 
 /* At most eight levels deep. */
@@ -163,9 +163,9 @@ static void settle_square(struct brightness *b, double all, double samples, stru
 {
 	bool quartered = q.x1 - q.x0 > 1;
 	for (uint32_t k = 0; k < 4 && quartered; k++)
-		quartered = knows(b, all, quarter(q, k));
+		quartered = is_known(b, all, quarter_of(q, k));
 	for (uint32_t k = 0; k < 4 && quartered; k++)
-		settle_square(b, all, samples, quarter(q, k));
+		settle_square(b, all, samples, quarter_of(q, k));
 	if (quartered)
 		return;
 	double scale = scale_of(b, all, samples, sums_of(b, q), q);

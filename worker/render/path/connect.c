@@ -385,8 +385,8 @@ static spectrum absorption_of_light(const struct path_context *c, unsigned s, ui
 }
 
 /* What media that only absorb leave of light on its way to z through y, vertex s - 1 of the light's sub-path. */
-static spectrum absorbed(const struct path_context *c, const struct path_vertex *z, vec3 to_light,
-			 const struct path_vertex *y, unsigned s)
+static spectrum absorption_towards(const struct path_context *c, const struct path_vertex *z, vec3 to_light,
+				   const struct path_vertex *y, unsigned s)
 {
 	uint32_t medium = path_medium_after(c->w, z, z->edge.medium, to_light);
 	return spectrum_mul(path_transmittance(c->w, &c->wl, medium, z, y), absorption_of_light(c, s, medium));
@@ -400,7 +400,7 @@ static bool only_absorbs(const struct path_context *c)
 static inline spectrum after_absorption(const struct path_context *c, const struct path_vertex *z, vec3 to_light,
 					const struct path_vertex *y, unsigned s, spectrum l)
 {
-	return only_absorbs(c) ? spectrum_mul(l, absorbed(c, z, to_light, y, s)) : l;
+	return only_absorbs(c) ? spectrum_mul(l, absorption_towards(c, z, to_light, y, s)) : l;
 }
 
 /* Whether z and y see each other; where media scatter, the edge between them and what is left of l. */
@@ -439,8 +439,8 @@ static __attribute__((noinline)) spectrum seen_with_effects(struct path_context 
 
 /* What is left of l on its way from y, vertex s - 1 of the light's sub-path, to the camera's vertex t - 1, directly or
  * through surfaces; zero: they do not see each other. direct: l after what media absorb of it if nothing is passed. */
-static inline spectrum seen(struct path_context *c, const struct path_vertex *y, unsigned s, unsigned t, vec3 to_light,
-			    spectrum l, spectrum direct, struct path_edge *joint)
+static inline spectrum if_visible(struct path_context *c, const struct path_vertex *y, unsigned s, unsigned t,
+				  vec3 to_light, spectrum l, spectrum direct, struct path_edge *joint)
 {
 	if (EFFECT_IS_ON(c->w, joints))
 		return seen_with_effects(c, y, s, t, to_light, l, direct, joint);
@@ -482,7 +482,7 @@ static spectrum join_emitter(struct path_context *c, unsigned t, unsigned max_s)
 	spectrum l = spectrum_mul(spectrum_mul(z->beta, f), path_emitted(c, &y, vec3_neg(to_light), &c->wl));
 	l = spectrum_scale(path_cosine(z, to_light) * path_cosine(&y, to_light) / distance2 / pdf, l);
 	struct path_edge joint;
-	l = seen(c, &y, 1, t, to_light, l, after_absorption(c, z, to_light, &y, 1, l), &joint);
+	l = if_visible(c, &y, 1, t, to_light, l, after_absorption(c, z, to_light, &y, 1, l), &joint);
 	if (spectrum_is_zero(l) && path_refracts(c) && path_tries_to_refract(c, z - 1, z, &y, pdf, f))
 		l = refracted(c, &y, t, pdf);
 	return spectrum_is_zero(l) ? l : weighted(c, &y, 1, t, max_s, &joint, l);
@@ -510,7 +510,7 @@ static spectrum join_lens(struct path_context *c, const struct path_vertex *ligh
 {
 	const struct path_vertex *y = &light[s - 1];
 	struct path_edge joint;
-	l = seen(c, y, s, 1, d, l, after_absorption(c, &c->camera[0], d, y, s, l), &joint);
+	l = if_visible(c, y, s, 1, d, l, after_absorption(c, &c->camera[0], d, y, s, l), &joint);
 	return spectrum_is_zero(l) ? l : weighted(c, light, s, 1, max_s, &joint, l);
 }
 
@@ -573,7 +573,7 @@ static spectrum join_surfaces(struct path_context *c, unsigned s, unsigned t, un
 	if (times == 0)
 		return spectrum_of(0);
 	struct path_edge joint;
-	l = seen(c, y, s, t, to_light, spectrum_scale(times, l), spectrum_scale(times, direct), &joint);
+	l = if_visible(c, y, s, t, to_light, spectrum_scale(times, l), spectrum_scale(times, direct), &joint);
 	return spectrum_is_zero(l) ? l : weighted(c, c->light, s, t, max_s, &joint, l);
 }
 

@@ -22,7 +22,7 @@
 enum { SURE_VERTICES = 5 };
 
 /* Draws a number of vertices from `least` to `most`: n or more with probability survival(n) / survival(least). */
-static unsigned longer(double u, unsigned least, unsigned most)
+static unsigned draw_vertices(double u, unsigned least, unsigned most)
 {
 	unsigned from = least > SURE_VERTICES ? least : SURE_VERTICES;
 	if (most <= from)
@@ -33,8 +33,8 @@ static unsigned longer(double u, unsigned least, unsigned most)
 struct ensemble_lengths ensemble_lengths_of(const struct path_context *c, const double u[2], unsigned camera,
 					    unsigned light)
 {
-	return (struct ensemble_lengths){longer(u[0], camera, c->max_depth + 1), longer(u[1], light, c->max_depth),
-					 true};
+	return (struct ensemble_lengths){draw_vertices(u[0], camera, c->max_depth + 1),
+					 draw_vertices(u[1], light, c->max_depth), true};
 }
 
 struct ensemble_lengths ensemble_all_lengths(const struct path_context *c)
@@ -62,8 +62,8 @@ static double contribution(struct path_context *c, unsigned s, unsigned t)
 }
 
 /* known: a candidate whose contribution is known already, NULL: none. */
-static void gather(struct path_context *c, unsigned camera, unsigned light, bool capped, const struct candidate *known,
-		   struct ensemble *out)
+static void gather_candidates(struct path_context *c, unsigned camera, unsigned light, bool capped,
+			      const struct candidate *known, struct ensemble *out)
 {
 	out->total = 0;
 	out->count = 0;
@@ -91,7 +91,7 @@ void ensemble_draw(struct path_context *c, struct sampler *s, const struct ensem
 	double film[2];
 	c->one_way = false;
 	unsigned camera = path_walk_camera(c, s, n->camera, film), light = path_walk_light(c, s, n->light);
-	gather(c, camera, light, n->capped, NULL, out);
+	gather_candidates(c, camera, light, n->capped, NULL, out);
 }
 
 bool ensemble_choose(struct path_context *c, const struct ensemble *e, double u, struct full_path *x)
@@ -106,8 +106,8 @@ bool ensemble_choose(struct path_context *c, const struct ensemble *e, double u,
 }
 
 /* Contribution over density of going on from beta across edge e to a vertex of density pdf, by scattering f at `at`. */
-static spectrum carry(const struct path_context *c, const struct full_path *x, spectrum beta, spectrum f, unsigned at,
-		      unsigned e, double pdf)
+static spectrum extend_weight(const struct path_context *c, const struct full_path *x, spectrum beta, spectrum f,
+			      unsigned at, unsigned e, double pdf)
 {
 	const struct path_vertex *v = &x->v[at];
 	const struct full_path_edge *g = &x->edge[e];
@@ -145,7 +145,8 @@ static void put_camera(struct path_context *c, struct sampler *s, struct full_pa
 	else if (EFFECT_IS_ON(c->w, absorption))
 		path_absorb(c, &v[0], vec3_neg(x->edge[k - 1].w), &v[1]);
 	for (unsigned i = 2; i < t; i++) {
-		v[i].beta = carry(c, x, v[i - 1].beta, full_path_f(c, x, k - i + 1), k - i + 1, k - i, v[i].pdf);
+		v[i].beta =
+			extend_weight(c, x, v[i - 1].beta, full_path_f(c, x, k - i + 1), k - i + 1, k - i, v[i].pdf);
 		if (EFFECT_IS_ON(c->w, absorption) && !EFFECT_IS_ON(c->w, scattering))
 			path_absorb(c, &v[i - 1], vec3_neg(x->edge[k - i].w), &v[i]);
 	}
@@ -175,7 +176,7 @@ static void put_light(struct path_context *c, struct sampler *s_numbers, struct 
 	}
 	v[0].beta = spectrum_of(1 / v[0].pdf);
 	for (unsigned i = 1; i < s; i++)
-		v[i].beta = carry(c, x, v[i - 1].beta, full_path_f(c, x, i - 1), i - 1, i - 1, v[i].pdf);
+		v[i].beta = extend_weight(c, x, v[i - 1].beta, full_path_f(c, x, i - 1), i - 1, i - 1, v[i].pdf);
 	v[s - 1].delta = false;
 }
 
@@ -271,5 +272,5 @@ void ensemble_around(struct path_context *c, struct sampler *sampler, struct ful
 	} else {
 		light = path_walk_light(c, sampler, n.light);
 	}
-	gather(c, camera, light, true, &known, out);
+	gather_candidates(c, camera, light, true, &known, out);
 }

@@ -73,7 +73,7 @@ bool full_path_join(struct full_path *x, unsigned e)
 	return x->edge[e].distance2 > 0;
 }
 
-static const struct surface_point *facing(const struct full_path *x, unsigned j, struct surface_point *turned)
+static const struct surface_point *surface_facing(const struct full_path *x, unsigned j, struct surface_point *turned)
 {
 	return path_facing(&x->v[j], x->edge[j].w, turned);
 }
@@ -81,7 +81,7 @@ static const struct surface_point *facing(const struct full_path *x, unsigned j,
 bool full_path_turned(const struct full_path *x, unsigned j)
 {
 	struct surface_point turned;
-	return x->v[j].kind == VERTEX_SURFACE && facing(x, j, &turned) == &turned;
+	return x->v[j].kind == VERTEX_SURFACE && surface_facing(x, j, &turned) == &turned;
 }
 
 double full_path_cosine_to_light(const struct full_path *x, unsigned j)
@@ -89,7 +89,7 @@ double full_path_cosine_to_light(const struct full_path *x, unsigned j)
 	struct surface_point turned;
 	if (x->v[j].kind == VERTEX_MEDIUM)
 		return 1;
-	return fabs(vec3_dot(facing(x, j, &turned)->sh.n, x->edge[j - 1].w));
+	return fabs(vec3_dot(surface_facing(x, j, &turned)->sh.n, x->edge[j - 1].w));
 }
 
 unsigned full_path_mode(const struct full_path *x, unsigned j)
@@ -97,7 +97,7 @@ unsigned full_path_mode(const struct full_path *x, unsigned j)
 	struct surface_point turned;
 	if (x->v[j].kind == VERTEX_MEDIUM)
 		return BSDF_REFLECT;
-	const struct surface_point *s = facing(x, j, &turned);
+	const struct surface_point *s = surface_facing(x, j, &turned);
 	vec3 o = x->edge[j].w, i = vec3_neg(x->edge[j - 1].w);
 	if (x->v[j].delta && (x->v[j].mode & BSDF_STRAIGHT)) /* whatever the shading normal is */
 		return vec3_dot(s->ng, o) * vec3_dot(s->ng, i) < 0 ? BSDF_TRANSMIT : 0;
@@ -132,7 +132,7 @@ static spectrum scatter(const struct path_context *c, const struct full_path *x,
 		return full_path_specular(x, j, &wi, &chance);
 	}
 	struct surface_point turned;
-	const struct surface_point *s = facing(x, j, &turned);
+	const struct surface_point *s = surface_facing(x, j, &turned);
 	if (halfvec && s == &turned)
 		return spectrum_of(0);
 	struct bsdf_point p = world_bsdf_point(s, &x->wl, TRANSPORT_RADIANCE);

@@ -25,7 +25,7 @@ static bool has_light(const struct path_context *c, struct sampler *s)
 }
 
 /* What the film gets of l. */
-static spectrum kept(struct path_context *c, unsigned j, unsigned t, const double film[2], spectrum l)
+static spectrum share_for_film(struct path_context *c, unsigned j, unsigned t, const double film[2], spectrum l)
 {
 	return c->split && !spectrum_is_zero(l) ? c->split->keep(c->split, c, j, t, film, l) : l;
 }
@@ -59,7 +59,7 @@ static void join_light_to_lens(struct path_context *c, struct sampler *s, unsign
 			continue;
 		spectrum l = path_connect(c, j, 1, PATH_MAX_EDGES, at);
 		if (path_accept(c, l) && j > 1)
-			l = kept(c, j, 1, at, l);
+			l = share_for_film(c, j, 1, at, l);
 		if (!spectrum_is_zero(l) && path_splat(c, out, at[0], at[1], l) && !c->unclassed)
 			classes_add(classes, c, j, 1, l);
 	}
@@ -92,14 +92,14 @@ void path_trace_candidates(struct path_context *c, struct sampler *s, struct pat
 		for (unsigned j = 0; j <= 1; j++) {
 			spectrum l = join(c, j, t, &classes);
 			found = spectrum_add(found, l);
-			sum = spectrum_add(sum, kept(c, j, t, film, l));
+			sum = spectrum_add(sum, share_for_film(c, j, t, film, l));
 		}
 	c->faint = faint_beside(c, found);
 	if (c->faint > 0)
 		c->faint_place = s->block(s, SIDE_CAMERA, 0)[DIM_FAINT];
 	for (unsigned t = 2; t <= camera; t++)
 		for (unsigned j = 2; j <= light; j++)
-			sum = spectrum_add(sum, kept(c, j, t, film, join(c, j, t, &classes)));
+			sum = spectrum_add(sum, share_for_film(c, j, t, film, join(c, j, t, &classes)));
 	c->faint = 0;
 	if (!path_splat(c, out, film[0], film[1], sum) && out->classes)
 		classes_clear(out);

@@ -16,8 +16,8 @@
 enum { FULL = PATH_MAX_EDGES + 1, CARRIED = 3, CARRIED_END = 2 + CARRIED };
 
 /* The paths that end at the camera sub-path's vertices first - 1 ... n - 1; `before` of their edges are not in it. */
-static spectrum gather(struct path_context *c, unsigned first, unsigned n, unsigned before, uint32_t least,
-		       uint32_t most, double film[2])
+static spectrum gather_light(struct path_context *c, unsigned first, unsigned n, unsigned before, uint32_t least,
+			     uint32_t most, double film[2])
 {
 	spectrum sum = spectrum_of(0);
 	if (EFFECT_IS_ON(c->w, medium_light))
@@ -48,7 +48,7 @@ double longer_paths(struct path_context *c, uint64_t seed, uint64_t index, uint3
 	c->opaque = true; /* surfaces that a connection passes would make its path longer than was asked for */
 	sampler_random_init(&s, seed, RNG_BEYOND, index, 0);
 	unsigned n = path_walk_camera(c, &s.base, most, film);
-	spectrum sum = gather(c, first, n, before, least, longest, film);
+	spectrum sum = gather_light(c, first, n, before, least, longest, film);
 	for (uint64_t stretch = 1; n == FULL && c->camera[n - 1].kind != VERTEX_INFINITE && before + n - 1 < longest;
 	     stretch++) {
 		for (unsigned i = 1; i + CARRIED < n; i++)
@@ -57,7 +57,7 @@ double longer_paths(struct path_context *c, uint64_t seed, uint64_t index, uint3
 		before += n - CARRIED_END;
 		sampler_random_init(&s, seed, RNG_BEYOND, index, stretch);
 		n = path_walk_on(c, &s.base, SIDE_CAMERA, CARRIED_END, FULL);
-		sum = spectrum_add(sum, gather(c, CARRIED_END + 1, n, before, least, longest, film));
+		sum = spectrum_add(sum, gather_light(c, CARRIED_END + 1, n, before, least, longest, film));
 	}
 	c->dispersed = false;
 	c->roulette = roulette;

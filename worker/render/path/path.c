@@ -170,8 +170,8 @@ spectrum path_delta_share(const struct path_context *c, const struct path_vertex
 	return spectrum_is_zero(share) || !(chance > 0) ? spectrum_of(0) : share;
 }
 
-static bool depart(const struct path_context *c, const struct path_vertex *v, const double u[3],
-		   enum transport transport, struct departure *out)
+static bool sample_departure(const struct path_context *c, const struct path_vertex *v, const double u[3],
+			     enum transport transport, struct departure *out)
 {
 	struct surface_point turned;
 	if (v->kind == VERTEX_MEDIUM)
@@ -277,7 +277,7 @@ static unsigned scatter_on(struct path_context *c, struct sampler *s, enum sampl
 		struct departure out;
 		for (int i = 0; i < 3; i++)
 			at->next_event[i] = u[DIM_NEXT_EVENT + i];
-		if (n >= max || !depart(c, at, u + DIM_BSDF, transport, &out))
+		if (n >= max || !sample_departure(c, at, u + DIM_BSDF, transport, &out))
 			return n;
 		if (!survives(c, n - 1, start, u[DIM_ROULETTE], &out.beta) || spectrum_is_zero(out.beta))
 			return n;

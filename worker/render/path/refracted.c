@@ -65,7 +65,7 @@ static bool is_same_path(const struct path_refraction *r, const struct path_vert
 	return true;
 }
 
-static bool same(vec3 a, vec3 b)
+static bool is_equal(vec3 a, vec3 b)
 {
 	return a.x == b.x && a.y == b.y && a.z == b.z;
 }
@@ -75,7 +75,7 @@ static const struct path_refraction *look_up(struct path_context *c, const struc
 					     const struct path_vertex *y)
 {
 	struct path_refraction_known *k = &c->refraction;
-	if (!k->any || !same(k->z, z->x.p) || !same(k->y, y->x.p) || k->time != z->x.prim.time ||
+	if (!k->any || !is_equal(k->z, z->x.p) || !is_equal(k->y, y->x.p) || k->time != z->x.prim.time ||
 	    k->nm != c->wl.nm[0]) {
 		k->any = true;
 		k->z = z->x.p;

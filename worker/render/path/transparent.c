@@ -17,7 +17,7 @@ static const double same_point = 0x1p-24;
 
 /* The share of light that goes straight through v, which a ray along d met. If there is any, v is made a vertex that
  * the path leaves straight on. */
-static spectrum pass(const struct path_context *c, struct path_vertex *v, vec3 d)
+static spectrum pass_straight(const struct path_context *c, struct path_vertex *v, vec3 d)
 {
 	if (!bsdf_is_passed(v->bsdf) || !path_meets(d, v))
 		return spectrum_of(0);
@@ -60,7 +60,7 @@ bool path_see_through(struct path_context *c, const struct path_vertex *before, 
 		if (!path_extend(c, from, d, begin, end, v) || v->kind != VERTEX_SURFACE || !are_apart(from, v, d) ||
 		    !is_before(v, y, whole))
 			return false;
-		*left = spectrum_mul(*left, pass(c, v, d));
+		*left = spectrum_mul(*left, pass_straight(c, v, d));
 		if (spectrum_is_zero(*left))
 			return false;
 		v->pdf = n == 0 ? path_pdf(c, before, z, v, TRANSPORT_RADIANCE)

@@ -92,7 +92,7 @@ static void sample_at(const struct displacer *w, uint32_t triangle, double b1, d
 	s->h = w->d->scale * w->d->height(w->d->user, s->u, s->v);
 }
 
-static vec3 across(vec3 v, vec3 n)
+static vec3 tangential_part(vec3 v, vec3 n)
 {
 	return vec3_madd(v, -vec3_dot(v, n), n);
 }
@@ -114,7 +114,7 @@ static vec3 displaced_normal(const struct displacer *w, uint32_t triangle, doubl
 		double s1 = k == 0 ? step : 0, s2 = k == 1 ? step : 0;
 		sample_at(w, triangle, b1 + s1, b2 + s2, &a);
 		sample_at(w, triangle, b1 - s1, b2 - s2, &b);
-		flat[k] = across(vec3_sub(a.p, b.p), at->n);
+		flat[k] = tangential_part(vec3_sub(a.p, b.p), at->n);
 		moved[k] = vec3_madd(vec3_madd(flat[k], a.h - b.h, at->n), at->h, vec3_sub(a.n, b.n));
 	}
 	vec3 n = vec3_cross(moved[0], moved[1]);

@@ -23,7 +23,7 @@ static int compare_positions(const void *a, const void *b)
 	return order ? order : x->vertex < y->vertex ? -1 : x->vertex > y->vertex;
 }
 
-static bool weld(struct displace_grid *g, const struct mesh *base, struct arena *arena)
+static bool weld_positions(struct displace_grid *g, const struct mesh *base, struct arena *arena)
 {
 	uint32_t n = base->vertex_count;
 	struct position *sorted = arena_alloc(arena, n, sizeof *sorted);
@@ -91,7 +91,7 @@ bool displace_grid_init(struct displace_grid *g, const struct mesh *base, uint32
 {
 	*g = (struct displace_grid){
 		.parts = parts, .base_vertices = base->vertex_count, .index = (const uint32_t(*)[3])base->index};
-	if (!weld(g, base, arena) || (parts > 1 && !number_edges(g, base, arena)))
+	if (!weld_positions(g, base, arena) || (parts > 1 && !number_edges(g, base, arena)))
 		return false;
 	uint64_t inner = parts - 1, inside = parts > 2 ? inner * (parts - 2) / 2 : 0;
 	g->border = base->vertex_count + g->vertex_edges * inner;

@@ -58,7 +58,7 @@ static int read_accessor(struct accessor *a, const struct scene_node *n, const c
 	return 0;
 }
 
-static uint32_t whole(const struct accessor *a, uint64_t i, unsigned component)
+static uint32_t index_component(const struct accessor *a, uint64_t i, unsigned component)
 {
 	const unsigned char *p = a->at + i * a->stride + types[a->type].size * component;
 	return (uint32_t)get_bytes(p, (int)types[a->type].size);
@@ -66,7 +66,7 @@ static uint32_t whole(const struct accessor *a, uint64_t i, unsigned component)
 
 static double read_number(const struct accessor *a, uint64_t i, unsigned component)
 {
-	uint32_t bits = whole(a, i, component);
+	uint32_t bits = index_component(a, i, component);
 	float x;
 	if (a->type != F32)
 		return bits / (a->type == U8 ? 255.0 : 65535.0);
@@ -115,7 +115,7 @@ static int fill_mesh(struct mesh *m, const struct scene_node *n, const struct ac
 	for (uint32_t t = 0; t < m->triangle_count; t++)
 		for (unsigned k = 0; k < 3; k++) {
 			uint64_t c = corner_of(mode, t, k);
-			uint64_t v = index ? whole(index, c, 0) : c;
+			uint64_t v = index ? index_component(index, c, 0) : c;
 			if (v >= m->vertex_count)
 				return node_error(n, e, EINVAL, "index %llu is out of range; there are %u vertices",
 						  (unsigned long long)v, m->vertex_count);

@@ -16,8 +16,8 @@ const struct shape_ops *const shape_registry[] = {
 	NULL,
 };
 
-static int finish(struct shape_geometry *out, const struct scene_node *n, struct arena *arena, uint64_t *dropped,
-		  struct error *e)
+static int finish_shape(struct shape_geometry *out, const struct scene_node *n, struct arena *arena, uint64_t *dropped,
+			struct error *e)
 {
 	struct mesh_finish f = {
 		out->placed ? mat4_identity() : node_transform(n, "to_world"), node_bool(n, "flip_normals", false),
@@ -38,7 +38,7 @@ int shape_curve_mesh(struct shape_geometry *g, const struct scene_node *n, struc
 	if (rc)
 		return node_error(n, e, -rc, "out of memory");
 	*g = (struct shape_geometry){.kind = SHAPE_MESH, .mesh = mesh, .placed = true, .made_here = true};
-	return finish(g, n, arena, dropped, e);
+	return finish_shape(g, n, arena, dropped, e);
 }
 
 int shape_build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
@@ -52,5 +52,5 @@ int shape_build(const struct scene_node *n, const struct asset_source *assets, s
 	if (!*ops || !(*ops)->build)
 		return node_error(n, e, ENOTSUP, "\"%s\" is not a shape that is supported", n->type);
 	int r = (*ops)->build(n, assets, arena, out, e);
-	return r || out->kind != SHAPE_MESH ? r : finish(out, n, arena, dropped, e);
+	return r || out->kind != SHAPE_MESH ? r : finish_shape(out, n, arena, dropped, e);
 }

@@ -41,7 +41,7 @@ static bool same_place(const struct corner *a, const struct corner *b)
 	return memcmp(a->key, b->key, sizeof a->key) == 0;
 }
 
-static void gather(struct smoothing *s)
+static void gather_normals(struct smoothing *s)
 {
 	const struct mesh *m = s->m;
 	for (uint32_t i = 0; i < m->triangle_count; i++) {
@@ -161,7 +161,7 @@ int mesh_smooth(struct mesh *m, double degrees, struct arena *arena, const struc
 	    !mesh_alloc(&s.out, (uint32_t)corners, triangles, false, m->uv != NULL, arena)) {
 		r = node_error(n, e, ENOMEM, "out of memory");
 	} else {
-		gather(&s);
+		gather_normals(&s);
 		s.out.vertex_count = 0;
 		if (!share_all(&s))
 			r = node_error(

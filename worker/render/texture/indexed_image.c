@@ -62,7 +62,7 @@ static bool find_numbers(struct number_table *t, const float *x, size_t count)
 	return true;
 }
 
-static size_t places(const struct image *i)
+static size_t number_count(const struct image *i)
 {
 	return (size_t)i->width * i->height * i->channels;
 }
@@ -107,7 +107,7 @@ static int make_indices(const struct number_table *t, const float *x, size_t cou
 
 int indexed_image_make(const struct image *from, struct arena *arena, struct indexed_image *out, struct error *e)
 {
-	size_t count = places(from);
+	size_t count = number_count(from);
 	struct number_table t = {.slots = 4};
 	*out = (struct indexed_image){.width = from->width, .height = from->height, .channels = from->channels};
 	while (t.slots < 2 * NUMBERS_MAX && t.slots < 2 * count)

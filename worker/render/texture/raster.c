@@ -164,7 +164,7 @@ static void eval_nearest(const struct raster *r, double u, double v, double rgb[
 	texel(r, nearest(u, r->image.width, r->wrap_u), nearest(v, r->image.height, r->wrap_v), rgb);
 }
 
-static double between(const struct corners *q, int k)
+static double interpolate(const struct corners *q, int k)
 {
 	return (1 - q->fy) * ((1 - q->fx) * q->c[0][k] + q->fx * q->c[1][k]) +
 	       q->fy * ((1 - q->fx) * q->c[2][k] + q->fx * q->c[3][k]);
@@ -179,7 +179,7 @@ void raster_eval(const struct raster *r, double u, double v, double rgb[3])
 	}
 	find_corners(r, u, v, &q);
 	for (int k = 0; k < 3; k++)
-		rgb[k] = between(&q, k);
+		rgb[k] = interpolate(&q, k);
 }
 
 /* Pixels per unit of u; negative if the image is mirrored. */
@@ -201,7 +201,7 @@ void raster_patch(const struct raster *r, double u, double v, struct raster_patc
 	double su = pixels_per_unit(u, r->image.width, r->wrap_u), sv = pixels_per_unit(v, r->image.height, r->wrap_v);
 	for (int k = 0; k < 3; k++) {
 		double top = q.c[1][k] - q.c[0][k], bottom = q.c[3][k] - q.c[2][k];
-		out->x[k] = between(&q, k);
+		out->x[k] = interpolate(&q, k);
 		out->du[k] = su * ((1 - q.fy) * top + q.fy * bottom);
 		out->dv[k] = sv * ((1 - q.fx) * (q.c[2][k] - q.c[0][k]) + q.fx * (q.c[3][k] - q.c[1][k]));
 		out->duv[k] = su * sv * (bottom - top);

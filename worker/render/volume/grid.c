@@ -193,7 +193,7 @@ struct cells {
 };
 
 /* The t at which the ray meets the plane of that number across axis i. */
-static double crossing(const struct cells *c, int i, double plane)
+static double crossing_of_plane(const struct cells *c, int i, double plane)
 {
 	return (plane - c->o[i]) * c->per[i];
 }
@@ -224,7 +224,7 @@ static bool clip_to_box(struct cells *c, const struct grid_ray *r)
 static void find_leave(struct cells *c, int i)
 {
 	int plane = c->step[i] > 0 ? c->block.last[i] + 1 : c->block.first[i];
-	c->leave[i] = c->step[i] ? crossing(c, i, plane) : INFINITY;
+	c->leave[i] = c->step[i] ? crossing_of_plane(c, i, plane) : INFINITY;
 }
 
 /* The block around a cell that is outside of the points or in an empty brick; `within` is the nearest one inside. */

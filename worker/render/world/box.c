@@ -18,7 +18,7 @@ double box_extent(const struct box *b)
 }
 
 /* Between two planes across an axis: narrows [t[0], t[1]]. */
-static bool between(double low, double high, double p, double d, double t[2])
+static bool clip_to_slab(double low, double high, double p, double d, double t[2])
 {
 	if (d == 0)
 		return p >= low && p <= high;
@@ -31,6 +31,6 @@ static bool between(double low, double high, double p, double d, double t[2])
 bool box_is_met(const struct box *b, vec3 p, vec3 d, double t_max)
 {
 	double t[2] = {0, t_max};
-	return b->low.x <= b->high.x && between(b->low.x, b->high.x, p.x, d.x, t) &&
-	       between(b->low.y, b->high.y, p.y, d.y, t) && between(b->low.z, b->high.z, p.z, d.z, t);
+	return b->low.x <= b->high.x && clip_to_slab(b->low.x, b->high.x, p.x, d.x, t) &&
+	       clip_to_slab(b->low.y, b->high.y, p.y, d.y, t) && clip_to_slab(b->low.z, b->high.z, p.z, d.z, t);
 }

@@ -47,7 +47,7 @@ static const char *names_of(const struct tally *t, char text[NAMES_MAX])
 	return text;
 }
 
-static const char *verb(const struct tally *t, const char *one, const char *many)
+static const char *verb_of(const struct tally *t, const char *one, const char *many)
 {
 	return t->count == 1 ? one : many;
 }
@@ -231,7 +231,7 @@ static void colour(struct report *r, const struct census *c)
 	fx->illuminant = c->shape[COLOR_SHAPE_CONSTANT] ? COLOR_SHAPE_CONSTANT : COLOR_SHAPE_D65;
 	if (c->coloured.count)
 		fx->colour = line(r, EFFECT_COLOUR, called, "%s var%s with wavelength", names_of(&c->coloured, text),
-				  verb(&c->coloured, "ies", "y"));
+				  verb_of(&c->coloured, "ies", "y"));
 	else if (c->coloured_light.count)
 		fx->colour = line(r, EFFECT_COLOUR, called, "the light of %s is coloured",
 				  names_of(&c->coloured_light, text));
@@ -267,15 +267,15 @@ static void dispersion(struct report *r, const struct census *c, bool rgb)
 	else if (called)
 		on = line(r, EFFECT_DISPERSION, true,
 			  "the index of %s varies with wavelength: paths that meet %s carry one", name,
-			  verb(t, "it", "them"));
+			  verb_of(t, "it", "them"));
 	else if (t == &c->hidden_dispersive)
-		on = line(r, EFFECT_DISPERSION, false, "%s disperse%s, but %s", name, verb(t, "s", ""),
+		on = line(r, EFFECT_DISPERSION, false, "%s disperse%s, but %s", name, verb_of(t, "s", ""),
 			  hidden_because(c->why_hidden));
 	else if (t == &c->unused_dispersive)
-		on = line(r, EFFECT_DISPERSION, false, "%s disperse%s, but no shape uses %s", name, verb(t, "s", ""),
-			  verb(t, "it", "them"));
+		on = line(r, EFFECT_DISPERSION, false, "%s disperse%s, but no shape uses %s", name, verb_of(t, "s", ""),
+			  verb_of(t, "it", "them"));
 	else if (t->count)
-		on = line(r, EFFECT_DISPERSION, false, "%s %s constant eta", name, verb(t, "has", "have"));
+		on = line(r, EFFECT_DISPERSION, false, "%s %s constant eta", name, verb_of(t, "has", "have"));
 	else
 		on = line(r, EFFECT_DISPERSION, false, "no material refracts");
 	r->fx->dispersion = on;
@@ -296,11 +296,11 @@ static void spectral(struct report *r, const struct census *c, bool rgb)
 }
 
 /* A line that names what has something, or another sentence. */
-static bool tallied(struct report *r, enum effect which, const struct tally *t, const char *one, const char *many,
-		    const char *none)
+static bool add_tally_line(struct report *r, enum effect which, const struct tally *t, const char *one,
+			   const char *many, const char *none)
 {
 	char text[NAMES_MAX];
-	return t->count ? line(r, which, true, "%s %s", names_of(t, text), verb(t, one, many))
+	return t->count ? line(r, which, true, "%s %s", names_of(t, text), verb_of(t, one, many))
 			: line(r, which, false, "%s", none);
 }
 
@@ -310,7 +310,7 @@ static bool materials(struct report *r, enum effect which, const struct tally *t
 {
 	char text[NAMES_MAX];
 	if (t->count)
-		return line(r, which, true, "%s %s", names_of(t, text), verb(t, one, many));
+		return line(r, which, true, "%s %s", names_of(t, text), verb_of(t, one, many));
 	return line(r, which, false, "no material that light meets %s", none);
 }
 
@@ -322,7 +322,7 @@ static void lobes(struct report *r, const struct census *c)
 		char text[NAMES_MAX];
 		fx->specular =
 			line(r, EFFECT_SPECULAR, false, "%s %s specular, but %s", names_of(&c->hidden_specular, text),
-			     verb(&c->hidden_specular, "is", "are"), hidden_because(c->why_hidden));
+			     verb_of(&c->hidden_specular, "is", "are"), hidden_because(c->why_hidden));
 	} else {
 		fx->specular = materials(r, EFFECT_SPECULAR, &c->specular, "has exactly specular lobes",
 					 "have exactly specular lobes", "has exactly specular lobes");
@@ -342,10 +342,10 @@ static void lobes(struct report *r, const struct census *c)
 		  "is diffuse only");
 	materials(r, EFFECT_TRANSMISSION, &c->transmission, "lets light through", "let light through",
 		  "lets it through");
-	fx->absorption = tallied(r, EFFECT_ABSORPTION, &c->absorbing, "borders on a medium that absorbs",
-				 "border on a medium that absorbs", "no medium absorbs");
-	fx->scattering = tallied(r, EFFECT_SCATTERING, &c->scattering, "borders on a medium that scatters",
-				 "border on a medium that scatters", "no medium scatters");
+	fx->absorption = add_tally_line(r, EFFECT_ABSORPTION, &c->absorbing, "borders on a medium that absorbs",
+					"border on a medium that absorbs", "no medium absorbs");
+	fx->scattering = add_tally_line(r, EFFECT_SCATTERING, &c->scattering, "borders on a medium that scatters",
+					"border on a medium that scatters", "no medium scatters");
 }
 
 static void surfaces(struct report *r, const struct census *c, const struct world *w, const struct effects_source *src)
@@ -368,7 +368,7 @@ static void surfaces(struct report *r, const struct census *c, const struct worl
 		}
 	if (t.count)
 		line(r, EFFECT_DISPLACEMENT, true, "%s %s displaced: %llu triangles", names_of(&t, text),
-		     verb(&t, "is", "are"), (unsigned long long)triangles);
+		     verb_of(&t, "is", "are"), (unsigned long long)triangles);
 	else
 		line(r, EFFECT_DISPLACEMENT, false, "no shape is displaced");
 	static const enum effect absent[] = {EFFECT_BUMP, EFFECT_ALPHA};
@@ -390,7 +390,7 @@ static void surfaces(struct report *r, const struct census *c, const struct worl
 		count(&moving, src->sensor, "");
 	if (moving.count)
 		r->fx->motion = line(r, EFFECT_MOTION, true, "%s move%s while the shutter is open",
-				     names_of(&moving, text), verb(&moving, "s", ""));
+				     names_of(&moving, text), verb_of(&moving, "s", ""));
 	else
 		r->fx->motion = line(r, EFFECT_MOTION, false, "%s",
 				     w->settings.shutter_open < w->settings.shutter_close
@@ -414,7 +414,7 @@ static void emitter_moves(struct report *r, const struct census *c)
 	if (called)
 		r->fx->emitter_move = line(r, EFFECT_EMITTER_MOVE, true, "%s %s many points or directions",
 					   names_of(c->area.count ? &c->area : &c->environment, text),
-					   verb(c->area.count ? &c->area : &c->environment, "has", "have"));
+					   verb_of(c->area.count ? &c->area : &c->environment, "has", "have"));
 	else
 		r->fx->emitter_move = line(r, EFFECT_EMITTER_MOVE, false,
 					   c->delta.count     ? "all emitters are single points or directions"
@@ -465,15 +465,15 @@ void effects_analyse(struct world *w, const struct effects_source *src, const st
 	emitter_moves(&r, &c);
 	lobes(&r, &c);
 	surfaces(&r, &c, w, src);
-	tallied(&r, EFFECT_ENVIRONMENT, &c.environment, "shines on everything that escapes", "",
-		"rays that escape meet nothing");
-	tallied(&r, EFFECT_AREA_LIGHT, &c.area, "shines from its surface", "shine from their surfaces",
-		"no surface shines");
-	tallied(&r, EFFECT_DELTA_LIGHT, &c.delta, "is a point or parallel light, which no path hits by chance",
-		"are points or parallel light, which no path hits by chance",
-		"no emitter is a point or parallel light");
-	fx->medium_light = tallied(&r, EFFECT_MEDIUM_LIGHT, &c.shining, "borders on a medium that shines",
-				   "border on a medium that shines", "no medium shines");
+	add_tally_line(&r, EFFECT_ENVIRONMENT, &c.environment, "shines on everything that escapes", "",
+		       "rays that escape meet nothing");
+	add_tally_line(&r, EFFECT_AREA_LIGHT, &c.area, "shines from its surface", "shine from their surfaces",
+		       "no surface shines");
+	add_tally_line(&r, EFFECT_DELTA_LIGHT, &c.delta, "is a point or parallel light, which no path hits by chance",
+		       "are points or parallel light, which no path hits by chance",
+		       "no emitter is a point or parallel light");
+	fx->medium_light = add_tally_line(&r, EFFECT_MEDIUM_LIGHT, &c.shining, "borders on a medium that shines",
+					  "border on a medium that shines", "no medium shines");
 	fx->scattering = fx->scattering || fx->medium_light;
 	fx->transparent_shadows = shadows(&r, EFFECT_TRANSPARENT_SHADOWS, &c.straight,
 					  "where media scatter or shine, connections look through `null` alone",

@@ -24,7 +24,7 @@ static enum effect find(const char *name, size_t length)
 	return (enum effect)i;
 }
 
-static int unknown(const char *name, size_t length, struct error *e)
+static int refuse_unknown(const char *name, size_t length, struct error *e)
 {
 	char wanted[64], hint[96], list[384] = "";
 	snprintf(wanted, sizeof wanted, "%.*s", (int)length, name);
@@ -58,7 +58,7 @@ static int parse_item(const char *item, size_t length, struct effects_choice *ou
 	}
 	enum effect which = find(item + 1, length - 1);
 	if (which == EFFECTS)
-		return unknown(item + 1, length - 1, e);
+		return refuse_unknown(item + 1, length - 1, e);
 	const struct effect_decl *d = &effect_table[which];
 	bool on = *item == '+';
 	if (!(d->may & (on ? EFFECT_MAY_FORCE_ON : EFFECT_MAY_FORCE_OFF)))

@@ -212,7 +212,7 @@ static void choose_for_light(struct world *w, const struct maker *m)
 				      : 0;
 }
 
-static int make(struct world *w, struct arena *scratch, uint32_t parts, uint32_t most)
+static int build_choice(struct world *w, struct arena *scratch, uint32_t parts, uint32_t most)
 {
 	struct emitter_points points;
 	int rc = emitter_points_find(w, most, scratch, &points);
@@ -249,7 +249,7 @@ int emitter_choice_make(struct world *w)
 	most = most < pixels ? most : (uint32_t)pixels;
 	most = most > POINTS_MOST ? POINTS_MOST : most < POINTS_LEAST ? POINTS_LEAST : most;
 	struct arena scratch = {0};
-	int rc = make(w, &scratch, parts, most);
+	int rc = build_choice(w, &scratch, parts, most);
 	arena_fini(&scratch);
 	return rc;
 }

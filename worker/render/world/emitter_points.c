@@ -60,7 +60,7 @@ static bool lets_light_through(const struct world *w, uint32_t shape)
 }
 
 /* Whether light arrives along a straight line, not bent by what it passes. */
-static bool arrives(const struct finder *f, const struct point *x, const struct target *y)
+static bool is_lit(const struct finder *f, const struct point *x, const struct target *y)
 {
 	const struct world *w = f->w;
 	struct ray_end from = {x->p, x->ng, x->prim};
@@ -108,8 +108,8 @@ static bool draw_point(const struct world *w, uint32_t part, const struct emitte
 }
 
 /* What the part would bring to x if nothing were between. */
-static double offer(const struct world *w, uint32_t part, const struct point *x, const double u[2],
-		    const struct wavelengths *wl, struct target *to)
+static double unoccluded_light(const struct world *w, uint32_t part, const struct point *x, const double u[2],
+			       const struct wavelengths *wl, struct target *to)
 {
 	struct emitter_room room;
 	const struct emitter *em = world_emitter(w, emitter_of_part(w, part), x->prim.time, &room);
@@ -137,7 +137,7 @@ static uint32_t greatest_untested(const struct offer *o, uint32_t n)
 }
 
 /* The numbers of one point or step; `use` counts from 0. */
-static void numbers(uint64_t walk, uint64_t step, uint64_t use, double u[4])
+static void draw_numbers(uint64_t walk, uint64_t step, uint64_t use, double u[4])
 {
 	rng_uniform4(0, RNG_EMITTERS, walk, step, use, u);
 }
@@ -147,17 +147,17 @@ static void add(struct finder *f, const struct point *x, uint64_t walk, uint64_t
 {
 	const struct world *w = f->w;
 	double u[4], arrived = 0, sum = 0;
-	numbers(walk, step, 1, u);
+	draw_numbers(walk, step, 1, u);
 	const struct wavelengths wl = world_wavelengths(w, u[2]);
 	for (uint32_t i = 0; i < f->parts; i++)
-		f->offers[i] = (struct offer){offer(w, i, x, u, &wl, &f->targets[i]), false};
+		f->offers[i] = (struct offer){unoccluded_light(w, i, x, u, &wl, &f->targets[i]), false};
 	for (int n = 0; n < TESTS; n++) {
 		uint32_t i = greatest_untested(f->offers, f->parts);
 		if (i == UINT32_MAX || f->offers[i].light < FAINT * arrived)
 			break;
 		f->offers[i].tested = true;
 		f->rays++;
-		if (arrives(f, x, &f->targets[i]))
+		if (is_lit(f, x, &f->targets[i]))
 			arrived += f->offers[i].light;
 		else
 			f->offers[i].light = 0;
@@ -188,8 +188,8 @@ static bool leave_camera(const struct world *w, uint64_t walk, struct step *s)
 	const struct scene_settings *set = &w->settings;
 	struct camera room;
 	double u[4], v[4];
-	numbers(walk, 0, 0, u);
-	numbers(walk, 0, 2, v);
+	draw_numbers(walk, 0, 0, u);
+	draw_numbers(walk, 0, 2, v);
 	const struct camera *c = camera_at(&w->camera, u[2], &room);
 	double x = set->crop_x + u[0] * scene_settings_width(set), y = set->crop_y + u[1] * scene_settings_height(set);
 	if (!camera_has(c, x, y))
@@ -221,14 +221,14 @@ static vec3 scattered(const struct bsdf *b, vec3 d, vec3 n, const double u[4])
 static void add_in_medium(struct finder *f, const struct step *s, double distance, uint64_t walk, uint64_t step)
 {
 	double u[4];
-	numbers(walk, step, 2, u);
+	draw_numbers(walk, step, 2, u);
 	const struct point x = {.p = vec3_madd(s->from.p, s->t_min + u[0] * (distance - s->t_min), s->d),
 				.prim = prim_none_at(s->from.prim.time)};
 	add(f, &x, walk, STEPS + step);
 }
 
 /* Goes to the next surface, which leaves a point if it scatters: *points is counted. false: the walk ends. */
-static bool advance(struct finder *f, struct step *s, uint64_t walk, uint64_t number, int *points)
+static bool step_to_surface(struct finder *f, struct step *s, uint64_t walk, uint64_t number, int *points)
 {
 	const struct world *w = f->w;
 	struct ray_hit hit;
@@ -247,7 +247,7 @@ static bool advance(struct finder *f, struct step *s, uint64_t walk, uint64_t nu
 		add(f, &x, walk, number);
 		++*points;
 	}
-	numbers(walk, number, 0, u);
+	draw_numbers(walk, number, 0, u);
 	if (!part->passable)
 		s->d = scattered(b, s->d, n, u);
 	s->from = (struct ray_end){at.p, at.ng, hit.prim};
@@ -274,7 +274,7 @@ int emitter_points_find(const struct world *w, uint32_t most, struct arena *aren
 		if (!leave_camera(w, walk, &s))
 			continue;
 		for (uint64_t n = 1; n <= STEPS && points < POINTS; n++)
-			if (!advance(&f, &s, walk, n, &points))
+			if (!step_to_surface(&f, &s, walk, n, &points))
 				break;
 	}
 	return 0;

@@ -53,7 +53,7 @@ static struct surface_point point_on(const struct geom_shape *s, struct prim_ref
 	return x;
 }
 
-static void pass(struct spread *s, double area, struct prim_ref prim)
+static void place_points(struct spread *s, double area, struct prim_ref prim)
 {
 	struct world *w = s->w;
 	s->area += area;
@@ -73,15 +73,15 @@ static void pass_shape(struct spread *s, uint32_t i)
 	const struct geom_shape *g = &s->w->shapes[i];
 	struct prim_ref prim = {i, 0, 0.5};
 	if (g->is_sphere) {
-		pass(s, 4 * M_PI * g->radius * g->radius, prim);
+		place_points(s, 4 * M_PI * g->radius * g->radius, prim);
 		return;
 	}
 	const uint32_t stride = 1 + (g->triangle_count > 0 ? (g->triangle_count - 1) / s->triangles : 0);
 	for (prim.prim = stride / 2; prim.prim < g->triangle_count; prim.prim += stride)
-		pass(s, stride * triangle_area(g, prim), prim);
+		place_points(s, stride * triangle_area(g, prim), prim);
 }
 
-static bool refracts(const struct world *w, uint32_t shape)
+static bool is_refracting(const struct world *w, uint32_t shape)
 {
 	return !w->shapes[shape].curves && bsdf_refracts(&w->bsdfs[w->parts[shape].bsdf]);
 }
@@ -90,7 +90,7 @@ static void pass_all(struct spread *s)
 {
 	s->area = 0;
 	for (uint32_t i = 0; i < s->w->shape_count; i++)
-		if (refracts(s->w, i))
+		if (is_refracting(s->w, i))
 			pass_shape(s, i);
 }
 
@@ -99,7 +99,7 @@ int refracting_points_make(struct world *w)
 	struct spread s = {.w = w, .step = 0};
 	uint32_t shapes = 0;
 	for (uint32_t i = 0; i < w->shape_count; i++)
-		shapes += refracts(w, i);
+		shapes += is_refracting(w, i);
 	if (!shapes)
 		return 0;
 	s.triangles = TRIANGLES / shapes > TRIANGLES_LEAST ? TRIANGLES / shapes : TRIANGLES_LEAST;
