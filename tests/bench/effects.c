@@ -67,7 +67,7 @@ static void add(const char *effect, const char *what, double value, const char *
 	bench_single(name, value, unit, BENCH_INFORMS, 0);
 }
 
-static void cost(const char *bin, size_t i)
+static void measure_effect(const char *bin, size_t i)
 {
 	char how[512];
 	const char *effect = rows[i].effect;
@@ -101,7 +101,7 @@ static void by_hand(const char *bin)
 }
 
 /* Colour, dispersion and aperture off, against a renderer without a question about them. */
-static void unknown(const char *bin)
+static void measure_questions(const char *bin)
 {
 	static const struct {
 		const char *name, *how;
@@ -131,8 +131,8 @@ void bench_effects(const char *bin)
 		bench_skip("valgrind is not installed");
 		return;
 	}
-	unknown(bin);
+	measure_questions(bin);
 	by_hand(bin);
 	for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
-		cost(bin, i);
+		measure_effect(bin, i);
 }

@@ -106,7 +106,7 @@ static struct plan_request request_of(const struct world *w, const struct method
 }
 
 /* What the default renders with, and what it costs to find out. */
-static void choose(const struct world *w, struct plan_request *r, struct shot *out)
+static void choose_integrator(const struct world *w, struct plan_request *r, struct shot *out)
 {
 	struct error e;
 	struct render_choice choice;
@@ -116,7 +116,7 @@ static void choose(const struct world *w, struct plan_request *r, struct shot *o
 	out->pilot = bench_cpu_seconds() - begin;
 }
 
-static void shoot(const struct world *w, const struct method *m, uint64_t spp, uint64_t seed, struct shot *out)
+static void render_shot(const struct world *w, const struct method *m, uint64_t spp, uint64_t seed, struct shot *out)
 {
 	struct error e;
 	struct render_summary s;
@@ -126,7 +126,7 @@ static void shoot(const struct world *w, const struct method *m, uint64_t spp, u
 	world_summary(w, &s);
 	out->pilot = 0;
 	if (!face) {
-		choose(w, &r, out);
+		choose_integrator(w, &r, out);
 		face = render_integrator_find(r.integrator);
 	} else if (face->has_mutations && render_mutations(m->mutations, &s, r.mixture, &e)) {
 		bench_die(&e);
@@ -147,7 +147,7 @@ static uint64_t shoot_for(const struct world *w, const struct method *m, double 
 			  struct shot *out)
 {
 	for (uint64_t spp = 1;;) {
-		shoot(w, m, spp, seed, out);
+		render_shot(w, m, spp, seed, out);
 		if (out->cpu > 0.85 * seconds)
 			return spp;
 		/* The bootstrap and what a round costs: only a run that is not much shorter tells. */
@@ -202,7 +202,7 @@ static void make_half(const struct world *w, const struct trial_scene *s, double
 	mkdir("build/bench-references", 0777);
 	snprintf(path, sizeof path, "build/bench-references/%s-%ux%u-%.0fs-%u", s->name, s->width, s->height, seconds,
 		 half);
-	shoot(w, by, 1, REFERENCE_SEED, &shot); /* for its size */
+	render_shot(w, by, 1, REFERENCE_SEED, &shot); /* for its size */
 	if (!read_reference(path, &shot.image)) {
 		canvas_image_fini(&shot.image);
 		shoot_for(w, by, seconds, REFERENCE_SEED + half, &shot);
@@ -363,7 +363,7 @@ static void take_shot(const struct world *w, const struct method *m, double seco
 	if (!out->spp)
 		out->spp = shoot_for(w, m, seconds, 1 + k, &shot);
 	else
-		shoot(w, m, out->spp, 1 + k, &shot);
+		render_shot(w, m, out->spp, 1 + k, &shot);
 	out->cpu[k] = shot.cpu;
 	for (int t = 0; t < KINDS; t++)
 		out->value[t][k] = shot.cpu * error_by_reference(&shot.image, by, t == KNOWN ? by->known : by->scale,
@@ -385,7 +385,7 @@ static void take_default(const struct world *w, double seconds, unsigned seeds, 
 	struct shot shot;
 	for (size_t i = DEFAULT + 1; i < count && i < BREAKUP; i++) {
 		struct plan_request r = request_of(w, &methods[DEFAULT], of[i].spp, 1 + k);
-		choose(w, &r, &shot);
+		choose_integrator(w, &r, &shot);
 		if (strcmp(r.integrator, methods[i].integrator) != 0)
 			continue;
 		double times = (of[i].cpu[k] + shot.pilot) / of[i].cpu[k];
@@ -478,7 +478,7 @@ static void compare_all(const struct world *w, const struct trial_scene *s, doub
 }
 
 /* A whole number of the environment, within 1 and most; else the default. */
-static unsigned asked(const char *name, unsigned usual, unsigned most)
+static unsigned env_count(const char *name, unsigned usual, unsigned most)
 {
 	const char *text = getenv(name);
 	long n = text ? atol(text) : 0;
@@ -523,9 +523,9 @@ void bench_equal_time(const char *bin)
 	(void)bin;
 	const char *time = getenv("HSLT_BENCH_SECONDS"), *only = getenv("HSLT_BENCH_SCENE"),
 		   *random = getenv("HSLT_BENCH_RANDOM");
-	const struct lengths l = {time ? atof(time) : 10, asked("HSLT_BENCH_SEEDS", 5, SEEDS_MOST),
-				  asked("HSLT_BENCH_METHODS", METHODS, METHODS),
-				  asked("HSLT_BENCH_REFERENCE", REFERENCE_TIMES, REFERENCE_MOST)};
+	const struct lengths l = {time ? atof(time) : 10, env_count("HSLT_BENCH_SEEDS", 5, SEEDS_MOST),
+				  env_count("HSLT_BENCH_METHODS", METHODS, METHODS),
+				  env_count("HSLT_BENCH_REFERENCE", REFERENCE_TIMES, REFERENCE_MOST)};
 	if (random) {
 		run_random(random, &l);
 		return;

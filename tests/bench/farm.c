@@ -245,7 +245,7 @@ static void send_once(const char *bin)
 }
 
 /* All programs are there; says which is missing. */
-static bool ready(const char *bin)
+static bool has_programs(const char *bin)
 {
 	static const char *const needed[] = {"hslt-coordinator", "hslt-worker", "hslt-submit", "hslt-render"};
 	for (size_t i = 0; i < sizeof needed / sizeof *needed; i++)
@@ -261,14 +261,14 @@ static bool ready(const char *bin)
 void bench_sending(const char *bin)
 {
 	bench_group("sending", "hslt-submit and hslt-coordinator on loopback: a scene submitted twice");
-	if (ready(bin))
+	if (has_programs(bin))
 		send_once(bin);
 }
 
 void bench_farm(const char *bin)
 {
 	bench_group("farm", "real processes on loopback, pssmlt");
-	if (!ready(bin))
+	if (!has_programs(bin))
 		return;
 	cpu_per_mutation(bin);
 	two_workers(bin);
@@ -277,7 +277,7 @@ void bench_farm(const char *bin)
 void bench_memory(const char *bin)
 {
 	bench_group("memory", "resident sizes of real processes");
-	if (!ready(bin))
+	if (!has_programs(bin))
 		return;
 	coordinator_memory(bin);
 	worker_memory(bin);

@@ -117,7 +117,7 @@ static const struct {
 	{"sharing", bench_sharing, false}, {"sending", bench_sending, false},
 };
 
-static bool chosen(const char *name, bool when_named, char **names, int count)
+static bool is_chosen(const char *name, bool when_named, char **names, int count)
 {
 	for (int i = 0; i < count; i++)
 		if (strcmp(names[i], name) == 0)
@@ -138,7 +138,7 @@ int main(int argc, char **argv)
 	rows = json_array();
 	skipped = json_array();
 	for (size_t k = 0; k < sizeof benches / sizeof *benches; k++)
-		if (chosen(benches[k].name, benches[k].when_named, argv + i, argc - i))
+		if (is_chosen(benches[k].name, benches[k].when_named, argv + i, argc - i))
 			benches[k].run(bin);
 	printf("\n%u target%s missed\n", missed, missed == 1 ? "" : "s");
 	json_t *all = json_pack("{s:i, s:o, s:o}", "schema", 1, "rows", rows, "skipped", skipped);

@@ -78,7 +78,7 @@ static double to_xyz(const struct setting *s, unsigned i)
 	return xyz[1];
 }
 
-static double splat(const struct setting *s, unsigned i)
+static double time_splat(const struct setting *s, unsigned i)
 {
 	struct splat at = {64 * s->u[i][0], 64 * s->u[i][1], {1, 1, 1}};
 	film_sums_splat(s->film, &at, 1);
@@ -112,7 +112,7 @@ static double bsdf_sampled(const struct setting *s, unsigned i)
 	return b->ops->sample(b, &p, s->wo[i], s->u[i], &out) ? out.pdf : 0;
 }
 
-static void film(struct setting *s, const char *name, enum filter_kind kind, double radius)
+static void time_film(struct setting *s, const char *name, enum filter_kind kind, double radius)
 {
 	struct plan p = {.width = 64, .height = 64, .crop_width = 64, .crop_height = 64};
 	struct scene_settings set = {.filter = kind, .filter_radius = radius, .filter_stddev = 0.5};
@@ -121,11 +121,11 @@ static void film(struct setting *s, const char *name, enum filter_kind kind, dou
 	if (film_sums_init(&sums, &p, &set, &e))
 		bench_die(&e);
 	s->film = &sums;
-	time_part(name, s, splat);
+	time_part(name, s, time_splat);
 	film_sums_fini(&sums);
 }
 
-static void color(struct setting *s)
+static void time_color(struct setting *s)
 {
 	struct error e;
 	struct color c;
@@ -142,7 +142,7 @@ static void color(struct setting *s)
 	time_part("spectrum to XYZ", s, to_xyz);
 }
 
-static void bsdf(struct setting *s, const char *text)
+static void time_bsdf(struct setting *s, const char *text)
 {
 	struct arena arena = {.limit = 1 << 20};
 	struct bsdf_build build = {.arena = &arena, .dialect_3 = true};
@@ -169,16 +169,16 @@ void bench_parts(const char *bin)
 	bench_group("parts", "nanoseconds a call, inputs in cache");
 	time_part("block of 8 random numbers", &s, random_block);
 	time_part("small step of one number", &s, small_step);
-	color(&s);
-	film(&s, "splat, box", FILTER_BOX, 0.5);
-	film(&s, "splat, tent", FILTER_TENT, 1);
-	film(&s, "splat, gaussian", FILTER_GAUSSIAN, 2);
-	bsdf(&s, "diffuse reflectance=rgb(0.8,0.2,0.1)");
-	bsdf(&s, "conductor material=Au");
-	bsdf(&s, "roughconductor material=Au distribution=ggx");
-	bsdf(&s, "roughconductor material=Au");
-	bsdf(&s, "dielectric");
-	bsdf(&s, "roughdielectric distribution=ggx");
-	bsdf(&s, "roughdielectric");
-	bsdf(&s, "phong");
+	time_color(&s);
+	time_film(&s, "splat, box", FILTER_BOX, 0.5);
+	time_film(&s, "splat, tent", FILTER_TENT, 1);
+	time_film(&s, "splat, gaussian", FILTER_GAUSSIAN, 2);
+	time_bsdf(&s, "diffuse reflectance=rgb(0.8,0.2,0.1)");
+	time_bsdf(&s, "conductor material=Au");
+	time_bsdf(&s, "roughconductor material=Au distribution=ggx");
+	time_bsdf(&s, "roughconductor material=Au");
+	time_bsdf(&s, "dielectric");
+	time_bsdf(&s, "roughdielectric distribution=ggx");
+	time_bsdf(&s, "roughdielectric");
+	time_bsdf(&s, "phong");
 }

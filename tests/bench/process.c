@@ -22,7 +22,7 @@ static void end_all(void)
 			kill(running[i], SIGKILL);
 }
 
-static void remember(pid_t before, pid_t after)
+static void replace_running(pid_t before, pid_t after)
 {
 	static bool registered;
 	if (!registered)
@@ -66,10 +66,10 @@ void process_start(struct process *p, const char *bin, const char *log, const ch
 		perror("bench: fork");
 		exit(1);
 	}
-	remember(0, p->pid);
+	replace_running(0, p->pid);
 }
 
-static void reap(struct process *p)
+static void wait_for_end(struct process *p)
 {
 	struct rusage r;
 	int status;
@@ -77,7 +77,7 @@ static void reap(struct process *p)
 		perror("bench: wait4");
 		exit(1);
 	}
-	remember(p->pid, 0);
+	replace_running(p->pid, 0);
 	p->pid = 0;
 	p->cpu_seconds = (double)(r.ru_utime.tv_sec + r.ru_stime.tv_sec) +
 			 1e-6 * (double)(r.ru_utime.tv_usec + r.ru_stime.tv_usec);
@@ -86,7 +86,7 @@ static void reap(struct process *p)
 
 void process_wait(struct process *p)
 {
-	reap(p);
+	wait_for_end(p);
 	if (p->code != 0) {
 		fprintf(stderr, "bench: a program ended with %d\n", p->code);
 		exit(1);
@@ -96,7 +96,7 @@ void process_wait(struct process *p)
 void process_stop(struct process *p)
 {
 	kill(p->pid, SIGTERM);
-	reap(p);
+	wait_for_end(p);
 }
 
 bool process_is_running(const struct process *p)

@@ -27,7 +27,7 @@ static struct sockaddr_in loopback(uint16_t port)
 }
 
 /* The bytes that were passed on; 0: the stream has ended, or the other side is gone. */
-static size_t pass(int from, int to)
+static size_t pass_bytes(int from, int to)
 {
 	char piece[1 << 16];
 	ssize_t n = recv(from, piece, sizeof piece, 0);
@@ -41,7 +41,7 @@ static size_t pass(int from, int to)
 }
 
 /* Until one side hangs up. */
-static void serve(struct relay *r, int client, int coordinator)
+static void serve_connection(struct relay *r, int client, int coordinator)
 {
 	struct pollfd ends[2] = {{client, POLLIN, 0}, {coordinator, POLLIN, 0}};
 	for (;;) {
@@ -49,7 +49,7 @@ static void serve(struct relay *r, int client, int coordinator)
 			return;
 		for (int k = 0; k < 2; k++)
 			if (ends[k].revents) {
-				size_t n = pass(ends[k].fd, ends[!k].fd);
+				size_t n = pass_bytes(ends[k].fd, ends[!k].fd);
 				if (n == 0)
 					return;
 				if (k == 0)
@@ -58,14 +58,14 @@ static void serve(struct relay *r, int client, int coordinator)
 	}
 }
 
-static void *run(void *user)
+static void *run_relay(void *user)
 {
 	struct relay *r = user;
 	struct sockaddr_in to = loopback(r->target);
 	for (int client; (client = accept(r->listener, NULL, NULL)) >= 0; close(client)) {
 		int coordinator = socket(AF_INET, SOCK_STREAM, 0);
 		if (coordinator >= 0 && connect(coordinator, (struct sockaddr *)&to, sizeof to) == 0)
-			serve(r, client, coordinator);
+			serve_connection(r, client, coordinator);
 		if (coordinator >= 0)
 			close(coordinator);
 	}
@@ -80,7 +80,7 @@ struct relay *relay_start(uint16_t target, uint16_t *port)
 	r->listener = socket(AF_INET, SOCK_STREAM, 0);
 	r->target = target;
 	if (r->listener < 0 || bind(r->listener, (struct sockaddr *)&at, size) || listen(r->listener, 8) ||
-	    getsockname(r->listener, (struct sockaddr *)&at, &size) || pthread_create(&r->thread, NULL, run, r)) {
+	    getsockname(r->listener, (struct sockaddr *)&at, &size) || pthread_create(&r->thread, NULL, run_relay, r)) {
 		perror("bench: relay");
 		exit(1);
 	}

@@ -123,7 +123,7 @@ static RTCScene new_scene(RTCDevice device)
 	return scene;
 }
 
-static void attach(RTCScene scene, RTCGeometry g)
+static void attach_geometry(RTCScene scene, RTCGeometry g)
 {
 	rtcCommitGeometry(g);
 	rtcAttachGeometry(scene, g);
@@ -138,7 +138,7 @@ static void add_sphere(RTCDevice device, RTCScene scene, vec3 center, double rad
 	v[1] = (float)center.y;
 	v[2] = (float)center.z;
 	v[3] = (float)radius;
-	attach(scene, g);
+	attach_geometry(scene, g);
 }
 
 static void add_triangles(RTCDevice device, RTCScene scene, const struct geom_shape *s)
@@ -148,7 +148,7 @@ static void add_triangles(RTCDevice device, RTCScene scene, const struct geom_sh
 				   sizeof s->position[0], s->vertex_count);
 	rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, s->index, 0, sizeof s->index[0],
 				   s->triangle_count);
-	attach(scene, g);
+	attach_geometry(scene, g);
 }
 
 static void make_raw_scene(const struct world *w, struct subject_scene *raw)

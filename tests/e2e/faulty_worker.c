@@ -88,7 +88,7 @@ static bool is_due(enum fault f)
 	return every[f] && (lease - 1) % every[f] == 0;
 }
 
-static void rest(double seconds, const atomic_bool *stop)
+static void sleep_unless_stopped(double seconds, const atomic_bool *stop)
 {
 	for (double until = clock_seconds() + seconds; clock_seconds() < until && !atomic_load(stop); tick())
 		usleep(1000);
@@ -106,7 +106,7 @@ int __wrap_render_lease(const struct world *w, const struct plan *p, const struc
 	double start = clock_seconds();
 	int result = __real_render_lease(w, p, k, in, stop, end, out, e);
 	if (every[SLOW])
-		rest((double)(every[SLOW] - 1) * (clock_seconds() - start), stop);
+		sleep_unless_stopped((double)(every[SLOW] - 1) * (clock_seconds() - start), stop);
 	return result;
 }
 

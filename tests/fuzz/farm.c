@@ -28,7 +28,7 @@
 
 const char farm_scene[] = "<scene version=\"3.0.0\"/>";
 
-static void need(bool ok, const char *what)
+static void require(bool ok, const char *what)
 {
 	if (!ok) {
 		fprintf(stderr, "the world of the fuzzer cannot be made: %s\n", what);
@@ -132,7 +132,7 @@ struct farm_world *farm_world_new(void)
 	snprintf(w->spool, sizeof w->spool, "%s/%u", folders_base(), count++);
 	farm_spool_copy(w->spool);
 	int rc = farm_world_open(w, &e);
-	need(rc == 0, e.text);
+	require(rc == 0, e.text);
 	return w;
 }
 
@@ -277,7 +277,7 @@ struct plan farm_plan(uint64_t job)
 		r.epoch = 1;
 		snprintf(r.integrator, sizeof r.integrator, "path");
 	}
-	need(plan_make(&r, &p, &e) == 0, e.text);
+	require(plan_make(&r, &p, &e) == 0, e.text);
 	return p;
 }
 
@@ -291,7 +291,7 @@ const Farm__Envelope *farm_submission(uint64_t job)
 	static char name[] = "job", scene[] = "s.xml", integrator[16], mixture[PLAN_MUTATIONS_MAX];
 	struct error e;
 	struct plan p = farm_plan(job);
-	need(blob_hash_bytes(farm_scene, strlen(farm_scene), &hash, &e) == 0, "a hash");
+	require(blob_hash_bytes(farm_scene, strlen(farm_scene), &hash, &e) == 0, "a hash");
 	farm__submit__init(&s);
 	farm__plan_request__init(&request);
 	farm__file__init(&file);
@@ -325,7 +325,7 @@ const Farm__Envelope *farm_submission(uint64_t job)
 	return &m;
 }
 
-static void light(struct batch *b, const struct plan *plan)
+static void fill_tile(struct batch *b, const struct plan *plan)
 {
 	b->tile_count = 1;
 	b->tiles = mem_alloc(1, sizeof *b->tiles);
@@ -339,7 +339,7 @@ struct batch farm_batch(const struct lease_key *k, const struct plan *plan)
 {
 	struct batch b = black_batch(k, plan, 4);
 	if (k->kind == LEASE_RENDER) {
-		light(&b, plan);
+		fill_tile(&b, plan);
 	} else if (k->job != FARM_DONE) {
 		for (uint64_t i = 0; i < b.weight_count; i++)
 			b.weights[i] = 1;
@@ -350,7 +350,7 @@ struct batch farm_batch(const struct lease_key *k, const struct plan *plan)
 
 /* ---- the first spool ---- */
 
-static const Farm__Envelope *hear(struct farm_world *w, unsigned peer)
+static const Farm__Envelope *hear_message(struct farm_world *w, unsigned peer)
 {
 	struct farm_peer *p = &w->peers[peer];
 	for (int i = 0; i < 100000; i++) {
@@ -358,28 +358,28 @@ static const Farm__Envelope *hear(struct farm_world *w, unsigned peer)
 		unsigned char byte;
 		size_t used;
 		ssize_t got = recv(p->fd, &byte, 1, MSG_DONTWAIT);
-		need(got != 0, "the coordinator has hung up");
+		require(got != 0, "the coordinator has hung up");
 		if (got != 1) {
 			uv_run(&w->server->loop, UV_RUN_ONCE);
 			continue;
 		}
 		int rc = frame_reader_take(&p->reader, &byte, 1, &used, &e);
-		need(rc >= 0, e.text);
+		require(rc >= 0, e.text);
 		if (!rc)
 			continue;
 		envelope_fini(&p->received);
-		need(envelope_unpack(&p->received, p->reader.header.bytes, p->reader.header.size, &e) == 0, e.text);
+		require(envelope_unpack(&p->received, p->reader.header.bytes, p->reader.header.size, &e) == 0, e.text);
 		return p->received.message;
 	}
-	need(false, "the coordinator says nothing");
+	require(false, "the coordinator says nothing");
 	return NULL;
 }
 
 static const Farm__Envelope *hear_kind(struct farm_world *w, unsigned peer, Farm__Envelope__BodyCase kind)
 {
 	const Farm__Envelope *m;
-	while ((m = hear(w, peer))->body_case != kind)
-		need(m->body_case != FARM__ENVELOPE__BODY_FAULT, "a fault");
+	while ((m = hear_message(w, peer))->body_case != kind)
+		require(m->body_case != FARM__ENVELOPE__BODY_FAULT, "a fault");
 	return m;
 }
 
@@ -388,7 +388,7 @@ static void submit(struct farm_world *w, unsigned client, uint64_t job)
 	const Farm__Envelope *m = farm_submission(job);
 	farm_say_message(w, client, m, NULL, 0);
 	const Farm__SubmitAnswer *a = hear_kind(w, client, FARM__ENVELOPE__BODY_SUBMIT_ANSWER)->submit_answer;
-	need(!*a->refusal, a->refusal);
+	require(!*a->refusal, a->refusal);
 	if (a->n_missing) {
 		Farm__BlobChunk c;
 		Farm__Envelope chunk;
@@ -401,7 +401,7 @@ static void submit(struct farm_world *w, unsigned client, uint64_t job)
 		farm_say_message(w, client, &chunk, farm_scene, strlen(farm_scene));
 		a = hear_kind(w, client, FARM__ENVELOPE__BODY_SUBMIT_ANSWER)->submit_answer;
 	}
-	need(a->job == job, "another number of a job");
+	require(a->job == job, "another number of a job");
 }
 
 static void ask_for_job(struct farm_world *w, unsigned worker, uint64_t job)
@@ -417,25 +417,25 @@ static void ask_for_job(struct farm_world *w, unsigned worker, uint64_t job)
 	hear_kind(w, worker, FARM__ENVELOPE__BODY_JOB_INFO);
 }
 
-static void answer(struct farm_world *w, unsigned worker, struct lease_key k)
+static void send_result(struct farm_world *w, unsigned worker, struct lease_key k)
 {
 	struct plan plan = farm_plan(k.job);
 	struct batch b = farm_batch(&k, &plan);
 	unsigned char *frame;
 	size_t size;
 	struct error e;
-	need(batch_pack(&b, &plan, &frame, &size, &e) == 0, e.text);
+	require(batch_pack(&b, &plan, &frame, &size, &e) == 0, e.text);
 	size_t n;
 	unsigned char *checked = checksummed_frame(frame, size, &n);
 	farm_say(w, worker, checked, n);
 	free(checked);
 	const Farm__LeaseAck *a = hear_kind(w, worker, FARM__ENVELOPE__BODY_LEASE_ACK)->lease_ack;
 	bool noted = a->verdict == FARM__VERDICT__VERDICT_NOTED;
-	need(noted || a->verdict == FARM__VERDICT__VERDICT_MERGED, a->text);
+	require(noted || a->verdict == FARM__VERDICT__VERDICT_MERGED, a->text);
 	mem_free(frame);
 	batch_fini(&b);
 	if (noted) /* now the other one's */
-		answer(w, worker + 1, k);
+		send_result(w, worker + 1, k);
 }
 
 static void do_bootstrap(struct farm_world *w, unsigned worker, uint64_t job)
@@ -443,8 +443,8 @@ static void do_bootstrap(struct farm_world *w, unsigned worker, uint64_t job)
 	struct plan p = farm_plan(job);
 	for (uint32_t g = 0; g < p.groups; g++)
 		for (uint32_t part = 0; part < p.parts; part++)
-			answer(w, worker,
-			       (struct lease_key){.job = job, .kind = LEASE_BOOTSTRAP, .group = g, .part = part});
+			send_result(w, worker,
+				    (struct lease_key){.job = job, .kind = LEASE_BOOTSTRAP, .group = g, .part = part});
 }
 
 static void do_rounds(struct farm_world *w, unsigned worker, uint64_t job, uint32_t slots)
@@ -452,12 +452,12 @@ static void do_rounds(struct farm_world *w, unsigned worker, uint64_t job, uint3
 	struct plan p = farm_plan(job);
 	for (uint64_t epoch = 0; epoch < p.rounds; epoch++)
 		for (uint32_t i = 0; i < slots; i++)
-			answer(w, worker,
-			       (struct lease_key){.job = job,
-						  .kind = LEASE_RENDER,
-						  .group = i / p.parts,
-						  .part = i % p.parts,
-						  .epoch = epoch});
+			send_result(w, worker,
+				    (struct lease_key){.job = job,
+						       .kind = LEASE_RENDER,
+						       .group = i / p.parts,
+						       .part = i % p.parts,
+						       .epoch = epoch});
 }
 
 static void fill(void)
@@ -467,7 +467,7 @@ static void fill(void)
 	struct error e;
 	template_path(w.spool);
 	int rc = farm_world_open(&w, &e);
-	need(rc == 0, e.text);
+	require(rc == 0, e.text);
 	farm_call(&w, CLIENT, false);
 	farm_hello(&w, CLIENT, FARM__ROLE__ROLE_CLIENT);
 	farm_call(&w, WORKER, false);
@@ -484,7 +484,7 @@ static void fill(void)
 		if (job == FARM_CHAINS || job == FARM_ENDED)
 			do_rounds(&w, WORKER, job, p.groups * p.parts - (job == FARM_CHAINS));
 		if (job == FARM_BOOTSTRAP)
-			answer(&w, WORKER, (struct lease_key){.job = job, .kind = LEASE_BOOTSTRAP});
+			send_result(&w, WORKER, (struct lease_key){.job = job, .kind = LEASE_BOOTSTRAP});
 	}
 	farm_settle(&w);
 	farm_world_close(&w);

@@ -59,7 +59,7 @@ static void say_hello_ack(int fd)
 	mem_free(frame);
 }
 
-static void *speak(void *user)
+static void *run_server(void *user)
 {
 	char bytes[4096];
 	(void)user;
@@ -165,7 +165,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 	now.count = script_read(bytes + 1, size - 1, steps);
 	now.steps = steps;
 	now.hello = *bytes / WANTS % 8 != 0;
-	if (pthread_create(&thread, NULL, speak, NULL))
+	if (pthread_create(&thread, NULL, run_server, NULL))
 		abort();
 	if (client_open(&cl, now.address, NULL, false, "n", &e) == 0) {
 		make_request(cl, *bytes % WANTS);

@@ -23,7 +23,7 @@ static struct {
 	uint64_t stored;
 } now;
 
-static uint64_t stored(const struct server *s)
+static uint64_t sum_of_stored(const struct server *s)
 {
 	uint64_t sum = s->jobs.ended_count;
 	for (const struct live_job *job = s->jobs.live; job; job = job->next)
@@ -31,7 +31,7 @@ static uint64_t stored(const struct server *s)
 	return sum;
 }
 
-static void speak(struct farm_world *w, const struct step *s)
+static void take_step(struct farm_world *w, const struct step *s)
 {
 	unsigned who = s->who % SPEAKERS;
 	if (who == ONE_HANGS_UP) {
@@ -62,13 +62,13 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 	if (!now.world) {
 		now.world = farm_world_new();
 		now.inputs = 0;
-		now.stored = stored(now.world->server);
+		now.stored = sum_of_stored(now.world->server);
 	}
 	size_t count = script_read(bytes, size, steps);
 	for (size_t i = 0; i < count; i++)
-		speak(now.world, &steps[i]);
+		take_step(now.world, &steps[i]);
 	farm_settle(now.world);
-	if (++now.inputs == WORLD_MOST || stored(now.world->server) != now.stored) {
+	if (++now.inputs == WORLD_MOST || sum_of_stored(now.world->server) != now.stored) {
 		farm_world_free(now.world);
 		now.world = NULL;
 	}

@@ -11,7 +11,7 @@
 
 #include <math.h>
 
-static double some(double phi_d, double theta_d, double theta_h, double nm)
+static double smooth_value(double phi_d, double theta_d, double theta_h, double nm)
 {
 	return theta_h > 1 ? NAN : theta_d * nm + phi_d;
 }
@@ -37,7 +37,7 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 		free(bytes);
 	}
 	size_t size;
-	unsigned char *bytes = polarized_file_make(some, 3, 2, &size);
+	unsigned char *bytes = polarized_file_make(smooth_value, 3, 2, &size);
 	seed_file("measured", 8, bytes, size);
 	free(bytes);
 	exit(0);

@@ -18,7 +18,7 @@ struct input {
 	size_t scene_size, mesh_size, picture_size;
 };
 
-static struct input cut(const uint8_t *bytes, size_t size)
+static struct input cut_input(const uint8_t *bytes, size_t size)
 {
 	const uint8_t *zero = size ? memchr(bytes, 0, size) : NULL;
 	struct input in = {
@@ -58,7 +58,7 @@ static bool is_moderate(const struct scene *s)
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 {
-	struct input in = cut(bytes, size);
+	struct input in = cut_input(bytes, size);
 	const struct memory_file files[] = {{"s.xml", in.scene, in.scene_size},
 					    {"i.xml", in.scene, in.scene_size},
 					    {"m.obj", in.mesh, in.mesh_size},

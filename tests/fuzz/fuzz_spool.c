@@ -45,7 +45,7 @@ static size_t load(const char *path)
 	return n;
 }
 
-static void store(const char *path, const void *bytes, size_t size)
+static void write_file(const char *path, const void *bytes, size_t size)
 {
 	FILE *f = fopen(path, "wb");
 	if (!f || fwrite(bytes, 1, size, f) != size || fclose(f))
@@ -64,7 +64,7 @@ static void journal_path(const char *spool, char path[512])
 }
 
 /* u24 BE place, xor */
-static void change(const uint8_t *edits, size_t size, uint8_t *bytes, size_t count)
+static void apply_edits(const uint8_t *edits, size_t size, uint8_t *bytes, size_t count)
 {
 	for (size_t i = 0; i + EDIT <= size && i < EDIT * EDITS_MOST && count; i += EDIT) {
 		size_t at = (size_t)edits[i] << 16 | (size_t)edits[i + 1] << 8 | edits[i + 2];
@@ -75,8 +75,8 @@ static void change(const uint8_t *edits, size_t size, uint8_t *bytes, size_t cou
 static void change_file(const char *path, const uint8_t *edits, size_t size)
 {
 	size_t n = load(path);
-	change(edits, size, file, n);
-	store(path, file, n);
+	apply_edits(edits, size, file, n);
+	write_file(path, file, n);
 }
 
 static void write_checked(const char *path, const void *bytes, size_t size)
@@ -146,7 +146,7 @@ static void damage(const char *spool, enum what what, const uint8_t *bytes, size
 		path_in(spool, "jobs/j7", path);
 		mkdir(path, 0777);
 		path_in(spool, "jobs/j7/job.json", path);
-		store(path, bytes, size);
+		write_file(path, bytes, size);
 		break;
 	case OLD_ROW:
 		path_in(spool, "jobs/j7", path);
@@ -156,7 +156,7 @@ static void damage(const char *spool, enum what what, const uint8_t *bytes, size
 		break;
 	case JOURNAL:
 		journal_path(spool, path);
-		store(path, bytes, size);
+		write_file(path, bytes, size);
 		break;
 	case JOURNAL_CHANGED:
 		journal_path(spool, path);
@@ -170,7 +170,7 @@ static void damage(const char *spool, enum what what, const uint8_t *bytes, size
 		n = load(path);
 		if (n < 4)
 			abort();
-		change(bytes, size, file, n - 4);
+		apply_edits(bytes, size, file, n - 4);
 		write_checked(path, file, n - 4);
 		break;
 	case CHECKPOINT_BODY:
@@ -183,7 +183,7 @@ static void damage(const char *spool, enum what what, const uint8_t *bytes, size
 		break;
 	case ASIDE:
 		path_in(spool, "aside", path);
-		store(path, bytes, size);
+		write_file(path, bytes, size);
 		break;
 	default:
 		write_submission(spool, bytes, size);

@@ -20,7 +20,7 @@ enum { SAID = 3000, EDITS_MOST = 16, PIECE = 700 };
 
 static struct tls *farm, *node, *stranger;
 
-static void need(int rc, const struct error *e)
+static void require(int rc, const struct error *e)
 {
 	if (rc) {
 		fprintf(stderr, "%s\n", e->text);
@@ -35,8 +35,8 @@ static struct tls *folder_of(const char *authority, const char *name, enum tls_r
 	struct error e = {""};
 	snprintf(home, sizeof home, "%s/%s", folders_base(), authority);
 	snprintf(path, sizeof path, "%s/%s", home, name);
-	need(authority_issue(home, name, role, 1, false, &e), &e);
-	need(tls_open(&t, path, &e), &e);
+	require(authority_issue(home, name, role, 1, false, &e), &e);
+	require(tls_open(&t, path, &e), &e);
 	return t;
 }
 
@@ -49,7 +49,7 @@ static void make_folders(void)
 	for (int i = 0; i < 2; i++) {
 		char home[128];
 		snprintf(home, sizeof home, "%s/%s", folders_base(), homes[i]);
-		need(authority_init(home, homes[i], 2, &e), &e);
+		require(authority_init(home, homes[i], 2, &e), &e);
 	}
 	farm = folder_of("ours", "farm", TLS_COORDINATOR);
 	node = folder_of("ours", "node", TLS_WORKER);
@@ -71,7 +71,7 @@ static void open_end(struct end *x, struct tls *t, bool listening)
 {
 	struct error e;
 	*x = (struct end){0};
-	need(tls_link_new(&x->link, t, listening, &e), &e);
+	require(tls_link_new(&x->link, t, listening, &e), &e);
 }
 
 static void read_all(struct end *x)
@@ -105,7 +105,7 @@ struct edits { /* of one direction: u16 BE place, xor */
 	const struct end *from;
 };
 
-static void change(struct edits *d, uint8_t *bytes, size_t size)
+static void apply_edits(struct edits *d, uint8_t *bytes, size_t size)
 {
 	for (size_t i = 0; i + 3 <= d->size && i < 3 * EDITS_MOST; i += 3) {
 		size_t place = (size_t)d->bytes[i] << 8 | d->bytes[i + 1];
@@ -115,7 +115,7 @@ static void change(struct edits *d, uint8_t *bytes, size_t size)
 	d->passed += size;
 }
 
-static bool carry(struct end *from, struct end *to, struct edits *d)
+static bool carry_output(struct end *from, struct end *to, struct edits *d)
 {
 	const unsigned char *bytes;
 	static uint8_t copy[1 << 17];
@@ -127,7 +127,7 @@ static bool carry(struct end *from, struct end *to, struct edits *d)
 	memcpy(copy, bytes, size);
 	tls_link_output_taken(from->link);
 	if (d && d->from == from)
-		change(d, copy, size);
+		apply_edits(d, copy, size);
 	pass_bytes(to, copy, size);
 	return true;
 }
@@ -136,12 +136,12 @@ static void carry_all(struct edits *d)
 {
 	bool more = true;
 	while (more) {
-		more = carry(&caller, &listener, d);
-		more |= carry(&listener, &caller, d);
+		more = carry_output(&caller, &listener, d);
+		more |= carry_output(&listener, &caller, d);
 	}
 }
 
-static uint8_t said(size_t i)
+static uint8_t byte_sent(size_t i)
 {
 	return (uint8_t)(i * 7 + i / 251);
 }
@@ -151,7 +151,7 @@ static void write_bytes(struct end *x)
 	uint8_t bytes[SAID];
 	struct error e;
 	for (size_t i = 0; i < SAID; i++)
-		bytes[i] = said(i);
+		bytes[i] = byte_sent(i);
 	if (!x->broken && tls_link_is_open(x->link))
 		x->broken = tls_link_write(x->link, bytes, SAID, &e) != 0;
 }
@@ -161,13 +161,13 @@ static void check_received(const struct end *x, const char *name)
 	if (x->got_size > SAID)
 		abort();
 	for (size_t i = 0; i < x->got_size; i++)
-		if (x->got[i] != said(i))
+		if (x->got[i] != byte_sent(i))
 			abort();
 	if (tls_link_is_open(x->link) && strcmp(tls_link_peer(x->link)->name, name) != 0)
 		abort();
 }
 
-static void converse(const uint8_t *bytes, size_t size, const struct end *changed, struct tls *who)
+static void run_conversation(const uint8_t *bytes, size_t size, const struct end *changed, struct tls *who)
 {
 	struct edits d = {bytes, size, 0, changed};
 	open_end(&caller, who, false);
@@ -239,8 +239,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 		break;
 	case CHANGE_CALLER:
 	case CHANGE_LISTENER:
-		converse(bytes, size, what % WHATS == CHANGE_CALLER ? &caller : &listener,
-			 what / WHATS % 8 == 1 ? stranger : node);
+		run_conversation(bytes, size, what % WHATS == CHANGE_CALLER ? &caller : &listener,
+				 what / WHATS % 8 == 1 ? stranger : node);
 		break;
 	case RECORDS:
 		send_records(bytes, size);
@@ -276,7 +276,7 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 	size_t size = tls_link_output(caller.link, &bytes);
 	write_seed(TO_LISTENER, bytes, size);
 	write_seed(RECORDS, bytes, size);
-	carry(&caller, &listener, NULL);
+	carry_output(&caller, &listener, NULL);
 	size = tls_link_output(listener.link, &bytes);
 	write_seed(TO_CALLER, bytes, size);
 	write_seed(CHANGE_CALLER, "\0\60\1", 3);

@@ -105,12 +105,12 @@ static void start_worker(void)
 	}
 }
 
-static void turn(void)
+static void run_loop(void)
 {
 	uv_run(&now.agent->loop, UV_RUN_NOWAIT);
 }
 
-static void drain(void)
+static void drain_socket(void)
 {
 	char bytes[1 << 15];
 	ssize_t n = 1;
@@ -127,7 +127,7 @@ static void send_bytes(const void *bytes, size_t size)
 			return;
 		at += n > 0 ? n : 0;
 		size -= n > 0 ? (size_t)n : 0;
-		turn();
+		run_loop();
 	}
 }
 
@@ -160,11 +160,11 @@ static void hang_up(void)
 	}
 	now.fd = -1;
 	for (int i = 0; now.agent->conn && i < 1000; i++)
-		turn();
+		run_loop();
 }
 
 /* The worker waits a while before it calls again; here it does not. */
-static void answer(void)
+static void send_answer(void)
 {
 	struct agent *a = now.agent;
 	for (int i = 0; i < 1000 && now.fd < 0 && !a->gone; i++) {
@@ -172,11 +172,11 @@ static void answer(void)
 			uv_timer_start(&a->retry, a->retry.timer_cb, 0, 0);
 		if (a->resolves)
 			uv_run(&a->loop, UV_RUN_ONCE);
-		turn();
+		run_loop();
 		now.fd = accept4(now.listener, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
 	}
 	setsockopt(now.fd, IPPROTO_TCP, TCP_NODELAY, &(int){1}, sizeof(int));
-	turn();
+	run_loop();
 	say_hello_ack();
 }
 
@@ -201,7 +201,7 @@ static bool is_building(const struct task *t)
 }
 
 /* What has begun is let go of on the way back, as by a thread. */
-static void work(void)
+static void run_next_task(void)
 {
 	struct thread_pool *c = now.agent->thread_pool;
 	struct task *t = c->first;
@@ -229,13 +229,13 @@ static void step(const struct step *s)
 	switch (s->who % SPEAKERS) {
 	case COORDINATOR:
 		if (now.fd < 0)
-			answer();
+			send_answer();
 		bytes = checksummed_parts(s->header, s->header_size, s->payload, s->payload_size, false, &size);
 		send_bytes(bytes, size);
 		free(bytes);
 		break;
 	case POOL:
-		work();
+		run_next_task();
 		break;
 	case NETWORK:
 		hang_up();
@@ -247,8 +247,8 @@ static void step(const struct step *s)
 			agent_settle(now.agent);
 		}
 	}
-	turn();
-	drain();
+	run_loop();
+	drain_socket();
 }
 
 /* Files of the cache are read by libuv's pool, which nobody tells when to work; a worker that ends waits for it. */
@@ -326,7 +326,7 @@ static void describe_job(struct seed *s, uint64_t job)
 	seed_say(s, COORDINATOR, &m, room, strlen(room));
 }
 
-static void grant(struct seed *s, const struct lease_key *k)
+static void grant_lease(struct seed *s, const struct lease_key *k)
 {
 	Farm__LeaseKey key;
 	Farm__LeaseGrant g;
@@ -366,7 +366,7 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 			ack.key = revoke.key = &key;
 			ack.verdict = FARM__VERDICT__VERDICT_MERGED;
 			job_end.job = keys[i].job;
-			grant(&s, &keys[i]);
+			grant_lease(&s, &keys[i]);
 			describe_job(&s, keys[i].job);
 			seed_raw(&s, POOL, "-");
 			if (end == 1)
@@ -382,7 +382,7 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 		}
 	struct seed flood = {0};
 	for (uint64_t epoch = 0; epoch < SCRIPT_STEPS; epoch++)
-		grant(&flood, &(struct lease_key){.job = FARM_SAMPLES, .kind = LEASE_RENDER, .epoch = epoch});
+		grant_lease(&flood, &(struct lease_key){.job = FARM_SAMPLES, .kind = LEASE_RENDER, .epoch = epoch});
 	seed_end(&flood, "flood", 0);
 	exit(0);
 }

@@ -47,7 +47,7 @@ static void begin(unsigned seed)
 	now.random = seed * UINT64_C(0x9E3779B97F4A7C15) + 1;
 }
 
-static uint64_t dice(uint64_t below)
+static uint64_t random_below(uint64_t below)
 {
 	now.random ^= now.random << 13;
 	now.random ^= now.random >> 7;
@@ -59,23 +59,23 @@ static uint64_t dice(uint64_t below)
 
 static uint64_t some_integer(uint64_t before)
 {
-	switch (dice(8)) {
+	switch (random_below(8)) {
 	case 0:
-		return dice(5);
+		return random_below(5);
 	case 1:
 		return before + 1;
 	case 2:
 		return before - 1;
 	case 3:
-		return before ^ UINT64_C(1) << dice(64);
+		return before ^ UINT64_C(1) << random_below(64);
 	case 4:
-		return UINT64_MAX >> dice(64);
+		return UINT64_MAX >> random_below(64);
 	case 5:
-		return UINT64_C(1) << dice(64);
+		return UINT64_C(1) << random_below(64);
 	case 6:
 		return before * 2;
 	default:
-		return dice(300);
+		return random_below(300);
 	}
 }
 
@@ -95,7 +95,9 @@ static double some_double(double before)
 					(double)__builtin_inf(),
 					-(double)__builtin_inf(),
 					(double)__builtin_nan("")};
-	return dice(4) ? values[dice(sizeof values / sizeof *values)] : dice(2) ? before * 2 : before + 1;
+	return random_below(4)	 ? values[random_below(sizeof values / sizeof *values)]
+	       : random_below(2) ? before * 2
+				 : before + 1;
 }
 
 static char *some_text(const char *before)
@@ -125,8 +127,8 @@ static char *some_text(const char *before)
 	char *p = allocate(NULL, STRING_ROOM);
 	if (!p)
 		return NULL;
-	if (dice(2)) {
-		strcpy(p, texts[dice(sizeof texts / sizeof *texts)]);
+	if (random_below(2)) {
+		strcpy(p, texts[random_below(sizeof texts / sizeof *texts)]);
 		return p;
 	}
 	size_t length = before ? strlen(before) : 0;
@@ -170,7 +172,7 @@ static size_t size_of(ProtobufCType t)
 	}
 }
 
-static void change(ProtobufCMessage *m);
+static void change_message(ProtobufCMessage *m);
 
 static ProtobufCMessage *fresh(const ProtobufCMessageDescriptor *d)
 {
@@ -196,7 +198,7 @@ static void change_value(const ProtobufCFieldDescriptor *f, void *at)
 		if (!*(ProtobufCMessage **)at)
 			*(ProtobufCMessage **)at = fresh(f->descriptor);
 		if (*(ProtobufCMessage **)at)
-			change(*(ProtobufCMessage **)at);
+			change_message(*(ProtobufCMessage **)at);
 		return;
 	case PROTOBUF_C_TYPE_DOUBLE:
 		memcpy(&d, at, sizeof d);
@@ -214,10 +216,10 @@ static void change_list(const ProtobufCFieldDescriptor *f, void *at, size_t *cou
 {
 	size_t each = size_of(f->type);
 	uint8_t *list = *(uint8_t **)at;
-	if (*count && dice(2)) {
-		change_value(f, list + dice(*count) * each);
-	} else if (*count && dice(2)) {
-		size_t gone = dice(*count);
+	if (*count && random_below(2)) {
+		change_value(f, list + random_below(*count) * each);
+	} else if (*count && random_below(2)) {
+		size_t gone = random_below(*count);
 		memmove(list + gone * each, list + (gone + 1) * each, (*count - gone - 1) * each);
 		--*count;
 	} else {
@@ -226,8 +228,8 @@ static void change_list(const ProtobufCFieldDescriptor *f, void *at, size_t *cou
 			return;
 		if (*count)
 			memcpy(more, list, *count * each);
-		if (*count && dice(2))
-			memcpy(more + *count * each, list + dice(*count) * each, each);
+		if (*count && random_below(2))
+			memcpy(more + *count * each, list + random_below(*count) * each, each);
 		else
 			change_value(f, more + *count * each);
 		if (f->type >= PROTOBUF_C_TYPE_STRING && f->type != PROTOBUF_C_TYPE_BYTES &&
@@ -242,19 +244,19 @@ static void change_list(const ProtobufCFieldDescriptor *f, void *at, size_t *cou
 static const ProtobufCFieldDescriptor *choose_field(ProtobufCMessage *m)
 {
 	const ProtobufCMessageDescriptor *d = m->descriptor;
-	const ProtobufCFieldDescriptor *f = &d->fields[dice(d->n_fields)];
+	const ProtobufCFieldDescriptor *f = &d->fields[random_below(d->n_fields)];
 	if (!(f->flags & PROTOBUF_C_FIELD_FLAG_ONEOF))
 		return f;
 	uint32_t *chosen = (uint32_t *)(void *)((uint8_t *)m + f->quantifier_offset);
 	const ProtobufCFieldDescriptor *there = protobuf_c_message_descriptor_get_field(d, *chosen);
-	if (there && dice(16))
+	if (there && random_below(16))
 		return there;
 	*chosen = f->id;
 	*(void **)(void *)((uint8_t *)m + f->offset) = NULL;
 	return f;
 }
 
-static void change(ProtobufCMessage *m)
+static void change_message(ProtobufCMessage *m)
 {
 	if (!m->descriptor->n_fields)
 		return;
@@ -262,7 +264,8 @@ static void change(ProtobufCMessage *m)
 	uint8_t *base = (uint8_t *)m, *at = base + f->offset;
 	if (f->label == PROTOBUF_C_LABEL_REPEATED)
 		change_list(f, at, (size_t *)(void *)(base + f->quantifier_offset));
-	else if (f->type == PROTOBUF_C_TYPE_MESSAGE && !(f->flags & PROTOBUF_C_FIELD_FLAG_ONEOF) && dice(16) == 0)
+	else if (f->type == PROTOBUF_C_TYPE_MESSAGE && !(f->flags & PROTOBUF_C_FIELD_FLAG_ONEOF) &&
+		 random_below(16) == 0)
 		*(void **)(void *)at = NULL;
 	else
 		change_value(f, at);
@@ -274,8 +277,8 @@ static const uint8_t *change_packed(const uint8_t *bytes, size_t *size)
 	ProtobufCMessage *m = protobuf_c_message_unpack(&farm__envelope__descriptor, &allocator, *size, bytes);
 	if (!m)
 		m = fresh(&farm__envelope__descriptor);
-	for (uint64_t i = 0, n = 1 + dice(4); i < n && m; i++)
-		change(m);
+	for (uint64_t i = 0, n = 1 + random_below(4); i < n && m; i++)
+		change_message(m);
 	size_t packed = m ? protobuf_c_message_get_packed_size(m) : 0;
 	uint8_t *out = packed ? allocate(NULL, packed) : NULL;
 	if (out)
@@ -287,7 +290,7 @@ size_t message_mutate(uint8_t *bytes, size_t size, size_t room, unsigned seed)
 {
 	begin(seed);
 	size_t changed = size;
-	const uint8_t *out = dice(8) ? change_packed(bytes, &changed) : NULL;
+	const uint8_t *out = random_below(8) ? change_packed(bytes, &changed) : NULL;
 	if (!out || changed > room)
 		return LLVMFuzzerMutate(bytes, size, room);
 	memcpy(bytes, out, changed);
@@ -366,9 +369,9 @@ static void change_step(struct step *s, unsigned speakers)
 {
 	size_t size = s->header_size;
 	const uint8_t *changed;
-	switch (dice(10)) {
+	switch (random_below(10)) {
 	case 0:
-		s->who = (uint8_t)dice(speakers);
+		s->who = (uint8_t)random_below(speakers);
 		break;
 	case 1:
 	case 2:
@@ -385,13 +388,13 @@ static void change_step(struct step *s, unsigned speakers)
 
 static size_t change_script(struct step *steps, size_t count, unsigned speakers)
 {
-	size_t at = count ? dice(count) : 0;
-	switch (count ? dice(12) : 0) {
+	size_t at = count ? random_below(count) : 0;
+	switch (count ? random_below(12) : 0) {
 	case 0: /* something new */
 		if (count == SCRIPT_STEPS)
 			return count;
 		memmove(steps + at + 1, steps + at, (count - at) * sizeof *steps);
-		steps[at] = (struct step){.who = (uint8_t)dice(speakers), .header = now.bytes};
+		steps[at] = (struct step){.who = (uint8_t)random_below(speakers), .header = now.bytes};
 		change_step(&steps[at], speakers);
 		return count + 1;
 	case 1: /* again */
@@ -402,7 +405,7 @@ static size_t change_script(struct step *steps, size_t count, unsigned speakers)
 		memmove(steps + at, steps + at + 1, (count - at - 1) * sizeof *steps);
 		return count - 1;
 	case 3: { /* in another order */
-		size_t other = dice(count);
+		size_t other = random_below(count);
 		struct step s = steps[at];
 		steps[at] = steps[other];
 		steps[other] = s;
@@ -419,12 +422,12 @@ size_t script_mutate(uint8_t *bytes, size_t size, size_t room, unsigned seed, un
 	struct step steps[SCRIPT_STEPS];
 	begin(seed);
 	uint8_t *copy = allocate(NULL, size + 1); /* the input may grow over what the steps point at */
-	if (!copy || dice(32) == 0)
+	if (!copy || random_below(32) == 0)
 		return LLVMFuzzerMutate(bytes, size, room);
 	if (size)
 		memcpy(copy, bytes, size);
 	size_t count = script_read(copy, size, steps);
-	for (uint64_t i = 0, n = 1 + dice(3); i < n; i++)
+	for (uint64_t i = 0, n = 1 + random_below(3); i < n; i++)
 		count = change_script(steps, count, speakers);
 	size_t changed = script_write(steps, count, bytes, room);
 	return changed ? changed : LLVMFuzzerMutate(bytes, size, room);

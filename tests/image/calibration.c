@@ -80,7 +80,7 @@ static void make_reference(const struct calibration_scene *s, const struct world
 	r->floor_square = 1e-4 * mean * mean;
 }
 
-static double realised(const struct reference *r, const struct canvas_image *img)
+static double realised_error(const struct reference *r, const struct canvas_image *img)
 {
 	double sum = 0;
 	for (uint32_t i = 0; i < VALUES; i++)
@@ -94,9 +94,9 @@ struct figures {
 	double far, values;   /* pixels' channels beyond three of their errors; all */
 };
 
-static void look(const struct reference *r, const struct canvas_image *img, struct figures *f)
+static void add_image(const struct reference *r, const struct canvas_image *img, struct figures *f)
 {
-	double x = realised(r, img);
+	double x = realised_error(r, img);
 	f->renders++;
 	f->own += x;
 	f->estimate += img->rel_mse;
@@ -142,7 +142,7 @@ static void run_case(struct calibration *c, const struct calibration_scene *s, c
 	struct figures f = {0};
 	repeats_run(w, &how, NULL, NULL, &run);
 	for (uint32_t i = 0; i < renders; i++)
-		look(r, &run.images[i], &f);
+		add_image(r, &run.images[i], &f);
 	bool tells = r->variance <= 0.1 * f.own / renders;
 	printf("| %s | %s | %s | %llu | %.1f | %.1f | %d of %d | %d%s | %.1f | %.2f |\n", s->kind, s->name,
 	       how.integrator, (unsigned long long)how.spp, 100 * sqrt(fmax(0, f.own / renders)),
@@ -215,7 +215,7 @@ static struct figures judge_integrator(const struct calibration *c, size_t k, in
 	return sum;
 }
 
-static bool judge(const struct calibration *c, int length)
+static bool judge_scene(const struct calibration *c, int length)
 {
 	struct figures sum = {0};
 	for (size_t k = 0; k < INTEGRATORS; k++) {
@@ -272,7 +272,7 @@ int main(int argc, char **argv)
 	       "| length | integrator | tree | public | made | all | %% |\n| --- | --- | --- | --- | --- | --- | --- |\n");
 	bool right = true;
 	for (int length = 0; length < c.last; length++)
-		right &= judge(&c, length);
+		right &= judge_scene(&c, length);
 	printf("\n");
 	for (int length = 0; length < c.last; length++)
 		printf("Length %d: %d scenes. ", length + 1, scenes[length]);

@@ -115,7 +115,7 @@ static int by_size(const void *a, const void *b)
 	return (x > y) - (x < y);
 }
 
-static double realised(const struct reference *r, const struct canvas_image *img)
+static double realised_error(const struct reference *r, const struct canvas_image *img)
 {
 	double sum = 0;
 	for (uint32_t i = 0; i < r->values; i++)
@@ -129,10 +129,10 @@ static struct figures figures_of(const struct reference *r, const struct repeats
 	struct figures f = {0};
 	double ratio[RENDERS], mean = 0, estimated = 0, inside = 0, all = 0, square = shrink * shrink;
 	for (uint32_t i = 0; i < RENDERS; i++)
-		mean += realised(r, &s->images[i]) / RENDERS;
+		mean += realised_error(r, &s->images[i]) / RENDERS;
 	for (uint32_t i = 0; i < RENDERS; i++) {
 		const struct canvas_image *img = &s->images[i];
-		double own = realised(r, img);
+		double own = realised_error(r, img);
 		ratio[i] = own / img->rel_mse * square;
 		estimated += img->rel_mse / square / RENDERS;
 		f.known += img->rel_mse_doubt == ERROR_KNOWN;
@@ -213,7 +213,7 @@ CASE(glass_erpt4, "glass, fireflies", "erpt4", GLASS, 192, 3, 1024, 0, 0.1)
 CASE(glass_pssmlt, "glass, little known of b", "pssmlt", GLASS, 160, 60, 1024, 16, 0.15)
 CASE(glass_hslt, "glass", "hslt", GLASS, 640, 240, 2048, 16, 0.1)
 
-static int forget(void **unused)
+static int free_references(void **unused)
 {
 	(void)unused;
 	for (int i = 0; i < SCENES; i++) {
@@ -233,5 +233,5 @@ int main(void)
 		cmocka_unit_test(room_hslt),  cmocka_unit_test(glass_pssmlt),
 	};
 	return _cmocka_run_group_tests("calibration", tests, test_full() ? sizeof tests / sizeof *tests : SHORT, NULL,
-				       forget);
+				       free_references);
 }

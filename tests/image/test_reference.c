@@ -30,14 +30,14 @@ enum { WIDTH = 256 };
 static const double mean_tolerance = 0.03, trim = 0.001;
 
 /* Of each pixel that is compared, and the relMSE that is allowed with them, most of which is noise. */
-static uint32_t samples(void)
+static uint32_t samples_per_pixel(void)
 {
 	return test_full() ? 256 : 128;
 }
 
 static double most_rel_mse(void)
 {
-	return 2.56 / samples();
+	return 2.56 / samples_per_pixel();
 }
 
 struct subject {
@@ -46,7 +46,7 @@ struct subject {
 };
 
 /* Means of equal boxes, WIDTH of them in a row. */
-static void shrink(struct picture *p)
+static void shrink_picture(struct picture *p)
 {
 	struct error e = {""};
 	assert_int_equal(p->image.width % WIDTH, 0);
@@ -61,16 +61,16 @@ static void read_reference(const char *folder, struct picture *p)
 	snprintf(path, sizeof path, "%s/%s/TungstenRender.exr", getenv("HSLT_SCENES"), folder);
 	if (picture_read(p, path, &e))
 		fail_msg("%s", e.text);
-	shrink(p);
+	shrink_picture(p);
 }
 
 static void render(const struct world *w, const struct subject *s, uint64_t fewer, struct picture *xyz)
 {
 	uint32_t box = w->settings.width / WIDTH;
-	uint64_t full = (samples() + box * box - 1) / (box * box), spp = full / (fewer * test_scale());
+	uint64_t full = (samples_per_pixel() + box * box - 1) / (box * box), spp = full / (fewer * test_scale());
 	struct render_picture_how how = {"path", s->folder, spp ? spp : 1, s->max_depth};
 	render_picture_xyz(w, &how, xyz);
-	shrink(xyz);
+	shrink_picture(xyz);
 }
 
 /* accuracy: NULL, or the setting that is not the default. */

@@ -39,7 +39,7 @@ struct table {
 	size_t n, room;
 };
 
-static double now(void)
+static double seconds_now(void)
 {
 	struct timespec t;
 	clock_gettime(CLOCK_MONOTONIC, &t);
@@ -159,7 +159,7 @@ static void signal_all(const struct table *t, int sig)
 }
 
 /* Reaps what ended; the command's status once it has. */
-static bool reap(pid_t command, int *status)
+static bool has_ended(pid_t command, int *status)
 {
 	bool ended = false;
 	int s;
@@ -176,19 +176,19 @@ static void end_all(struct table *t)
 {
 	int status;
 	bool killing = false;
-	double begin = now();
+	double begin = seconds_now();
 	read_table(t);
 	signal_all(t, SIGTERM);
 	signal_all(t, SIGCONT);
 	for (;;) {
-		reap(0, &status);
+		has_ended(0, &status);
 		read_table(t);
 		bool any = false;
 		for (size_t i = 0; i < t->n && !any; i++)
 			any = t->of[i].ours;
 		if (!any)
 			return;
-		killing = killing || now() - begin > GRACE;
+		killing = killing || seconds_now() - begin > GRACE;
 		if (killing)
 			signal_all(t, SIGKILL);
 		nanosleep(&(struct timespec){0, 50000000}, NULL);
@@ -206,10 +206,11 @@ static void print_processes(const struct table *t, const char *command, const ch
 }
 
 /* Ends when the command has, or a limit is reached. */
-static int watch(pid_t command, const char *name, double cpu_limit, double idle_limit, const sigset_t *signals)
+static int watch_command(pid_t command, const char *name, double cpu_limit, double idle_limit, const sigset_t *signals)
 {
 	struct table t = {0};
-	double period = cpu_limit < idle_limit ? cpu_limit / 8 : idle_limit / 8, cpu = 0, idle = 0, last = now();
+	double period = cpu_limit < idle_limit ? cpu_limit / 8 : idle_limit / 8, cpu = 0, idle = 0,
+	       last = seconds_now();
 	off_t output = 0;
 	int status, over = 0;
 	if (period > 1)
@@ -217,7 +218,7 @@ static int watch(pid_t command, const char *name, double cpu_limit, double idle_
 	for (;;) {
 		struct timespec wait = {(time_t)period, (long)(1e9 * (period - (double)(time_t)period))};
 		int sig = sigtimedwait(signals, NULL, &wait);
-		if (reap(command, &status)) {
+		if (has_ended(command, &status)) {
 			free(t.of);
 			return WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
 		}
@@ -225,7 +226,7 @@ static int watch(pid_t command, const char *name, double cpu_limit, double idle_
 			end_all(&t);
 			return 128 + sig;
 		}
-		double passed = now() - last;
+		double passed = seconds_now() - last;
 		if (passed < period)
 			continue;
 		last += passed;
@@ -281,5 +282,5 @@ int main(int argc, char **argv)
 		fprintf(stderr, "limit: fork: %s\n", strerror(errno));
 		return 125;
 	}
-	return watch(command, argv[3], cpu, idle, &signals);
+	return watch_command(command, argv[3], cpu, idle, &signals);
 }

@@ -36,7 +36,7 @@ static void pack(struct kind *k, const struct batch *b, const struct plan *p)
 	batch_fini(&again);
 }
 
-static void *need(size_t count, size_t size)
+static void *require(size_t count, size_t size)
 {
 	void *p = mem_alloc(count, size);
 	if (!p)
@@ -49,14 +49,14 @@ static void make_tiles(struct batch *b, const struct plan *p)
 {
 	float mean = (float)((double)p->epoch / (double)plan_extended_pixels(p));
 	uint32_t count = batch_film_tiles(p), random = 1;
-	b->tiles = need(count, sizeof *b->tiles);
+	b->tiles = require(count, sizeof *b->tiles);
 	for (uint32_t y = 0; y < p->crop_height; y += TILE_SIZE)
 		for (uint32_t x = 0; x < p->crop_width; x += TILE_SIZE) {
 			struct tile *t = &b->tiles[b->tile_count++];
 			*t = (struct tile){x, y, p->crop_width - x < TILE_SIZE ? p->crop_width - x : TILE_SIZE,
 					   p->crop_height - y < TILE_SIZE ? p->crop_height - y : TILE_SIZE, NULL};
 			size_t n = (size_t)t->width * t->height * TILE_CHANNELS;
-			t->xyz = need(n, sizeof *t->xyz);
+			t->xyz = require(n, sizeof *t->xyz);
 			for (size_t i = 0; i < n; i++) {
 				random = random * 1664525u + 1013904223u;
 				t->xyz[i] = mean * (float)(random >> 8) * 0x1p-23f;
@@ -77,13 +77,13 @@ static void make_render(struct kind *k, const struct plan *p)
 	b.classes[0] = 0.5 * (double)b.counters[COUNT_SAMPLES];
 	b.cpu_seconds = 20;
 	b.state_count = chains;
-	b.states = need(chains, sizeof *b.states);
+	b.states = require(chains, sizeof *b.states);
 	for (uint32_t i = 0; i < chains; i++) {
-		b.states[i].bytes = need(STATE_BYTES, 1);
+		b.states[i].bytes = require(STATE_BYTES, 1);
 		b.states[i].size = STATE_BYTES;
 	}
 	b.moment_count = batch_moment_count(p, LEASE_RENDER);
-	b.moments = need(b.moment_count, sizeof *b.moments);
+	b.moments = require(b.moment_count, sizeof *b.moments);
 	uint64_t tiles = batch_film_tiles(p), sequences = batch_sequences(p);
 	for (uint64_t i = 0; i < sequences * tiles; i++)
 		b.moments[i] = 0.9f * (float)p->epoch / (float)tiles;
@@ -98,7 +98,7 @@ static void make_bootstrap(struct kind *k, const struct plan *p)
 	struct batch b = {.key = {1, LEASE_BOOTSTRAP, 0, 0, 0}};
 	struct plan_range r = plan_bootstrap_range(p, 0, 0);
 	b.weight_count = r.end - r.begin;
-	b.weights = need(b.weight_count, sizeof *b.weights);
+	b.weights = require(b.weight_count, sizeof *b.weights);
 	for (uint64_t i = 0; i < b.weight_count; i++) {
 		b.weights[i] = 1 + 0.5f * (float)(i % 3);
 		b.independent_sum += (double)b.weights[i];
@@ -112,7 +112,7 @@ static void make_bootstrap(struct kind *k, const struct plan *p)
 
 struct load_content *load_content_new(const struct plan *p)
 {
-	struct load_content *c = need(1, sizeof *c);
+	struct load_content *c = require(1, sizeof *c);
 	make_bootstrap(&c->bootstrap, p);
 	make_render(&c->render, p);
 	return c;

@@ -188,7 +188,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 
 /* ---- the coordinator */
 
-__attribute__((format(printf, 1, 2))) static void run(const char *format, ...)
+__attribute__((format(printf, 1, 2))) static void run_shell(const char *format, ...)
 {
 	char command[4096];
 	va_list ap;
@@ -202,9 +202,9 @@ __attribute__((format(printf, 1, 2))) static void run(const char *format, ...)
 static void make_certificates(void)
 {
 	setenv("HSLT_CA", folder, 1);
-	run("cd %s && %s/hslt-ca init >log 2>&1", folder, load.s.bin);
-	run("cd %s && %s/hslt-ca worker crowd >>log 2>&1", folder, load.s.bin);
-	run("cd %s && %s/hslt-ca client ann >>log 2>&1", folder, load.s.bin);
+	run_shell("cd %s && %s/hslt-ca init >log 2>&1", folder, load.s.bin);
+	run_shell("cd %s && %s/hslt-ca worker crowd >>log 2>&1", folder, load.s.bin);
+	run_shell("cd %s && %s/hslt-ca client ann >>log 2>&1", folder, load.s.bin);
 }
 
 static void start(char *host_port, size_t size)
@@ -303,7 +303,7 @@ static void on_connect(uv_timer_t *t)
 		uv_close((uv_handle_t *)t, NULL);
 }
 
-static void finish(void)
+static void finish_load(void)
 {
 	uv_close((uv_handle_t *)&clockwork.phase, NULL);
 	uv_close((uv_handle_t *)&clockwork.lag, NULL);
@@ -331,7 +331,7 @@ static void on_phase(uv_timer_t *t)
 		load.measuring = false;
 		load_leave(&load);
 	} else if (load.leaving && (load_unanswered(&load) == 0 || now - clockwork.ended > 120)) {
-		finish();
+		finish_load();
 	} else if (load.faults && !load.measuring && !load.leaving && load.closed > load.s.workers / 2) {
 		load_die("%s", load.fault);
 	}
@@ -366,7 +366,7 @@ static void row_times(const char *what, struct load_times *t)
 	       load_times_at(t, 1), t->count);
 }
 
-static bool bound(const char *what, double value, const char *unit, double most, bool strict)
+static bool check_bound(const char *what, double value, const char *unit, double most, bool strict)
 {
 	bool met = strict ? value < most : value <= most;
 	printf("%-46s %9.3g %s, bound %g: %s\n", what, value, unit, most, met ? "met" : "MISSED");
@@ -374,7 +374,7 @@ static bool bound(const char *what, double value, const char *unit, double most,
 }
 
 /* Batches that are in the sums more or less often than they were acknowledged. */
-static double miscounted(void)
+static double count_miscounted(void)
 {
 	uint64_t counted = 0;
 	for (unsigned i = 0; i < load.job_count; i++)
@@ -424,17 +424,17 @@ static int report(double wrong, double peak)
 	       bad[LOAD_HANGS], (unsigned long long)load.hangs);
 	if (load.faults)
 		printf("faults: %llu, the first: %s\n", (unsigned long long)load.faults, load.fault);
-	bool met = bound("leases lost", lost, "", 0, false);
-	met &= bound("acknowledged out of order", (double)load.disordered, "", 0, false);
-	met &= bound("merged more or less than once", wrong, "", 0, false);
-	met &= bound("wrong results that count", (double)load.lies_merged, "", 0, false);
-	met &= bound("coordinator's exit code", coordinator.code, "", 0, false);
-	met &= bound("connections lost, faults", (double)(load.closed + load.faults), "", 0, false);
+	bool met = check_bound("leases lost", lost, "", 0, false);
+	met &= check_bound("acknowledged out of order", (double)load.disordered, "", 0, false);
+	met &= check_bound("merged more or less than once", wrong, "", 0, false);
+	met &= check_bound("wrong results that count", (double)load.lies_merged, "", 0, false);
+	met &= check_bound("coordinator's exit code", coordinator.code, "", 0, false);
+	met &= check_bound("connections lost, faults", (double)(load.closed + load.faults), "", 0, false);
 	if (load.s.losses)
 		return met ? 0 : 1;
-	met &= bound("coordinator", cores, "cores", 1, true);
-	met &= bound("memory beyond the films", 1e-9 * (peak - films), "GB", 1, true);
-	met &= bound("p99 of a lease", load_times_at(&load.grant, 0.99), "ms", 100, true);
+	met &= check_bound("coordinator", cores, "cores", 1, true);
+	met &= check_bound("memory beyond the films", 1e-9 * (peak - films), "GB", 1, true);
+	met &= check_bound("p99 of a lease", load_times_at(&load.grant, 0.99), "ms", 100, true);
 	return met ? 0 : 1;
 }
 
@@ -485,12 +485,12 @@ int main(int argc, char **argv)
 	prepare(host_port);
 	uv_loop_init(&load.loop);
 	run_loop();
-	double wrong = miscounted(), peak = process_peak_bytes(&coordinator, NULL);
+	double wrong = count_miscounted(), peak = process_peak_bytes(&coordinator, NULL);
 	process_stop(&coordinator);
 	int code = report(wrong, peak);
 	load_content_free(load.content);
 	tls_close(load.tls);
-	run("rm -rf %s", folder);
+	run_shell("rm -rf %s", folder);
 	free(bin);
 	return code;
 }

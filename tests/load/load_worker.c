@@ -44,20 +44,20 @@ static void send_message(struct load_worker *w, Farm__Envelope *m, Farm__Envelop
 		conn_send(w->conn, m, NULL, 0);
 }
 
-static void fault(struct load_worker *w, const char *text)
+static void fail_worker(struct load_worker *w, const char *text)
 {
 	struct load *l = w->load;
 	if (!l->faults++)
 		snprintf(l->fault, sizeof l->fault, "worker %u: %s", w->index, text);
 }
 
-static void wish(struct load_worker *w, double at)
+static void add_wish(struct load_worker *w, double at)
 {
 	if (w->wishes < WISHES)
 		w->wish[w->wishes++] = at;
 }
 
-static void request(struct load_worker *w, unsigned want)
+static void request_leases(struct load_worker *w, unsigned want)
 {
 	Farm__LeaseRequest r;
 	Farm__Envelope m;
@@ -128,7 +128,7 @@ static void take_job(struct load_worker *w, const Farm__JobInfo *info)
 	struct load_job *j = job_of(l, info->job, &i);
 	struct plan p;
 	if (!j || info->n_files != 1 || plan_from_wire(info->plan, &p, &e)) {
-		fault(w, "a job that is not one of ours");
+		fail_worker(w, "a job that is not one of ours");
 		return;
 	}
 	if (!j->known && (p.groups * p.parts != j->plan.groups * j->plan.parts || p.epoch != j->plan.epoch))
@@ -167,7 +167,7 @@ static void send_result(struct load_worker *w, struct held *h)
 	unsigned char *frame = load_content_frame(l->content, &h->key, &size);
 	h->state = SENDING;
 	h->since = load_now();
-	wish(w, NAN);
+	add_wish(w, NAN);
 	if (w->kind == LOAD_LIES) {
 		memset(frame + size / 2, 0xff, 64); /* pixels of no value */
 		l->lies++;
@@ -240,7 +240,7 @@ static void take_grant(struct load_worker *w, const Farm__LeaseGrant *m)
 		return;
 	}
 	if (!h || lease_key_from_wire(m->key, &k, &e) || !job_of(l, k.job, &i)) {
-		fault(w, "a lease that cannot be");
+		fail_worker(w, "a lease that cannot be");
 		return;
 	}
 	if (find(w, &k)) { /* it took too long, and nobody else is there */
@@ -288,7 +288,7 @@ static void take_ack(struct load_worker *w, const Farm__LeaseAck *m)
 	struct lease_key k;
 	struct held *h = lease_key_from_wire(m->key, &k, &e) ? NULL : find(w, &k);
 	if (!h || h->state < SENDING) {
-		fault(w, "an answer to nothing");
+		fail_worker(w, "an answer to nothing");
 		return;
 	}
 	l->lies_merged += w->kind == LOAD_LIES && m->verdict == FARM__VERDICT__VERDICT_MERGED;
@@ -300,7 +300,7 @@ static void take_ack(struct load_worker *w, const Farm__LeaseAck *m)
 		l->lies_refused++;
 	else {
 		l->refused++;
-		fault(w, m->text);
+		fail_worker(w, m->text);
 	}
 	if (l->measuring)
 		load_times_add(&l->ack, 1000 * (load_now() - h->since));
@@ -318,7 +318,7 @@ static void take_revoke(struct load_worker *w, const Farm__LeaseRevoke *m)
 		uv_timer_stop(&w->work);
 	h->state = FREE;
 	w->load->revoked++;
-	wish(w, load_now());
+	add_wish(w, load_now());
 	work_on(w);
 }
 
@@ -340,20 +340,20 @@ static void take_welcome(struct load_worker *w, const Farm__HelloAck *ack)
 {
 	struct load *l = w->load;
 	if (!ack->accepted) {
-		fault(w, ack->text);
+		fail_worker(w, ack->text);
 		return;
 	}
 	l->connected++;
 	if (w->kind == LOAD_HOARDS) {
 		uv_timer_start(&w->beat, on_beat, ack->heartbeat_ms, ack->heartbeat_ms);
-		request(w, HOARD + 1);
+		request_leases(w, HOARD + 1);
 		return;
 	}
 	uv_timer_start(&w->beat, on_beat, (uint64_t)((double)ack->heartbeat_ms * load_uniform(l)) + 1,
 		       ack->heartbeat_ms);
 	for (unsigned i = 0; i < l->s.want; i++)
-		wish(w, load_now());
-	request(w, l->s.want);
+		add_wish(w, load_now());
+	request_leases(w, l->s.want);
 }
 
 static void take_beat(struct load_worker *w)
@@ -390,17 +390,17 @@ static void on_message(void *user, struct envelope *env, const unsigned char *pa
 		break;
 	case FARM__ENVELOPE__BODY_BLOB_CHUNK:
 		if (*m->blob_chunk->error)
-			fault(w, m->blob_chunk->error);
+			fail_worker(w, m->blob_chunk->error);
 		break;
 	case FARM__ENVELOPE__BODY_FAULT:
 		if (w->kind != LOAD_HANGS) /* which is to time out */
-			fault(w, m->fault->text);
+			fail_worker(w, m->fault->text);
 		break;
 	case FARM__ENVELOPE__BODY_JOB_END:
-		fault(w, "a job has ended");
+		fail_worker(w, "a job has ended");
 		break;
 	default:
-		fault(w, "a message that no worker is sent");
+		fail_worker(w, "a message that no worker is sent");
 	}
 }
 
@@ -464,7 +464,7 @@ static void on_closed(void *user, const char *why)
 	}
 	if (!l->leaving) {
 		l->closed++;
-		fault(w, why);
+		fail_worker(w, why);
 	}
 }
 
@@ -510,7 +510,7 @@ void load_leave(struct load *l)
 		if (!w->conn)
 			continue;
 		uv_timer_stop(&w->work);
-		request(w, 0);
+		request_leases(w, 0);
 		for (int k = 0; k < LEASES; k++)
 			if (w->held[k].state == WAITING || w->held[k].state == WORKING)
 				give_back(w, &w->held[k]);

@@ -22,7 +22,7 @@
 static struct rows rows;
 
 /* Samples in units of what a case names, and the least bias that has to be found. */
-static uint64_t samples(uint64_t spp)
+static uint64_t scaled_samples(uint64_t spp)
 {
 	uint64_t n = test_full() ? 64 * spp : getenv("HSLT_TEST_ROWS") ? 4 * spp : spp / 16;
 	return n < 32 ? 32 : n;
@@ -38,7 +38,7 @@ static bool is_table(void)
 static void render(const struct agree_case *k, const char *name, const char *integrator, uint64_t spp, struct world *w,
 		   struct agree_image *out)
 {
-	struct agree_side side = {integrator, samples(spp), is_table() ? AGREE_MAX_GROUPS : 16, 1, k->max_depth};
+	struct agree_side side = {integrator, scaled_samples(spp), is_table() ? AGREE_MAX_GROUPS : 16, 1, k->max_depth};
 	uint64_t paths = 32 * k->spp > 1 << 14 ? 32 * k->spp : 1 << 14;
 	if (is_table())
 		agree_render_chains(w, name, integrator, &side, test_full() ? 16 * paths : paths, NULL, out);

@@ -20,7 +20,7 @@
 static struct rows rows;
 static uint64_t mutations, caught[3], invalid;
 
-static uint64_t unsound(const uint64_t *counters)
+static uint64_t count_unsound(const uint64_t *counters)
 {
 	return counters[COUNT_NAN] + counters[COUNT_INFINITE] + counters[COUNT_NEGATIVE];
 }
@@ -56,10 +56,10 @@ static void run_case(const struct hard_case *h)
 		s.worst >= 0 ? stationary_function(s.worst) : "nothing", s.worst >= 0 ? 100 * s.bias[s.worst] : 0,
 		s.worst >= 0 ? 100 * s.error[s.worst] : 0, 100 * s.least_block,
 		100 * (double)c.counters[COUNT_ACCEPTED] / (double)c.counters[COUNT_SAMPLES], c.b,
-		(unsigned long long)unsound(c.counters), (unsigned long long)c.counters[COUNT_LONGEST_STUCK],
+		(unsigned long long)count_unsound(c.counters), (unsigned long long)c.counters[COUNT_LONGEST_STUCK],
 		s.failure[0] ? "; " : "", s.failure);
 	row(&rows, h->topic, h->name, measured, "p > 1e-6; 0 caught; 0 in the film",
-	    stationary_holds(&s) && !c.film_invalid && !unsound(c.counters));
+	    stationary_holds(&s) && !c.film_invalid && !count_unsound(c.counters));
 	mutations += s.proposals + c.counters[COUNT_SAMPLES];
 	for (int i = 0; i < 3; i++)
 		caught[i] += s.counters[COUNT_NAN + i] + c.counters[COUNT_NAN + i];

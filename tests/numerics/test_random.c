@@ -22,7 +22,7 @@ static struct rows rows;
 
 enum { BDPT_SPP = 64 };
 
-static uint64_t times(void)
+static uint64_t repetitions(void)
 {
 	return test_full() ? 16 : getenv("HSLT_TEST_ROWS") ? 4 : 1;
 }
@@ -39,8 +39,8 @@ static void render(const struct trial *t, const char *side, const char *integrat
 {
 	char test[64];
 	snprintf(test, sizeof test, "%s, %llu", t->name, (unsigned long long)more);
-	struct agree_side how = {integrator, spp * times() * more, 16, 0, 0};
-	agree_render_chains(w, test, side, &how, 8192 * times() * more, NULL, out);
+	struct agree_side how = {integrator, spp * repetitions() * more, 16, 0, 0};
+	agree_render_chains(w, test, side, &how, 8192 * repetitions() * more, NULL, out);
 }
 
 static void compare(struct trial *t, const char *side, const char *integrator, uint64_t spp, struct world *w)

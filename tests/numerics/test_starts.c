@@ -42,7 +42,7 @@ static bool is_black(const struct chains_result *r)
 	return true;
 }
 
-static void dark(const char *name, const char *scene)
+static void check_unlit_start(const char *name, const char *scene)
 {
 	struct world *w = world_of_text(32, 32, "%s", scene);
 	struct chains_how how = {.min_depth = 1,
@@ -63,7 +63,7 @@ static void dark(const char *name, const char *scene)
 }
 
 /* What the program says of a black scene, and that it ends well. */
-static void note(void)
+static void add_row(void)
 {
 	const char *build = getenv("BUILD");
 	char folder[] = "/tmp/black-XXXXXX", path[256], command[1024], line[512], said[512] = "";
@@ -124,7 +124,7 @@ static void found_later(void)
 	world_free(w);
 }
 
-static void dominated(void)
+static void check_bright_start(void)
 {
 	struct world *w = world_of_text(32, 32, "%s", ROOM(LAMP("0.4,1.2,0", "0.3", "5")));
 	double quarter[2][4][FILMS], stuck = 0, share = 0;
@@ -181,12 +181,12 @@ static void dominated(void)
 static void test_starts(void **state)
 {
 	(void)state;
-	dark("no emitter", ROOM(""));
-	dark("the lamp is outside", ROOM(LAMP("0,9,0", "1", "5")));
-	dark("a lamp of radiance 0", ROOM(LAMP("0,1,0", "0.3", "0")));
-	note();
+	check_unlit_start("no emitter", ROOM(""));
+	check_unlit_start("the lamp is outside", ROOM(LAMP("0,9,0", "1", "5")));
+	check_unlit_start("a lamp of radiance 0", ROOM(LAMP("0,1,0", "0.3", "0")));
+	add_row();
 	found_later();
-	dominated();
+	check_bright_start();
 	printf("starts: %u cases, %u failed\n", rows.cases, rows.failed);
 	assert_int_equal(rows.failed, 0);
 }

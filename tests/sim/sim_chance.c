@@ -39,7 +39,7 @@ __attribute__((format(printf, 2, 3))) void sim_wrong(struct world *w, const char
 
 /* ---- what happens when */
 
-static bool earlier(const struct message *a, const struct message *b)
+static bool is_earlier(const struct message *a, const struct message *b)
 {
 	return a->time < b->time || (!(b->time < a->time) && a->order < b->order);
 }
@@ -52,7 +52,7 @@ void sim_push(struct world *w, struct message m)
 	}
 	m.order = w->order++;
 	size_t i = w->heap_count++;
-	for (; i > 0 && earlier(&m, &w->heap[(i - 1) / 2]); i = (i - 1) / 2)
+	for (; i > 0 && is_earlier(&m, &w->heap[(i - 1) / 2]); i = (i - 1) / 2)
 		w->heap[i] = w->heap[(i - 1) / 2];
 	w->heap[i] = m;
 }
@@ -65,9 +65,9 @@ struct message sim_pop(struct world *w)
 		size_t k = 2 * i + 1;
 		if (k >= w->heap_count)
 			break;
-		if (k + 1 < w->heap_count && earlier(&w->heap[k + 1], &w->heap[k]))
+		if (k + 1 < w->heap_count && is_earlier(&w->heap[k + 1], &w->heap[k]))
 			k++;
-		if (!earlier(&w->heap[k], &last))
+		if (!is_earlier(&w->heap[k], &last))
 			break;
 		w->heap[i] = w->heap[k];
 		i = k;

@@ -6,7 +6,7 @@
 #include <math.h>
 #include <string.h>
 
-static void hold(struct world *w, struct sim_job *j, enum job_hold which, bool on)
+static void hold_job(struct world *w, struct sim_job *j, enum job_hold which, bool on)
 {
 	struct event ev = {.kind = EVENT_HOLD, .job = j->id, .hold = which, .text = on ? "held" : ""};
 	if (j->over)
@@ -43,7 +43,7 @@ void sim_restore(struct world *w, struct sim_job *j, double elapsed)
 	memset(j->held, 0, sizeof j->held);
 	sim_step(w, &ev, 0);
 	if (held)
-		hold(w, j, HOLD_ORDERED, true);
+		hold_job(w, j, HOLD_ORDERED, true);
 }
 
 /* Only what is merged is remembered. What was under way to the old one comes to the new one, from peers that it does
@@ -84,7 +84,7 @@ void sim_release_all(struct world *w)
 	for (uint32_t i = 0; i < w->job_count; i++)
 		for (int which = 0; which < JOB_HOLDS; which++)
 			if (w->jobs[i].submitted)
-				hold(w, &w->jobs[i], (enum job_hold)which, false);
+				hold_job(w, &w->jobs[i], (enum job_hold)which, false);
 }
 
 static void set_priority(struct world *w, struct sim_job *j)
@@ -97,7 +97,7 @@ static void set_priority(struct world *w, struct sim_job *j)
 }
 
 /* Later bounds: each that the job has, so that none of them is met. */
-static void later(struct world *w, struct sim_job *j)
+static void extend_bounds(struct world *w, struct sim_job *j)
 {
 	struct plan *p = &j->plan;
 	if (p->rounds != UINT64_MAX)
@@ -114,7 +114,7 @@ static void extend(struct world *w, struct sim_job *j)
 	if ((j->over && !j->done) || j->plan.rounds > 40)
 		return;
 	w->result.extended++;
-	later(w, j);
+	extend_bounds(w, j);
 	if (j->over) {
 		j->over = j->done = false;
 		memset(j->held, 0, sizeof j->held);
@@ -134,10 +134,10 @@ void sim_order(struct world *w)
 		return;
 	switch (sim_below(w, 4)) {
 	case 0:
-		hold(w, j, sim_chance(w, 0.5) ? HOLD_ORDERED : HOLD_STORAGE, true);
+		hold_job(w, j, sim_chance(w, 0.5) ? HOLD_ORDERED : HOLD_STORAGE, true);
 		break;
 	case 1:
-		hold(w, j, sim_chance(w, 0.5) ? HOLD_ORDERED : HOLD_STORAGE, false);
+		hold_job(w, j, sim_chance(w, 0.5) ? HOLD_ORDERED : HOLD_STORAGE, false);
 		break;
 	case 2:
 		set_priority(w, j);

@@ -142,7 +142,7 @@ static bool ended_by_time(enum job_end end, const struct sim_job *j)
 	return end == END_TIME || (end == END_ERROR && over && sim_error_after(j, j->rounds) <= j->plan.target_error);
 }
 
-static void ended(struct world *w, const struct action *a, struct sim_job *j)
+static void on_job_ended(struct world *w, const struct action *a, struct sim_job *j)
 {
 	if (j->over)
 		sim_wrong(w, "j%" PRIu64 " ended twice", a->job);
@@ -204,7 +204,7 @@ static void trace_action(const struct world *w, const struct action *a)
 	       a->rounds, (int)a->ack, (int)a->state, a->text);
 }
 
-static void act(struct world *w, const struct action *a, uint64_t value)
+static void perform_action(struct world *w, const struct action *a, uint64_t value)
 {
 	struct sim_job *j = sim_job_by_id(w, a->job);
 	uint32_t index;
@@ -246,7 +246,7 @@ static void act(struct world *w, const struct action *a, uint64_t value)
 		break;
 	case ACTION_JOB_CHANGED:
 		if (job_state_is_end(a->state))
-			ended(w, a, j);
+			on_job_ended(w, a, j);
 		break;
 	case ACTION_CLOSE_PEER:
 		if (worker_of(w, a->peer, &index)) {
@@ -303,7 +303,7 @@ void sim_step(struct world *w, struct event *ev, uint64_t value)
 		w->jobs[ev->tag].submitted = true;
 	}
 	for (size_t i = 0; i < u.count && !*w->wrong; i++)
-		act(w, &u.actions[i], value);
+		perform_action(w, &u.actions[i], value);
 	check_progress(w);
 	if (u.wake < w->tick_at || w->tick_at <= w->now) {
 		w->tick_at = u.wake;

@@ -76,7 +76,7 @@ void sim_finish(struct world *w, const struct message *m)
 }
 
 /* An answer that nobody asked for, perhaps of an epoch that is not open, and right should it come when it is. */
-static void volunteer(struct world *w, const struct worker *k)
+static void offer_capacity(struct world *w, const struct worker *k)
 {
 	const struct sim_job *j = &w->jobs[sim_below(w, w->job_count)];
 	if (!j->prepared)
@@ -107,7 +107,7 @@ void sim_beat(struct world *w, const struct message *m)
 			k->want = HOARD;
 		tell_core(w, k, (struct event){.kind = EVENT_REQUEST, .want = k->want}, 0);
 		if (!sim_is_calm(w) && sim_chance(w, 0.05))
-			volunteer(w, k);
+			offer_capacity(w, k);
 	}
 	struct message next = *m;
 	next.time = w->now + 7;

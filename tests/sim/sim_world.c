@@ -30,7 +30,7 @@ static void plan_job(struct world *w, struct sim_job *j)
 }
 
 /* Two honest workers of one fingerprint at least, or a job could not end; one or two that are not. */
-static void distrust(struct world *w)
+static void choose_liars(struct world *w)
 {
 	for (uint32_t i = 0; i < w->worker_count; i++) {
 		if (w->liars || w->verify < 1 || i < 2)
@@ -74,7 +74,7 @@ static void make_world(struct world *w)
 		sim_push(w, (struct message){.kind = SUBMIT, .time = i ? 300 * sim_uniform(w) : 0, .worker = i});
 	}
 	if (w->verify > 0)
-		distrust(w);
+		choose_liars(w);
 	sim_push(w, (struct message){.kind = CALM, .time = w->calm});
 	for (uint32_t i = sim_chance(w, 0.5) ? 1 + sim_below(w, 4) : 0; i > 0; i--)
 		sim_push(w, (struct message){.kind = RESTART, .time = 600 * sim_uniform(w) * sim_uniform(w)});
@@ -102,7 +102,7 @@ static void submit(struct world *w, uint32_t index)
 	}
 }
 
-static void happen(struct world *w, struct message *m)
+static void deliver_message(struct world *w, struct message *m)
 {
 	switch (m->kind) {
 	case TO_CORE:
@@ -176,7 +176,7 @@ const char *sim_run(uint64_t seed, int trace, struct sim_result *r)
 		}
 		struct message m = sim_pop(w);
 		w->now = m.time;
-		happen(w, &m);
+		deliver_message(w, &m);
 	}
 	w->result.time = w->now;
 	farm_free(w->farm);

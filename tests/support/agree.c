@@ -65,7 +65,7 @@ static void add_batch(struct group_run *g, const struct batch *b)
 			g->strategy[i][k] += b->strategy[i][k];
 }
 
-static bool lease(struct group_run *g, const struct lease_key *k, const struct lease_input *in, struct batch *b)
+static bool run_lease(struct group_run *g, const struct lease_key *k, const struct lease_input *in, struct batch *b)
 {
 	struct error e = {""};
 	enum lease_end end;
@@ -83,7 +83,7 @@ static bool bootstrap(struct group_run *g, uint64_t *seeds)
 	for (uint32_t part = 0; part < p->parts; part++) {
 		struct lease_key k = {1, LEASE_BOOTSTRAP, g->group, part, 0};
 		struct batch b;
-		if (!lease(g, &k, NULL, &b)) {
+		if (!run_lease(g, &k, NULL, &b)) {
 			free(weights);
 			return false;
 		}
@@ -113,7 +113,7 @@ static bool run_part(struct group_run *g, uint32_t part, const uint64_t *seeds)
 		struct batch b;
 		if (g->p->kind == PLAN_SAMPLES)
 			in = (struct lease_input){.map = g->map};
-		ok = lease(g, &k, &in, &b);
+		ok = run_lease(g, &k, &in, &b);
 		batch_fini(&before);
 		before = (struct batch){.state_count = 0};
 		if (ok) {
@@ -146,7 +146,7 @@ struct queue {
 	atomic_uint next;
 };
 
-static void *work(void *arg)
+static void *run_groups(void *arg)
 {
 	struct queue *q = arg;
 	for (uint32_t g; (g = atomic_fetch_add(&q->next, 1)) < q->count;)
@@ -207,8 +207,8 @@ void agree_render_chains(const struct world *w, const char *test, const char *si
 		runs[g] = (struct group_run){.w = w, .p = &p, .map = map, .group = g, .mean = out->mean[g]};
 	struct queue q = {runs, p.groups, 0};
 	pthread_t other;
-	bool two = pthread_create(&other, NULL, work, &q) == 0;
-	work(&q);
+	bool two = pthread_create(&other, NULL, run_groups, &q) == 0;
+	run_groups(&q);
 	if (two)
 		pthread_join(other, NULL);
 	render_map_free(map);

@@ -144,7 +144,7 @@ struct run {
 	uint64_t checked, doubts;
 };
 
-static bool applies(const struct balance_trial *t, unsigned k)
+static bool fault_applies(const struct balance_trial *t, unsigned k)
 {
 	int b = t->how.b, c = t->how.c;
 	if (b > (int)k || (b > 0 && c >= b) || (t->side == BALANCE_CAMERA && b != (int)k))
@@ -344,7 +344,7 @@ static void run_group(struct run *r, unsigned group, struct starts *s, struct ba
 			r->weight = weight / scale[k];
 			measure(r->c, r->x, r->g, r->blur);
 			for (size_t j = 0; j < count; j++)
-				for (unsigned n = 0; n < trials[j].repeat && applies(&trials[j], k); n++)
+				for (unsigned n = 0; n < trials[j].repeat && fault_applies(&trials[j], k); n++)
 					propose(r, &trials[j], group);
 		}
 	}

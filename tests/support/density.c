@@ -170,8 +170,8 @@ static struct bsdf_sample specular_lobe(const struct path_context *c, const stru
 /* Density of `to`, generated from `at`, come from `from`. Specular lobes: a distribution in the direction towards the
  * light, projected on the geometric normal. Towards the camera the two solid angles are to each other as the squared
  * indices and the cosines with the shading normal, about which light is refracted (etendue). */
-static double scattered(const struct path_context *c, const struct path_vertex *from, const struct path_vertex *at,
-			bool delta, const struct path_vertex *to, enum transport transport)
+static double scattering_pdf(const struct path_context *c, const struct path_vertex *from, const struct path_vertex *at,
+			     bool delta, const struct path_vertex *to, enum transport transport)
 {
 	struct surface_point x;
 	if (at->kind == VERTEX_MEDIUM)
@@ -202,7 +202,7 @@ static double density_from_light(const struct path_context *c, const struct rout
 	if (i == 0)
 		return c->w->emitter_pdf[x[0].emitter] * em->ops->pdf_point(em, &p);
 	if (i >= 2)
-		return scattered(c, &x[i - 2], &x[i - 1], r->delta[i - 1], &x[i], TRANSPORT_IMPORTANCE) *
+		return scattering_pdf(c, &x[i - 2], &x[i - 1], r->delta[i - 1], &x[i], TRANSPORT_IMPORTANCE) *
 		       by_distance(c, &x[i - 1], &x[i]);
 	vec3 w = towards(&x[0], &x[1]);
 	if (x[0].kind == VERTEX_INFINITE)
@@ -218,7 +218,7 @@ static double density_from_camera(const struct path_context *c, const struct rou
 	if (i == 0 && on_delta(c, &x[0]))
 		return 0;
 	if (i + 2 <= r->k)
-		return scattered(c, &x[i + 2], &x[i + 1], r->delta[i + 1], &x[i], TRANSPORT_RADIANCE) *
+		return scattering_pdf(c, &x[i + 2], &x[i + 1], r->delta[i + 1], &x[i], TRANSPORT_RADIANCE) *
 		       by_distance(c, &x[i + 1], &x[i]);
 	vec3 w = towards(&x[r->k], &x[i]);
 	double cosine = vec3_dot(c->w->camera.axes.n, w), pixels = c->window.width * c->window.height;
@@ -351,7 +351,7 @@ static unsigned joined_to(const struct path_context *c, const struct route *r, u
 }
 
 /* Of x_0, as next event estimation draws it. */
-static double toward(const struct path_context *c, const struct route *r)
+static double direct_pdf(const struct path_context *c, const struct route *r)
 {
 	const struct emitter *em = &c->w->emitters[r->x[0].emitter];
 	struct emitter_point p = emitter_point_of(&r->x[0]);
@@ -372,21 +372,21 @@ static double geometry(const struct path_vertex *a, const struct path_vertex *b)
 	return cosine_at(a, w) * cosine_at(b, w) / (endless ? 1 : vec3_dot(d, d));
 }
 
-static bool exists(const struct path_context *c, const struct route *r, unsigned j)
+static bool is_joint(const struct path_context *c, const struct route *r, unsigned j)
 {
 	if (j == 0)
 		return !on_delta(c, &r->x[0]);
 	unsigned end = joined_to(c, r, j);
 	if (j == 1 && end == r->k)
 		return c->joins_lens && r->x[0].kind != VERTEX_INFINITE && !on_delta(c, &r->x[0]) &&
-		       toward(c, r) >= PATH_LENS_DENSER * (c->light_every ? c->light_every : 1) *
-					       path_pdf(c, NULL, &r->x[end], &r->x[0], TRANSPORT_RADIANCE);
+		       direct_pdf(c, r) >= PATH_LENS_DENSER * (c->light_every ? c->light_every : 1) *
+						   path_pdf(c, NULL, &r->x[end], &r->x[0], TRANSPORT_RADIANCE);
 	return !r->delta[j - 1] && !r->delta[end];
 }
 
 /* Logarithm of the density of the whole path by technique j. What it passes follows from the ends: the geometry terms
  * of the small edges stand for the long one's. */
-static double technique(const struct path_context *c, const struct route *r, unsigned j)
+static double technique_pdf(const struct path_context *c, const struct route *r, unsigned j)
 {
 	unsigned end = j > 0 ? joined_to(c, r, j) : 0;
 	double sum = 0;
@@ -400,7 +400,7 @@ static double technique(const struct path_context *c, const struct route *r, uns
 		sum -= log(geometry(&r->x[end], &r->x[j - 1]));
 	if (j != 1)
 		return sum;
-	return sum - log(r->from_light[0]) + log(toward(c, r));
+	return sum - log(r->from_light[0]) + log(direct_pdf(c, r));
 }
 
 /* The edge between two points, as a sub-path makes it. */
@@ -415,8 +415,8 @@ static struct path_edge edge_between(const struct path_context *c, const struct 
 }
 
 /* As if technique s had made it. */
-static void relabel(const struct path_context *c, struct route *r, unsigned s, struct joined_path *p,
-		    struct path_edge *joint)
+static void relabel_vertices(const struct path_context *c, struct route *r, unsigned s, struct joined_path *p,
+			     struct path_edge *joint)
 {
 	p->edges = r->k;
 	p->s = s;
@@ -448,9 +448,9 @@ static void check_rare_light(struct path_context *c, const struct route *r, cons
 {
 	double sum = 0;
 	c->light_every = 8;
-	bool made = exists(c, r, p->s);
+	bool made = is_joint(c, r, p->s);
 	for (unsigned j = 0; j <= p->edges; j++)
-		if (exists(c, r, j))
+		if (is_joint(c, r, j))
 			sum += j < (joined_to(c, r, 1) == p->edges ? 1 : 2) ? ratio[j] : 0.125 * ratio[j];
 	double weight = made ? path_balance_weight(c, p, PATH_MAX_EDGES) : 1 / sum;
 	c->light_every = 1;
@@ -463,18 +463,18 @@ static void check_ratios(struct path_context *c, struct route *r, struct density
 {
 	double p[DEPTH + 2], ratio[DEPTH + 2], most = -INFINITY;
 	for (unsigned j = 0; j <= r->k; j++) {
-		p[j] = technique(c, r, j);
+		p[j] = technique_pdf(c, r, j);
 		most = fmax(most, p[j]);
-		if (!exists(c, r, j))
+		if (!is_joint(c, r, j))
 			p[j] = -INFINITY;
 	}
 	for (unsigned s = 0; s <= r->k; s++) {
 		struct joined_path joined;
 		struct path_edge joint;
 		/* No technique makes a path that is 1e100 times less likely than by another. */
-		if (!exists(c, r, s) || most - p[s] > 230)
+		if (!is_joint(c, r, s) || most - p[s] > 230)
 			continue;
-		relabel(c, r, s, &joined, &joint);
+		relabel_vertices(c, r, s, &joined, &joint);
 		tally->passed += joined.passed > 0;
 		for (unsigned max_s = s > 1 ? PATH_MAX_EDGES : 1; max_s <= PATH_MAX_EDGES;
 		     max_s += PATH_MAX_EDGES - 1) {
@@ -498,7 +498,7 @@ static void check_ratios(struct path_context *c, struct route *r, struct density
 	}
 }
 
-static bool joins(struct path_context *c, unsigned s, unsigned t)
+static bool is_joinable(struct path_context *c, unsigned s, unsigned t)
 {
 	const struct path_vertex *z = &c->camera[t - 1];
 	if (s == 0)
@@ -587,7 +587,7 @@ struct density_tally density_check(const char *name, struct world *w, size_t wal
 			check_landing(&c, j);
 		for (unsigned t = 1; t <= camera; t++)
 			for (unsigned j = t > 1 ? 0 : c.joins_lens ? 1 : 2; j <= light && t + j - 1 <= DEPTH; j++)
-				if (t + j >= 2 && joins(&c, j, t))
+				if (t + j >= 2 && is_joinable(&c, j, t))
 					check_route(&c, j, t, &tally);
 	}
 	print_message(

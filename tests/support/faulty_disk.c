@@ -60,14 +60,14 @@ static uint64_t calls, changing_calls, since_failure, dice;
 static atomic_bool failed;
 static _Atomic uint64_t unasked[FAULTY_DISK_COUNTS];
 
-static void *must(void *p)
+static void *not_null(void *p)
 {
 	if (!p)
 		abort();
 	return p;
 }
 
-static double roll(void)
+static double random_unit(void)
 {
 	uint64_t z = dice += UINT64_C(0x9e3779b97f4a7c15);
 	z = (z ^ z >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
@@ -79,7 +79,7 @@ static double roll(void)
 
 static struct faulty_disk_node *node_new(bool folder, const char *last)
 {
-	struct faulty_disk_node *n = must(calloc(1, sizeof *n));
+	struct faulty_disk_node *n = not_null(calloc(1, sizeof *n));
 	n->folder = folder;
 	memcpy(n->last, last, strnlen(last, sizeof n->last - 1));
 	n->changes_last = &n->changes;
@@ -107,8 +107,8 @@ static void forget_name(struct name **list, const char *text)
 static void set_name(struct name **list, const char *text, struct faulty_disk_node *node)
 {
 	forget_name(list, text);
-	struct name *n = must(malloc(sizeof *n));
-	*n = (struct name){*list, must(strdup(text)), node};
+	struct name *n = not_null(malloc(sizeof *n));
+	*n = (struct name){*list, not_null(strdup(text)), node};
 	*list = n;
 }
 
@@ -120,7 +120,7 @@ static struct name *copy_names(const struct name *from)
 	return list;
 }
 
-static void apply(struct name **list, const struct renaming *r)
+static void apply_renaming(struct name **list, const struct renaming *r)
 {
 	if (r->gone)
 		forget_name(list, r->gone);
@@ -131,9 +131,9 @@ static void apply(struct name **list, const struct renaming *r)
 static void rename_in(struct faulty_disk_node *folder, const char *gone, const char *made,
 		      struct faulty_disk_node *node)
 {
-	struct renaming *r = must(calloc(1, sizeof *r));
-	*r = (struct renaming){NULL, gone ? must(strdup(gone)) : NULL, made ? must(strdup(made)) : NULL, node};
-	apply(&folder->live, r);
+	struct renaming *r = not_null(calloc(1, sizeof *r));
+	*r = (struct renaming){NULL, gone ? not_null(strdup(gone)) : NULL, made ? not_null(strdup(made)) : NULL, node};
+	apply_renaming(&folder->live, r);
 	*folder->renamings_last = r;
 	folder->renamings_last = &r->next;
 }
@@ -210,7 +210,7 @@ void faulty_disk_renamed(const char *from, const char *to)
 
 static void resize(unsigned char **bytes, uint64_t *size, uint64_t want)
 {
-	*bytes = must(realloc(*bytes, want + 1));
+	*bytes = not_null(realloc(*bytes, want + 1));
 	if (want > *size)
 		memset(*bytes + *size, 0, want - *size);
 	*size = want;
@@ -248,7 +248,7 @@ void faulty_disk_flushed(struct faulty_disk_node *n, bool database)
 	n->changes_last = &n->changes;
 	for (struct renaming *r; (r = n->renamings);) {
 		n->renamings = r->next;
-		apply(&n->safe, r);
+		apply_renaming(&n->safe, r);
 		free(r->gone);
 		free(r->made);
 		free(r);
@@ -276,11 +276,11 @@ void faulty_disk_flushed_folder_of(const char *path)
 
 static void add_change(struct faulty_disk_node *n, const void *bytes, uint64_t size, uint64_t at)
 {
-	struct change *c = must(calloc(1, sizeof *c));
+	struct change *c = not_null(calloc(1, sizeof *c));
 	c->at = at;
 	c->size = size;
 	if (bytes) {
-		c->bytes = must(malloc(size + 1));
+		c->bytes = not_null(malloc(size + 1));
 		memcpy(c->bytes, bytes, size);
 	}
 	*n->changes_last = c;
@@ -320,16 +320,16 @@ static void write_out(const struct faulty_disk_node *n, const char *path, const 
 	write_at(&bytes, &size, n->bytes ? n->bytes : (const unsigned char *)"", n->size, 0);
 	for (const struct change *c = n->changes; c; c = c->next) {
 		if (!c->bytes) {
-			if (roll() < p->lengths)
+			if (random_unit() < p->lengths)
 				resize(&bytes, &size, c->size);
 			continue;
 		}
-		if (roll() < p->lengths && c->at + c->size > size)
+		if (random_unit() < p->lengths && c->at + c->size > size)
 			resize(&bytes, &size, c->at + c->size);
 		for (uint64_t at = c->at, end; at < c->at + c->size; at = end) {
 			end = at / SECTOR * SECTOR + SECTOR;
 			end = end < c->at + c->size ? end : c->at + c->size;
-			if (roll() < p->bytes)
+			if (random_unit() < p->bytes)
 				write_at(&bytes, &size, c->bytes + (at - c->at), end - at, at);
 			else
 				++*lost;
@@ -353,8 +353,8 @@ static void write_folder(const struct faulty_disk_node *n, const char *path, con
 	if (mkdir(path, 0700))
 		abort();
 	for (const struct renaming *r = n->renamings; r; r = r->next) {
-		if (roll() < p->names)
-			apply(&names, r);
+		if (random_unit() < p->names)
+			apply_renaming(&names, r);
 		else
 			++*lost;
 	}
@@ -373,9 +373,9 @@ static void go_dark(void)
 	static const double shares[] = {0, 0.1, 0.5, 0.9, 1};
 	uint64_t lost = 0;
 	struct odds p;
-	p.bytes = shares[(int)(5 * roll())];
-	p.lengths = shares[(int)(5 * roll())];
-	p.names = shares[(int)(5 * roll())];
+	p.bytes = shares[(int)(5 * random_unit())];
+	p.lengths = shares[(int)(5 * random_unit())];
+	p.names = shares[(int)(5 * random_unit())];
 	write_folder(root, setup.after, &p, &lost);
 	atomic_fetch_add(&setup.counts[3], lost);
 	_exit(FAULTY_DISK_EXIT);
@@ -427,7 +427,7 @@ static void load_file(struct faulty_disk_node *n, const char *path)
 
 static void load_folder(struct faulty_disk_node *n, const char *path)
 {
-	DIR *d = must(opendir(path));
+	DIR *d = not_null(opendir(path));
 	for (struct dirent *f; (f = readdir(d));) {
 		char below[PATH_MOST];
 		struct stat st;

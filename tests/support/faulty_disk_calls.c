@@ -22,7 +22,7 @@ static bool is_refused(enum faulty_disk_call what)
 }
 
 /* Keeps errno. */
-static long out(long result)
+static long leave_with(long result)
 {
 	faulty_disk_leave();
 	return result;
@@ -38,7 +38,7 @@ static int do_open(const char *path, int flags, mode_t mode)
 		open_files[fd] = hidden ? NULL : faulty_disk_node_of(path, (flags & O_CREAT) != 0);
 	if (fd >= 0 && fd < FDS && open_files[fd] && (flags & O_TRUNC))
 		faulty_disk_cut(open_files[fd], 0);
-	return (int)out(fd);
+	return (int)leave_with(fd);
 }
 
 static int do_close(int fd)
@@ -46,7 +46,7 @@ static int do_close(int fd)
 	faulty_disk_enter(FAULTY_DISK_READS); /* a close that fails has closed all the same */
 	if (fd >= 0 && fd < FDS)
 		open_files[fd] = NULL;
-	return (int)out(close(fd));
+	return (int)leave_with(close(fd));
 }
 
 static struct faulty_disk_node *file_of(int fd)
@@ -56,12 +56,12 @@ static struct faulty_disk_node *file_of(int fd)
 
 static ssize_t do_read(int fd, void *bytes, size_t size)
 {
-	return is_refused(FAULTY_DISK_READS) ? -1 : out(read(fd, bytes, size));
+	return is_refused(FAULTY_DISK_READS) ? -1 : leave_with(read(fd, bytes, size));
 }
 
 static ssize_t do_pread(int fd, void *bytes, size_t size, off_t at)
 {
-	return is_refused(FAULTY_DISK_READS) ? -1 : out(pread(fd, bytes, size, at));
+	return is_refused(FAULTY_DISK_READS) ? -1 : leave_with(pread(fd, bytes, size, at));
 }
 
 static ssize_t do_write(int fd, const void *bytes, size_t size)
@@ -73,7 +73,7 @@ static ssize_t do_write(int fd, const void *bytes, size_t size)
 	ssize_t n = write(fd, bytes, size);
 	if (n > 0)
 		faulty_disk_wrote(file_of(fd), bytes, (size_t)n, (uint64_t)at);
-	return out(n);
+	return leave_with(n);
 }
 
 static ssize_t do_pwritev(int fd, const struct iovec *parts, int count, off_t at)
@@ -87,7 +87,7 @@ static ssize_t do_pwritev(int fd, const struct iovec *parts, int count, off_t at
 		at += (off_t)size;
 		left -= size;
 	}
-	return out(n);
+	return leave_with(n);
 }
 
 static int do_ftruncate(int fd, off_t size)
@@ -97,19 +97,19 @@ static int do_ftruncate(int fd, off_t size)
 	int rc = ftruncate(fd, size);
 	if (!rc)
 		faulty_disk_cut(file_of(fd), (uint64_t)size);
-	return (int)out(rc);
+	return (int)leave_with(rc);
 }
 
 static int do_fallocate(int fd, int mode, off_t at, off_t size)
 {
 	assert(mode == FALLOC_FL_KEEP_SIZE);
-	return is_refused(FAULTY_DISK_WRITES) ? -1 : (int)out(fallocate(fd, mode, at, size));
+	return is_refused(FAULTY_DISK_WRITES) ? -1 : (int)leave_with(fallocate(fd, mode, at, size));
 }
 
 static int do_posix_fallocate(int fd, off_t at, off_t size)
 {
 	int code = faulty_disk_enter(FAULTY_DISK_WRITES);
-	return (int)out(code ? code : posix_fallocate(fd, at, size));
+	return (int)leave_with(code ? code : posix_fallocate(fd, at, size));
 }
 
 static int do_fsync(int fd)
@@ -131,7 +131,7 @@ static int do_rename(const char *from, const char *to)
 	int rc = rename(from, to);
 	if (!rc)
 		faulty_disk_renamed(from, to);
-	return (int)out(rc);
+	return (int)leave_with(rc);
 }
 
 static int do_unlink(const char *path)
@@ -141,7 +141,7 @@ static int do_unlink(const char *path)
 	int rc = unlink(path);
 	if (!rc)
 		faulty_disk_removed(path);
-	return (int)out(rc);
+	return (int)leave_with(rc);
 }
 
 static int do_mkdir(const char *path, mode_t mode)
@@ -151,7 +151,7 @@ static int do_mkdir(const char *path, mode_t mode)
 	int rc = mkdir(path, mode);
 	if (!rc)
 		faulty_disk_made_folder(path);
-	return (int)out(rc);
+	return (int)leave_with(rc);
 }
 
 static int do_rmdir(const char *path)
@@ -161,27 +161,27 @@ static int do_rmdir(const char *path)
 	int rc = rmdir(path);
 	if (!rc)
 		faulty_disk_removed(path);
-	return (int)out(rc);
+	return (int)leave_with(rc);
 }
 
 static int do_stat(const char *path, struct stat *st)
 {
-	return is_refused(FAULTY_DISK_READS) ? -1 : (int)out(lstat(path, st));
+	return is_refused(FAULTY_DISK_READS) ? -1 : (int)leave_with(lstat(path, st));
 }
 
 static int do_fstat(int fd, struct stat *st)
 {
-	return is_refused(FAULTY_DISK_READS) ? -1 : (int)out(fstat(fd, st));
+	return is_refused(FAULTY_DISK_READS) ? -1 : (int)leave_with(fstat(fd, st));
 }
 
 static int do_touch(const char *path)
 {
-	return is_refused(FAULTY_DISK_READS) ? -1 : (int)out(disk_system.touch(path));
+	return is_refused(FAULTY_DISK_READS) ? -1 : (int)leave_with(disk_system.touch(path));
 }
 
 static int do_flock(int fd, int what)
 {
-	return is_refused(FAULTY_DISK_READS) ? -1 : (int)out(disk_system.flock(fd, what));
+	return is_refused(FAULTY_DISK_READS) ? -1 : (int)leave_with(disk_system.flock(fd, what));
 }
 
 static DIR *do_opendir(const char *path)

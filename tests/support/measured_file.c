@@ -35,23 +35,23 @@ static double phi_of(const struct measured_kind *k, int i)
 /* ---- the formulas ---- */
 
 /* By the axes of the facets. */
-static vec3 unturned(const struct measured_kind *k, vec3 w)
+static vec3 into_facet_frame(const struct measured_kind *k, vec3 w)
 {
 	double c = cos(k->turn), s = sin(k->turn);
 	return (vec3){c * w.x + s * w.y, c * w.y - s * w.x, w.z};
 }
 
-static double facets(const struct measured_kind *k, vec3 h)
+static double facet_density(const struct measured_kind *k, vec3 h)
 {
-	vec3 m = unturned(k, h);
+	vec3 m = into_facet_frame(k, h);
 	double x = m.x / k->alpha_u, y = m.y / k->alpha_v, r = x * x + y * y + m.z * m.z;
 	return 1 / (PI * k->alpha_u * k->alpha_v * r * r);
 }
 
 /* cos(theta) / G1 */
-static double shown(const struct measured_kind *k, vec3 v)
+static double visible_factor(const struct measured_kind *k, vec3 v)
 {
-	vec3 w = unturned(k, v);
+	vec3 w = into_facet_frame(k, v);
 	double x = k->alpha_u * w.x, y = k->alpha_v * w.y;
 	return 0.5 * (w.z + sqrt(w.z * w.z + x * x + y * y));
 }
@@ -61,15 +61,15 @@ static double color_of(const struct measured_kind *k, double tint, vec3 wo, vec3
 {
 	vec3 h = vec3_normalize(vec3_add(wo, wi));
 	double fresnel = k->white ? 1 : tint + (1 - tint) * pow(1 - fmin(vec3_dot(wo, h), 1), 5);
-	double s = wi.z > 0 ? fresnel * wi.z / shown(k, wi) : 0;
-	return k->absolute ? s * facets(k, h) / (4 * shown(k, wo)) : s;
+	double s = wi.z > 0 ? fresnel * wi.z / visible_factor(k, wi) : 0;
+	return k->absolute ? s * facet_density(k, h) / (4 * visible_factor(k, wo)) : s;
 }
 
 double measured_kind_reflected(const struct measured_kind *k, double tint, vec3 wo, vec3 wi)
 {
 	vec3 h = vec3_normalize(vec3_add(wo, wi));
 	double s = color_of(k, tint, wo, wi);
-	return k->absolute ? s : s * facets(k, h) / (4 * shown(k, wo));
+	return k->absolute ? s : s * facet_density(k, h) / (4 * visible_factor(k, wo));
 }
 
 static vec3 direction(double x, double y)
@@ -150,8 +150,8 @@ static void add_planes(struct tensor_file *f, const struct measured_kind *k)
 	for (int y = 0; y < n; y++)
 		for (int x = 0; x < n; x++) {
 			vec3 w = direction((double)x / (n - 1), (double)y / (n - 1));
-			tensor_file_put(&ndf, facets(k, w));
-			tensor_file_put(&sigma, shown(k, w));
+			tensor_file_put(&ndf, facet_density(k, w));
+			tensor_file_put(&sigma, visible_factor(k, w));
 		}
 }
 
@@ -162,7 +162,7 @@ static void find_visible(const struct measured_kind *k, vec3 wo, double *grid)
 		for (int x = 0; x < n; x++) {
 			double u = (double)x / (n - 1);
 			vec3 m = direction(u, (double)y / (n - 1));
-			double d = facets(k, m) * fmax(vec3_dot(wo, m), 0) * u * sin(0.5 * PI * u * u);
+			double d = facet_density(k, m) * fmax(vec3_dot(wo, m), 0) * u * sin(0.5 * PI * u * u);
 			grid[y * n + x] = (double)(float)d;
 		}
 }

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void *room(struct arena *a, size_t count, size_t size)
+static void *alloc_or_abort(struct arena *a, size_t count, size_t size)
 {
 	void *p = arena_alloc(a, count, size);
 	if (!p)
@@ -15,7 +15,7 @@ static void *room(struct arena *a, size_t count, size_t size)
 
 static void add(struct arena *a, struct scene_node *n, const char *name, struct value v)
 {
-	struct property *all = room(a, n->property_count + 1, sizeof *all);
+	struct property *all = alloc_or_abort(a, n->property_count + 1, sizeof *all);
 	if (n->property_count)
 		memcpy(all, n->properties, n->property_count * sizeof *all);
 	all[n->property_count] = (struct property){.name = arena_strdup(a, name), .line = 1, .value = v};
@@ -43,7 +43,7 @@ static struct value parse_value(struct arena *a, const char *text)
 
 struct scene_node *node_make(struct arena *a, enum plugin_class cls, const char *text)
 {
-	struct scene_node *n = room(a, 1, sizeof *n);
+	struct scene_node *n = alloc_or_abort(a, 1, sizeof *n);
 	char *copy = arena_strdup(a, text), *rest = copy;
 	*n = (struct scene_node){.cls = cls, .type = strtok_r(copy, " ", &rest), .file = "test", .line = 1};
 	for (char *word; (word = strtok_r(NULL, " ", &rest));) {
@@ -58,7 +58,7 @@ struct scene_node *node_make(struct arena *a, enum plugin_class cls, const char 
 
 void node_add_child(struct arena *a, struct scene_node *n, const struct scene_node *child)
 {
-	const struct scene_node **all = room(a, n->child_count + 1, sizeof *all);
+	const struct scene_node **all = alloc_or_abort(a, n->child_count + 1, sizeof *all);
 	for (uint32_t i = 0; i < n->child_count; i++)
 		all[i] = n->children[i];
 	all[n->child_count++] = child;
@@ -76,13 +76,13 @@ void node_add_transform(struct arena *a, struct scene_node *n, const char *name,
 }
 
 /* A BSDF and its parts, which the first of these characters separates, and theirs the next. */
-static struct scene_node *nested(struct arena *a, char *text, const char *separators);
+static struct scene_node *nested_node(struct arena *a, char *text, const char *separators);
 
 /* " diffuse", or " texture checkerboard", or " texture scale texture checkerboard", or a BSDF with parts. */
-static struct scene_node *part(struct arena *a, char *text, const char *separators)
+static struct scene_node *node_of_part(struct arena *a, char *text, const char *separators)
 {
 	if (*separators && strchr(text, *separators))
-		return nested(a, text, separators);
+		return nested_node(a, text, separators);
 	char *first = strstr(text, "texture "), *second = first ? strstr(first + 1, " texture ") : NULL;
 	if (!first)
 		return node_make(a, PLUGIN_BSDF, text);
@@ -99,14 +99,14 @@ static void add_part(struct arena *a, struct scene_node *n, char *text, const ch
 {
 	char *at = strchr(text, '@'), *space = at ? strchr(at, ' ') : NULL;
 	if (!space || (*separators && strchr(text, *separators))) {
-		node_add_child(a, n, part(a, text, separators));
+		node_add_child(a, n, node_of_part(a, text, separators));
 		return;
 	}
 	*space = 0;
 	node_add_ref(a, n, at + 1, node_make(a, PLUGIN_TEXTURE, space + 1));
 }
 
-static struct scene_node *nested(struct arena *a, char *text, const char *separators)
+static struct scene_node *nested_node(struct arena *a, char *text, const char *separators)
 {
 	const char here[] = {*separators, 0};
 	char *rest = text;
@@ -120,5 +120,5 @@ struct scene_node *node_bsdf(struct arena *a, const char *text)
 {
 	char copy[512];
 	snprintf(copy, sizeof copy, "%s", text);
-	return nested(a, copy, "|/;");
+	return nested_node(a, copy, "|/;");
 }

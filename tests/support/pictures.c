@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void rgbe(const double rgb[3], unsigned char out[4])
+static void to_rgbe(const double rgb[3], unsigned char out[4])
 {
 	double largest = fmax(rgb[0], fmax(rgb[1], rgb[2]));
 	int exponent = 0;
@@ -33,7 +33,7 @@ void pictures_add(struct pictures *p, uint32_t width, uint32_t height, const dou
 	assert(f->bytes);
 	memcpy(f->bytes, head, (size_t)n);
 	for (size_t i = 0; i < (size_t)width * height; i++)
-		rgbe(rgb + 3 * i, f->bytes + n + 4 * i);
+		to_rgbe(rgb + 3 * i, f->bytes + n + 4 * i);
 }
 
 static int open_picture(void *user, const char *name, struct asset *out, struct error *e)

@@ -6,7 +6,7 @@
 
 #include <math.h>
 
-static double angle(double least, double most, int i, int n)
+static double angle_of_index(double least, double most, int i, int n)
 {
 	return least + (most - least) * i / (n - 1);
 }
@@ -22,10 +22,10 @@ unsigned char *polarized_file_make(polarized_f *f, int phis, int thetas, size_t 
 		      *nm = tensor_file_add(&file, "wvls", TENSOR_SHORTS, 1, wavelengths),
 		      *m = tensor_file_add(&file, "M", TENSOR_FLOATS, 6, sides);
 	for (int i = 0; i < phis; i++)
-		tensor_file_put(&phi, angle(-M_PI, M_PI, i, phis));
+		tensor_file_put(&phi, angle_of_index(-M_PI, M_PI, i, phis));
 	for (int i = 0; i < thetas; i++) {
-		tensor_file_put(&theta_d, angle(0, M_PI / 2, i, thetas));
-		tensor_file_put(&theta_h, angle(0, M_PI / 2, i, thetas));
+		tensor_file_put(&theta_d, angle_of_index(0, M_PI / 2, i, thetas));
+		tensor_file_put(&theta_h, angle_of_index(0, M_PI / 2, i, thetas));
 	}
 	for (int i = 0; i < POLARIZED_WAVELENGTHS; i++)
 		put_bytes(nm + 2 * i, (uint64_t)(450 + 50 * i), 2);
@@ -34,9 +34,9 @@ unsigned char *polarized_file_make(polarized_f *f, int phis, int thetas, size_t 
 			for (int h = 0; h < thetas; h++)
 				for (int w = 0; w < POLARIZED_WAVELENGTHS; w++)
 					for (int k = 0; k < 16; k++) {
-						double first =
-							f(angle(-M_PI, M_PI, i, phis), angle(0, M_PI / 2, d, thetas),
-							  angle(0, M_PI / 2, h, thetas), 450 + 50 * w);
+						double first = f(angle_of_index(-M_PI, M_PI, i, phis),
+								 angle_of_index(0, M_PI / 2, d, thetas),
+								 angle_of_index(0, M_PI / 2, h, thetas), 450 + 50 * w);
 						tensor_file_put(&m, k ? 7 : first);
 					}
 	return tensor_file_end(&file, size);

@@ -31,12 +31,12 @@ struct maker {
 #define PUT(m, ...) append((m)->s->body, sizeof (m)->s->body, &(m)->s->used, __VA_ARGS__)
 /* clang-format on */
 
-static bool chance(struct maker *m, double p)
+static bool is_drawn(struct maker *m, double p)
 {
 	return dice_throw(&m->d) < p;
 }
 
-static double between(struct maker *m, double low, double high)
+static double random_between(struct maker *m, double low, double high)
 {
 	return dice_between(&m->d, low, high);
 }
@@ -44,7 +44,7 @@ static double between(struct maker *m, double low, double high)
 /* One number a call: the order in which arguments are evaluated is the compiler's. */
 static void put_between(struct maker *m, const char *before, double low, double high, const char *after)
 {
-	PUT(m, "%s%.3f%s", before, between(m, low, high), after);
+	PUT(m, "%s%.3f%s", before, random_between(m, low, high), after);
 }
 
 static void put_rgb(struct maker *m, const char *name, double low, double high)
@@ -101,7 +101,7 @@ static void begin_relief(struct maker *m)
 {
 	PUT(m, "<bsdf type='normalmap'><texture type='checkerboard'>");
 	for (int i = 0; i < 2; i++) {
-		double angle = between(m, 0, 60 * M_PI / 180), around = between(m, 0, 2 * M_PI);
+		double angle = random_between(m, 0, 60 * M_PI / 180), around = random_between(m, 0, 2 * M_PI);
 		PUT(m, "<rgb name='color%d' value='%.3f,%.3f,%.3f'/>", i, 0.5 + 0.5 * sin(angle) * cos(around),
 		    0.5 + 0.5 * sin(angle) * sin(around), 0.5 + 0.5 * cos(angle));
 	}
@@ -111,7 +111,7 @@ static void begin_relief(struct maker *m)
 static void put_material(struct maker *m)
 {
 	const char *chosen = m->materials[dice_below(&m->d, m->count)];
-	bool bent = m->relief && chance(m, 0.6) && !strstr(chosen, "bumpmap") && !strstr(chosen, "normalmap");
+	bool bent = m->relief && is_drawn(m, 0.6) && !strstr(chosen, "bumpmap") && !strstr(chosen, "normalmap");
 	if (bent)
 		begin_relief(m);
 	size_t used = strlen(m->s->materials);
@@ -155,7 +155,7 @@ static void put_phase(struct maker *m)
 static void put_medium(struct maker *m, const char *name)
 {
 	PUT(m, "<medium type='homogeneous' name='%s'>", name);
-	if (m->fog && chance(m, 0.8)) {
+	if (m->fog && is_drawn(m, 0.8)) {
 		put_rgb(m, "albedo", 0.3, 1);
 		put_phase(m);
 	} else
@@ -193,22 +193,22 @@ static void put_shape(struct maker *m)
 		PUT(m, "</shape></shape>");
 		for (int i = 0; i < 2; i++) {
 			PUT(m, "<shape type='instance'><ref id='g%zu'/>", id);
-			put_place(m, between(m, 0.3, 0.6), -0.2, 1);
+			put_place(m, random_between(m, 0.3, 0.6), -0.2, 1);
 			PUT(m, "</shape>");
 		}
 		return;
 	}
 	PUT(m, "<shape type='%s'>%s", shapes[k].type, shapes[k].inner);
-	if (chance(m, 0.1))
+	if (is_drawn(m, 0.1))
 		PUT(m, "<boolean name='flip_normals' value='true'/>");
-	put_place(m, between(m, 0.3, 0.7), -0.2, 1);
-	if (m->fog && chance(m, 0.4))
+	put_place(m, random_between(m, 0.3, 0.7), -0.2, 1);
+	if (m->fog && is_drawn(m, 0.4))
 		PUT(m, "<bsdf type='null'/>");
 	else
 		put_material(m);
 	/* on either side of any shape, whether it is closed or not: most of them do not fit together */
-	if (chance(m, m->fog ? 0.7 : 0.2))
-		put_medium(m, chance(m, 0.7) ? "interior" : "exterior");
+	if (is_drawn(m, m->fog ? 0.7 : 0.2))
+		put_medium(m, is_drawn(m, 0.7) ? "interior" : "exterior");
 	PUT(m, "</shape>");
 }
 
@@ -218,7 +218,7 @@ static void put_wall(struct maker *m, const char *turn, const char *move)
 	    "<shape type='rectangle'><transform name='to_world'><scale value='2'/>%s<translate %s/></transform>"
 	    "<bsdf type='twosided'><bsdf type='diffuse'>",
 	    turn, move);
-	if (chance(m, 0.3)) {
+	if (is_drawn(m, 0.3)) {
 		PUT(m, "<texture name='reflectance' type='checkerboard'>");
 		put_rgb(m, "color0", 0.05, 0.8);
 		put_rgb(m, "color1", 0.05, 0.8);
@@ -264,14 +264,14 @@ static void put_lamp(struct maker *m)
 {
 	unsigned k = dice_below(&m->d, SHAPES - 1); /* not the displaced ball */
 	PUT(m, "<shape type='%s'>%s<emitter type='area'>", shapes[k].type, shapes[k].inner);
-	if (chance(m, 0.2))
+	if (is_drawn(m, 0.2))
 		PUT(m,
 		    "<texture name='radiance' type='bitmap'><string name='filename' value='picture.ppm'/></texture>");
 	else
 		put_rgb(m, "radiance", 2, 9);
-	PUT(m, "%s</emitter>", chance(m, 0.3) ? "<boolean name='two_sided' value='true'/>" : "");
-	put_place(m, between(m, 0.25, 0.5), 1.2, 0.5);
-	if (chance(m, 0.2))
+	PUT(m, "%s</emitter>", is_drawn(m, 0.3) ? "<boolean name='two_sided' value='true'/>" : "");
+	put_place(m, random_between(m, 0.25, 0.5), 1.2, 0.5);
+	if (is_drawn(m, 0.2))
 		put_material(m);
 	PUT(m, "</shape>");
 }
@@ -326,11 +326,11 @@ static void put_camera(struct maker *m)
 	static const char *const types[] = {"perspective", "perspective", "thinlens", "orthographic"};
 	unsigned k = dice_below(&m->d, 4);
 	PUT(m, "<sensor type='%s'>", types[k]);
-	if (chance(m, 0.3))
+	if (is_drawn(m, 0.3))
 		put_between(m, "<float name='near_clip' value='", 0.1, 2, "'/>");
 	if (k < 3)
 		put_between(m, "<float name='fov' value='", 35, 60, "'/>");
-	if (k < 3 && chance(m, 0.2))
+	if (k < 3 && is_drawn(m, 0.2))
 		put_between(m, "<float name='principal_point_offset_x' value='", -0.3, 0.3, "'/>");
 	if (k == 2) {
 		put_between(m, "<float name='aperture_radius' value='", 0.02, 0.2, "'/>");
@@ -340,9 +340,9 @@ static void put_camera(struct maker *m)
 	put_between(m, "", -1, 1, ",");
 	put_between(m, "", -0.5, 1, ",3.8' target='");
 	put_between(m, "", -0.4, 0.4, ",0,0'/></transform>");
-	if (m->fog && chance(m, 0.3))
+	if (m->fog && is_drawn(m, 0.3))
 		put_medium(m, "medium");
-	PUT(m, "<film type='hdrfilm'><rfilter type='%s'/></film></sensor>", chance(m, 0.5) ? "box" : "gaussian");
+	PUT(m, "<film type='hdrfilm'><rfilter type='%s'/></film></sensor>", is_drawn(m, 0.5) ? "box" : "gaussian");
 }
 
 void random_scene_make(struct random_scene *s, uint64_t number, const char *const *materials, uint32_t count)
@@ -364,18 +364,18 @@ void random_scene_make(struct random_scene *s, uint64_t number, const char *cons
 	PUT(&m, "<integrator type='volpath'><integer name='max_depth' value='%u'/></integrator>",
 	    3 + dice_below(&m.d, 5));
 	put_camera(&m);
-	bool room = chance(&m, 0.6);
+	bool room = is_drawn(&m, 0.6);
 	put_wall(&m, "<rotate x='1' angle='-90'/>", "y='-1.6'");
 	for (unsigned i = 0; room && i < sizeof walls / sizeof *walls; i++)
-		if (chance(&m, 0.85))
+		if (is_drawn(&m, 0.85))
 			put_wall(&m, walls[i][0], walls[i][1]);
 	for (unsigned i = 0, n = 2 + dice_below(&m.d, 3); i < n; i++)
 		put_shape(&m);
-	if (!room || chance(&m, 0.2))
+	if (!room || is_drawn(&m, 0.2))
 		put_environment(&m);
-	if (room || chance(&m, 0.5))
+	if (room || is_drawn(&m, 0.5))
 		put_lamp(&m);
-	if (chance(&m, 0.25))
+	if (is_drawn(&m, 0.25))
 		put_beam(&m);
 }
 

@@ -85,7 +85,7 @@ static int render(struct queue *q, uint32_t i, struct error *e)
 	return rc;
 }
 
-static void *work(void *arg)
+static void *run_repeats(void *arg)
 {
 	struct queue *q = arg;
 	for (uint32_t i; (i = atomic_fetch_add(&q->next, 1)) < q->how->count;) {
@@ -115,8 +115,8 @@ void repeats_run(const struct world *w, const struct repeats_how *how, repeats_l
 			  .cpu = calloc(how->count, sizeof *q.cpu)};
 	assert_true(out->images && q.cpu);
 	pthread_t other;
-	bool two = pthread_create(&other, NULL, work, &q) == 0;
-	work(&q);
+	bool two = pthread_create(&other, NULL, run_repeats, &q) == 0;
+	run_repeats(&q);
 	if (two)
 		pthread_join(other, NULL);
 	assert_int_equal(q.failed, 0);

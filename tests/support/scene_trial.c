@@ -52,8 +52,8 @@ static struct plan plan_of(const struct render_summary *s, const struct render_i
 	return p;
 }
 
-static int lease(const struct world *w, const struct plan *p, enum lease_kind kind, const struct lease_input *in,
-		 struct batch *b, struct error *e)
+static int run_lease(const struct world *w, const struct plan *p, enum lease_kind kind, const struct lease_input *in,
+		     struct batch *b, struct error *e)
 {
 	struct lease_key k = {1, kind, 0, 0, 0};
 	enum lease_end end;
@@ -71,18 +71,18 @@ static int render(const struct world *w, const struct render_summary *s, const s
 		return -1;
 	struct batch b;
 	if (i->kind == PLAN_SAMPLES)
-		return lease(w, &p, LEASE_RENDER, NULL, &b, e);
-	if (lease(w, &p, LEASE_BOOTSTRAP, NULL, &b, e))
+		return run_lease(w, &p, LEASE_RENDER, NULL, &b, e);
+	if (run_lease(w, &p, LEASE_BOOTSTRAP, NULL, &b, e))
 		return -1;
 	uint64_t seeds[2] = {0, 0}, n = 0;
 	for (uint64_t k = 0; k < b.weight_count && n < 2; k++)
 		if (b.weights[k] > 0)
 			seeds[n++] = k;
 	const struct lease_input in = {.chain_count = 2, .seeds = seeds};
-	return n < 2 ? 0 : lease(w, &p, LEASE_RENDER, &in, &b, e);
+	return n < 2 ? 0 : run_lease(w, &p, LEASE_RENDER, &in, &b, e);
 }
 
-static int child(const struct memory_file *files)
+static int try_in_child(const struct memory_file *files)
 {
 	struct rlimit cpu = {CPU_SECONDS, CPU_SECONDS};
 	setrlimit(RLIMIT_CPU, &cpu);
@@ -124,7 +124,7 @@ int scene_trial(const struct memory_file *files, char *text, size_t size)
 		signal(SIGSEGV, SIG_DFL);
 		dup2(pipes[1], 1);
 		dup2(pipes[1], 2);
-		_exit(child(files));
+		_exit(try_in_child(files));
 	}
 	close(pipes[1]);
 	size_t used = 0;

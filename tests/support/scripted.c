@@ -258,7 +258,7 @@ uint64_t scripted_tag(const struct lease_key *k)
 	return z ^ z >> 31;
 }
 
-static float light(uint64_t *tag)
+static float random_value(uint64_t *tag)
 {
 	*tag = *tag * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
 	return 0.5f + (float)(*tag >> 40) * 0x1p-24f;
@@ -267,7 +267,7 @@ static float light(uint64_t *tag)
 static void light_weights(struct batch *b, uint64_t tag)
 {
 	for (uint64_t i = 0; i < b->weight_count; i++) {
-		b->weights[i] = light(&tag);
+		b->weights[i] = random_value(&tag);
 		b->independent_sum += b->weights[i];
 		b->independent_square += (double)b->weights[i] * b->weights[i];
 	}
@@ -288,7 +288,7 @@ static void add_tiles(struct batch *b, const struct plan *plan, uint64_t tag)
 			size_t count = (size_t)t->width * t->height * TILE_CHANNELS;
 			t->xyz = mem_alloc(count, sizeof *t->xyz);
 			for (size_t i = 0; i < count; i++)
-				t->xyz[i] = light(&tag);
+				t->xyz[i] = random_value(&tag);
 		}
 }
 

@@ -270,7 +270,7 @@ void peer_say_job_get(const struct scripted *p, uint64_t job)
 	peer_say(p, &m, NULL, 0);
 }
 
-static bool works(void)
+static bool is_answering(void)
 {
 	struct scripted *p = peer_call();
 	const Farm__HelloAck *ack = scripted_hello(p, FARM_VERSION, FARM__ROLE__ROLE_CLIENT);
@@ -286,13 +286,13 @@ static bool works(void)
 
 void served_still_works(void)
 {
-	assert_true(works());
+	assert_true(is_answering());
 }
 
 void served_works_again(void)
 {
 	for (int i = 0; i < LOOKS; i++) {
-		if (works())
+		if (is_answering())
 			return;
 		usleep(LOOK_US);
 	}

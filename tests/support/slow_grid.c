@@ -6,7 +6,7 @@
 
 enum { CUTS_MAX = 256 };
 
-static int wrapped(const struct grid *g, int i, int n)
+static int wrapped_index(const struct grid *g, int i, int n)
 {
 	while (i < 0 || i >= n) {
 		if (g->outside == GRID_REPEAT)
@@ -32,9 +32,9 @@ double slow_grid_value(const struct grid *g, const double x[3], int channel)
 		for (int j = (int)x[1] - 2; j <= x[1] + 2 && z > 0; j++) {
 			double y = z * weight_of(g, j, x[1]);
 			for (int i = (int)x[0] - 2; i <= x[0] + 2 && y > 0; i++) {
-				size_t row = (size_t)(wrapped(g, k, g->size[2]) * g->size[1] +
-						      wrapped(g, j, g->size[1])),
-				       at = row * (size_t)g->size[0] + (size_t)wrapped(g, i, g->size[0]);
+				size_t row = (size_t)(wrapped_index(g, k, g->size[2]) * g->size[1] +
+						      wrapped_index(g, j, g->size[1])),
+				       at = row * (size_t)g->size[0] + (size_t)wrapped_index(g, i, g->size[0]);
 				double value = (double)g->value[at * (size_t)g->channels + (size_t)channel];
 				sum += y * weight_of(g, i, x[0]) * value;
 			}

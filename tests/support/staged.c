@@ -172,7 +172,7 @@ uint64_t staged_submit(void)
 	return scripted_submit_whole(staged.client, &scripted_request, "<scene/>");
 }
 
-static const Farm__Done *ask(const Farm__Envelope *m)
+static const Farm__Done *ask_for_done(const Farm__Envelope *m)
 {
 	assert_true(scripted_say(staged.client, m, NULL, 0));
 	const Farm__Envelope *answer = scripted_hear(staged.client);
@@ -182,12 +182,12 @@ static const Farm__Done *ask(const Farm__Envelope *m)
 
 void staged_order(const Farm__Envelope *m)
 {
-	assert_true(ask(m)->ok);
+	assert_true(ask_for_done(m)->ok);
 }
 
 const char *staged_refusal(const Farm__Envelope *m)
 {
-	const Farm__Done *answer = ask(m);
+	const Farm__Done *answer = ask_for_done(m);
 	assert_false(answer->ok);
 	return answer->text;
 }
@@ -201,7 +201,7 @@ static const Farm__Done *cancel(uint64_t job)
 	c.job = job;
 	m.body_case = FARM__ENVELOPE__BODY_CANCEL;
 	m.cancel = &c;
-	return ask(&m);
+	return ask_for_done(&m);
 }
 
 void staged_cancel(uint64_t job)

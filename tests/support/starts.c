@@ -18,7 +18,7 @@ void starts_context(struct path_context *c, const struct world *w, unsigned min_
 				   .refract = halfvec_refract};
 }
 
-static void walk(struct starts *s, uint64_t index, unsigned *camera, unsigned *light)
+static void walk_both(struct starts *s, uint64_t index, unsigned *camera, unsigned *light)
 {
 	struct sampler_random r;
 	double film[2];
@@ -59,7 +59,7 @@ void starts_init(struct starts *s, struct path_context *c, uint64_t seed, uint64
 	*s = (struct starts){.c = c, .seed = seed, .pairs = pairs};
 	for (uint64_t i = group * pairs; i < (group + 1) * pairs; i++) {
 		unsigned camera, light;
-		walk(s, i, &camera, &light);
+		walk_both(s, i, &camera, &light);
 		for (unsigned edges = c->min_depth; edges <= c->max_depth; edges++)
 			for (unsigned j = 0; j <= edges; j++) {
 				double f = contribution(c, j, edges, camera, light);
@@ -96,6 +96,6 @@ bool starts_path(struct starts *s, unsigned edges, double u, struct full_path *x
 	}
 	unsigned camera, light;
 	const struct start *chosen = &s->of[edges].at[low];
-	walk(s, chosen->index, &camera, &light);
+	walk_both(s, chosen->index, &camera, &light);
 	return full_path_from_subpaths(s->c, chosen->s, chosen->passed, edges, x);
 }

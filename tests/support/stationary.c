@@ -160,8 +160,8 @@ static double log_geometry(const struct full_path *x, unsigned b)
 	return b > 0 ? log(path_cosine(&x->v[b - 1], x->edge[b - 1].w) / x->edge[b - 1].distance2) : 0;
 }
 
-static double planted(enum stationary_fault fault, const struct move *m, const struct full_path *x,
-		      const struct full_path *y)
+static double planted_factor(enum stationary_fault fault, const struct move *m, const struct full_path *x,
+			     const struct full_path *y)
 {
 	switch (fault) {
 	case STATIONARY_NO_TRANSFER:
@@ -200,7 +200,7 @@ static double propose(struct group *g, struct full_path *x, struct full_path *y,
 	}
 	double to_x = ops->log_weight(&g->mutation, x, move, Y_TO_X);
 	count_unsound(g, to_x, true);
-	return exp(fmin(to_y - to_x + planted(g->how->fault, move, x, y), 0));
+	return exp(fmin(to_y - to_x + planted_factor(g->how->fault, move, x, y), 0));
 }
 
 static void run_start(struct group *g, uint64_t chain, uint64_t index)
@@ -275,7 +275,7 @@ struct queue {
 	atomic_uint next;
 };
 
-static void *work(void *arg)
+static void *run_chains(void *arg)
 {
 	struct queue *q = arg;
 	for (unsigned g; (g = atomic_fetch_add(&q->next, 1)) < STATIONARY_GROUPS;)
@@ -345,8 +345,8 @@ static void run_groups(struct group *groups)
 {
 	struct queue q = {groups, 0};
 	pthread_t other;
-	bool two = pthread_create(&other, NULL, work, &q) == 0;
-	work(&q);
+	bool two = pthread_create(&other, NULL, run_chains, &q) == 0;
+	run_chains(&q);
 	if (two)
 		pthread_join(other, NULL);
 }

@@ -40,7 +40,7 @@ void vol_write(struct vol *v)
 	v->size = VOL_HEAD + 4 * count;
 }
 
-static double share(uint32_t i, uint32_t side)
+static double share_of_side(uint32_t i, uint32_t side)
 {
 	return side > 1 ? i / (side - 1.0) : 0;
 }
@@ -55,7 +55,7 @@ void vol_make(struct vol *v, const uint32_t side[3], uint32_t channels, vol_fiel
 		for (uint32_t j = 0; j < side[1]; j++)
 			for (uint32_t i = 0; i < side[0]; i++)
 				for (uint32_t c = 0; c < channels; c++)
-					v->value[at++] =
-						(float)f(share(i, side[0]), share(j, side[1]), share(k, side[2]), c);
+					v->value[at++] = (float)f(share_of_side(i, side[0]), share_of_side(j, side[1]),
+								  share_of_side(k, side[2]), c);
 	vol_write(v);
 }

@@ -8,7 +8,7 @@
 #include <setjmp.h>
 #include <cmocka.h>
 
-static unsigned said(struct log_bucket *b, unsigned lines, double from, double to)
+static unsigned lines_logged(struct log_bucket *b, unsigned lines, double from, double to)
 {
 	unsigned n = 0;
 	for (unsigned i = 0; i < lines; i++)
@@ -20,20 +20,20 @@ static void a_rush_is_cut(void **state)
 {
 	(void)state;
 	struct log_bucket b = {0};
-	assert_int_equal(said(&b, 4000, 1000, 1000), LOG_BURST);
+	assert_int_equal(lines_logged(&b, 4000, 1000, 1000), LOG_BURST);
 	assert_int_equal(log_bucket_withheld(&b, 1000), 0); /* it may go on */
 	assert_int_equal(log_bucket_withheld(&b, 1000.5), 4000 - LOG_BURST);
 	assert_int_equal(log_bucket_withheld(&b, 1100), 0); /* reported once */
 	/* 4,000 in ten seconds, from an empty bucket: what is filled again meanwhile. */
-	assert_int_equal(said(&b, LOG_BURST, 2000, 2000), LOG_BURST);
-	assert_in_range(said(&b, 4000, 2000, 2010), 10 * LOG_PER_SECOND - 1, 10 * LOG_PER_SECOND);
+	assert_int_equal(lines_logged(&b, LOG_BURST, 2000, 2000), LOG_BURST);
+	assert_in_range(lines_logged(&b, 4000, 2000, 2010), 10 * LOG_PER_SECOND - 1, 10 * LOG_PER_SECOND);
 }
 
 static void a_trickle_passes(void **state)
 {
 	(void)state;
 	struct log_bucket b = {0};
-	assert_int_equal(said(&b, 10000, 5, 5 + 10000.0 / LOG_PER_SECOND), 10000);
+	assert_int_equal(lines_logged(&b, 10000, 5, 5 + 10000.0 / LOG_PER_SECOND), 10000);
 	assert_int_equal(log_bucket_withheld(&b, 1e6), 0);
 }
 
@@ -42,7 +42,7 @@ static void time_that_stands_still(void **state)
 {
 	(void)state;
 	struct log_bucket b = {0};
-	assert_int_equal(said(&b, LOG_BURST + 1, 50, 50), LOG_BURST);
+	assert_int_equal(lines_logged(&b, LOG_BURST + 1, 50, 50), LOG_BURST);
 	assert_false(log_bucket_take(&b, 40));
 	assert_true(log_bucket_take(&b, 50 + 1.0 / LOG_PER_SECOND));
 	assert_int_equal(log_bucket_withheld(&b, 60), 2);

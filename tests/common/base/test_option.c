@@ -46,7 +46,7 @@ static int take_kind(void *target, char *arg, struct error *e)
 	return 0;
 }
 
-static void more(char *text, size_t size)
+static void say_more(char *text, size_t size)
 {
 	snprintf(text, size, ". There are more");
 }
@@ -63,7 +63,7 @@ static const struct option_row rows[] = {
 	{"share", 0, "P", "Share of the epochs", OPTION_RATIO(struct arguments, share, 0, 1)},
 	{"threads", 't', "N", "Threads", OPTION_COUNT(struct arguments, threads, 1, 1024), .standard = "3"},
 	{"blobs", 0, "GB", "Of the spool", OPTION_SCALED(struct arguments, bytes, 0.001, 1e6, 1e9), .standard = "100"},
-	{"kind", 'k', "NAME", "(chosen)", OPTION_TAKE(take_kind), .values = kinds, .more = more},
+	{"kind", 'k', "NAME", "(chosen)", OPTION_TAKE(take_kind), .values = kinds, .more = say_more},
 	{"wait-for", 0, NULL, "A longer name", OPTION_FLAG(struct arguments, quiet)},
 	{"sort", 0, "NAME", "An old name", OPTION_TAKE(take_kind), .values = kinds, .hidden = true},
 	{0},
@@ -128,7 +128,7 @@ static int parse(const char *line)
 	return options_parse(&program, argc, argv, &a, &asked, &e);
 }
 
-static void accepted(const char *line)
+static void expect_accepted(const char *line)
 {
 	if (parse(line))
 		fail_msg("%s: %s", line, e.text);
@@ -143,8 +143,9 @@ static void refused(const char *line, const char *why)
 static void test_kinds(void **state)
 {
 	(void)state;
-	accepted("list -o x --name gr\xc3\xbc\xc3\x9f\x65. --trim 0.25 --share 5% --threads 1k --time 2m --spp +2k "
-		 "--blobs 0.5 --kind bdpt -e -2");
+	expect_accepted(
+		"list -o x --name gr\xc3\xbc\xc3\x9f\x65. --trim 0.25 --share 5% --threads 1k --time 2m --spp +2k "
+		"--blobs 0.5 --kind bdpt -e -2");
 	assert_string_equal(a.output, "x");
 	assert_string_equal(a.name, "gr\xc3\xbc\xc3\x9f\x65.");
 	assert_true(a.trim == 0.25 && a.share == 0.05 && a.stops == -2 && a.part.seconds == 120);
@@ -181,12 +182,12 @@ static void test_defaults_and_environment(void **state)
 {
 	(void)state;
 	assert_int_equal(unsetenv("HSLT_TEST_TLS"), 0);
-	accepted("list -o x");
+	expect_accepted("list -o x");
 	assert_true(a.stops == 0.5 && a.threads == 3 && a.bytes == 100000000000u && !a.tls);
 	assert_int_equal(setenv("HSLT_TEST_TLS", "folder", 1), 0);
-	accepted("list -o x");
+	expect_accepted("list -o x");
 	assert_string_equal(a.tls, "folder");
-	accepted("list -o x --tls other");
+	expect_accepted("list -o x --tls other");
 	assert_string_equal(a.tls, "other");
 	assert_int_equal(unsetenv("HSLT_TEST_TLS"), 0);
 }
@@ -197,21 +198,21 @@ static void test_order_and_forms(void **state)
 	static const char *const lines[] = {"fetch j1 -o x -w -e 3 --threads 2", "-wox fetch --threads=2 -e3 j1",
 					    "-e 3 --thr 2 -w fetch --out=x j1", "--wait -t2 -o x -e3 -- fetch j1"};
 	for (size_t i = 0; i < sizeof lines / sizeof *lines; i++) {
-		accepted(lines[i]);
+		expect_accepted(lines[i]);
 		assert_string_equal(a.output, "x");
 		assert_string_equal(a.word[0], "fetch");
 		assert_string_equal(a.word[1], "j1");
 		assert_true(a.wait && a.stops == 3 && a.threads == 2);
 	}
-	accepted("list -o x --wait"); /* though it begins --wait-for, too */
+	expect_accepted("list -o x --wait"); /* though it begins --wait-for, too */
 	assert_true(a.wait && !a.quiet);
-	accepted("-o x fetch -5");
+	expect_accepted("-o x fetch -5");
 	assert_string_equal(a.word[1], "-5");
-	accepted("-o x fetch -");
+	expect_accepted("-o x fetch -");
 	assert_string_equal(a.word[1], "-");
-	accepted("-o x fetch -- --wait");
+	expect_accepted("-o x fetch -- --wait");
 	assert_string_equal(a.word[1], "--wait");
-	accepted("list -o --wait");
+	expect_accepted("list -o --wait");
 	assert_string_equal(a.output, "--wait");
 }
 
@@ -236,7 +237,7 @@ static void test_mistyped(void **state)
 static void test_hidden(void **state)
 {
 	(void)state;
-	accepted("list -o x --sort path");
+	expect_accepted("list -o x --sort path");
 	refused("list -o x --sor path", "unknown option '--sor'");
 }
 
@@ -252,11 +253,11 @@ static void test_checks(void **state)
 static void test_asked(void **state)
 {
 	(void)state;
-	accepted("list -o x");
+	expect_accepted("list -o x");
 	assert_int_equal(asked, OPTION_IS_END);
-	accepted("--help --no-such-option");
+	expect_accepted("--help --no-such-option");
 	assert_int_equal(asked, OPTION_IS_HELP);
-	accepted("-wV");
+	expect_accepted("-wV");
 	assert_int_equal(asked, OPTION_IS_VERSION);
 	refused("--no-such-option --help", "unknown option '--no-such-option'");
 }
@@ -271,7 +272,7 @@ static char *printed(enum option_kind what)
 	return text;
 }
 
-static void has(const char *text, const char *wanted)
+static void expect_part(const char *text, const char *wanted)
 {
 	if (strstr(text, wanted))
 		return;
@@ -283,16 +284,17 @@ static void test_help(void **state)
 {
 	(void)state;
 	const char *text = printed(OPTION_IS_HELP);
-	has(text, "Usage: hslt-test [OPTION...] VERB [JOB]\n  or:  hslt-test [OPTION...] A.exr\nTests options.\n");
-	has(text, "\n  -o, --output=FILE          The image\n");
-	has(text, "\n      --tls=DIR              Certificates (or $HSLT_TEST_TLS)\n");
-	has(text, "\n      --blobs=GB             Of the spool (100)\n");
-	has(text, "\n  -k, --kind=NAME            path, bdpt or hslt (chosen). There are more\n");
-	has(text, "\n\n When to stop:\n      --spp=+N               Samples\n");
-	has(text, "\n      --man                  Print the manual page (for man -l)\n");
-	has(text, "\n      --completion           Print a bash completion script\n");
-	has(text, "\nExamples:\n  hslt-test list\n");
-	has(text, "\nExit codes: 0 done, 2 usage.\n");
+	expect_part(text,
+		    "Usage: hslt-test [OPTION...] VERB [JOB]\n  or:  hslt-test [OPTION...] A.exr\nTests options.\n");
+	expect_part(text, "\n  -o, --output=FILE          The image\n");
+	expect_part(text, "\n      --tls=DIR              Certificates (or $HSLT_TEST_TLS)\n");
+	expect_part(text, "\n      --blobs=GB             Of the spool (100)\n");
+	expect_part(text, "\n  -k, --kind=NAME            path, bdpt or hslt (chosen). There are more\n");
+	expect_part(text, "\n\n When to stop:\n      --spp=+N               Samples\n");
+	expect_part(text, "\n      --man                  Print the manual page (for man -l)\n");
+	expect_part(text, "\n      --completion           Print a bash completion script\n");
+	expect_part(text, "\nExamples:\n  hslt-test list\n");
+	expect_part(text, "\nExit codes: 0 done, 2 usage.\n");
 	assert_null(strstr(text, "--sort"));
 }
 
@@ -300,13 +302,13 @@ static void test_man(void **state)
 {
 	(void)state;
 	const char *text = printed(OPTION_IS_MAN);
-	has(text, ".TH \"hslt\\-test\" 1 ");
-	has(text, "\n.SH NAME\nhslt\\-test \\- Tests options.\n.SH SYNOPSIS\n");
-	has(text, "\n.SH DESCRIPTION\n\\&.dot begins \\(aqthis\\(aq\n.PP\n\\efB is no escape\n");
-	has(text, "\n.TP\n\\fB\\-o\\fR, \\fB\\-\\-output\\fR=\\fIFILE\\fR\nThe image.\n");
-	has(text, "\n.SS \"When to stop\"\n");
-	has(text, "\n.TP\n\\fBHSLT_TEST_TLS\\fR\nStands in for \\fB\\-\\-tls\\fR.\n");
-	has(text, "\n.SH EXIT STATUS\n0 done, 2 usage.\n");
+	expect_part(text, ".TH \"hslt\\-test\" 1 ");
+	expect_part(text, "\n.SH NAME\nhslt\\-test \\- Tests options.\n.SH SYNOPSIS\n");
+	expect_part(text, "\n.SH DESCRIPTION\n\\&.dot begins \\(aqthis\\(aq\n.PP\n\\efB is no escape\n");
+	expect_part(text, "\n.TP\n\\fB\\-o\\fR, \\fB\\-\\-output\\fR=\\fIFILE\\fR\nThe image.\n");
+	expect_part(text, "\n.SS \"When to stop\"\n");
+	expect_part(text, "\n.TP\n\\fBHSLT_TEST_TLS\\fR\nStands in for \\fB\\-\\-tls\\fR.\n");
+	expect_part(text, "\n.SH EXIT STATUS\n0 done, 2 usage.\n");
 	assert_null(strstr(text, "sort"));
 }
 
@@ -314,13 +316,13 @@ static void test_completion(void **state)
 {
 	(void)state;
 	const char *text = printed(OPTION_IS_COMPLETION);
-	has(text, "\t-o | --output) mapfile -t COMPREPLY < <(compgen -f -- \"$word\") ;;\n");
-	has(text, "\t--tls) mapfile -t COMPREPLY < <(compgen -d -- ");
-	has(text, "\t-k | --kind) mapfile -t COMPREPLY < <(compgen -W \"path bdpt hslt\" -- ");
-	has(text, "\t--share) mapfile -t COMPREPLY < <(compgen -W \"\" -- ");
-	has(text, "-W \"--output --tls --name --wait --quiet --exposure ");
-	has(text, "-W \"list fetch\" -f -- ");
-	has(text, "\ncomplete -o filenames -F _hslt_test hslt-test\n");
+	expect_part(text, "\t-o | --output) mapfile -t COMPREPLY < <(compgen -f -- \"$word\") ;;\n");
+	expect_part(text, "\t--tls) mapfile -t COMPREPLY < <(compgen -d -- ");
+	expect_part(text, "\t-k | --kind) mapfile -t COMPREPLY < <(compgen -W \"path bdpt hslt\" -- ");
+	expect_part(text, "\t--share) mapfile -t COMPREPLY < <(compgen -W \"\" -- ");
+	expect_part(text, "-W \"--output --tls --name --wait --quiet --exposure ");
+	expect_part(text, "-W \"list fetch\" -f -- ");
+	expect_part(text, "\ncomplete -o filenames -F _hslt_test hslt-test\n");
 	assert_null(strstr(text, "sort"));
 }
 

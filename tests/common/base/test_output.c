@@ -18,7 +18,7 @@ static const struct program program = {.name = "ends", .summary = "Ends.", .exit
 static char name[] = "ends", *argv[] = {name, NULL};
 
 /* Its exit code. */
-static int ends(const char *path, size_t lines, bool flush, int code)
+static int exit_code_of(const char *path, size_t lines, bool flush, int code)
 {
 	int status = -1;
 	fflush(NULL);
@@ -42,12 +42,12 @@ static void a_full_disk_is_noticed(void **state)
 {
 	(void)state;
 	for (int flush = 0; flush < 2; flush++) {
-		assert_int_equal(ends("/dev/full", 1, flush, 0), 1);
-		assert_int_equal(ends("/dev/full", 100000, flush, 0), 1); /* more than waits in memory */
-		assert_int_equal(ends("/dev/full", 1, flush, 75), 75);
-		assert_int_equal(ends("/dev/full", 0, flush, 0), 0);
-		assert_int_equal(ends("/dev/null", 100000, flush, 0), 0);
-		assert_int_equal(ends("/dev/null", 1, flush, 6), 6);
+		assert_int_equal(exit_code_of("/dev/full", 1, flush, 0), 1);
+		assert_int_equal(exit_code_of("/dev/full", 100000, flush, 0), 1); /* more than waits in memory */
+		assert_int_equal(exit_code_of("/dev/full", 1, flush, 75), 75);
+		assert_int_equal(exit_code_of("/dev/full", 0, flush, 0), 0);
+		assert_int_equal(exit_code_of("/dev/null", 100000, flush, 0), 0);
+		assert_int_equal(exit_code_of("/dev/null", 1, flush, 6), 6);
 	}
 }
 

@@ -20,14 +20,14 @@
 
 static char folder[64];
 
-static int enter(void **state)
+static int enter_folder(void **state)
 {
 	(void)state;
 	snprintf(folder, sizeof folder, "/tmp/hslt-target.XXXXXX");
 	return mkdtemp(folder) && chdir(folder) == 0 && mkdir("a", 0700) == 0 && mkdir("b", 0700) == 0 ? 0 : -1;
 }
 
-static int leave(void **state)
+static int leave_folder(void **state)
 {
 	(void)state;
 	char command[128];
@@ -35,7 +35,7 @@ static int leave(void **state)
 	return chdir("/") || system(command);
 }
 
-static void writes(const char *path, const char *text)
+static void expect_written(const char *path, const char *text)
 {
 	struct error e;
 	assert_int_equal(image_file_probe(path, &e), 0);
@@ -44,7 +44,7 @@ static void writes(const char *path, const char *text)
 		fail_msg("%s", e.text);
 }
 
-static void holds(const char *path, const char *text)
+static void expect_content(const char *path, const char *text)
 {
 	char got[64] = "";
 	int fd = open(path, O_RDONLY);
@@ -64,32 +64,32 @@ static mode_t kind_of(const char *path)
 static void files_are_replaced(void **state)
 {
 	(void)state;
-	writes("a/file", "one");
+	expect_written("a/file", "one");
 	int before = open("a/file", O_RDONLY);
-	writes("a/file", "two");
+	expect_written("a/file", "two");
 	char got[8] = "";
 	assert_int_equal(read(before, got, 7), 3); /* who has it open still sees a whole one */
 	assert_string_equal(got, "one");
 	close(before);
-	holds("a/file", "two");
+	expect_content("a/file", "two");
 }
 
 static void of_links_what_they_lead_to(void **state)
 {
 	(void)state;
 	struct error e;
-	writes("b/real", "old");
+	expect_written("b/real", "old");
 	assert_int_equal(symlink("../b/real", "a/link"), 0);
 	assert_int_equal(symlink("link", "a/second"), 0);
-	writes("a/second", "new");
+	expect_written("a/second", "new");
 	assert_int_equal(kind_of("a/second"), S_IFLNK);
 	assert_int_equal(kind_of("a/link"), S_IFLNK);
 	assert_int_equal(kind_of("b/real"), S_IFREG);
-	holds("b/real", "new");
+	expect_content("b/real", "new");
 	assert_int_equal(symlink("../b/none", "a/dangling"), 0);
-	writes("a/dangling", "made");
+	expect_written("a/dangling", "made");
 	assert_int_equal(kind_of("a/dangling"), S_IFLNK);
-	holds("b/none", "made");
+	expect_content("b/none", "made");
 	assert_int_equal(symlink("round", "a/round"), 0);
 	assert_int_equal(image_file_write("a/round", (const unsigned char *)"x", 1, &e), -ELOOP);
 	assert_int_equal(image_file_write("a", (const unsigned char *)"x", 1, &e), -EISDIR);
@@ -101,7 +101,7 @@ static void pipes_and_devices_stay(void **state)
 	char got[8] = "", name[32];
 	assert_int_equal(mkfifo("a/pipe", 0600), 0);
 	int reader = open("a/pipe", O_RDONLY | O_NONBLOCK);
-	writes("a/pipe", "said");
+	expect_written("a/pipe", "said");
 	assert_int_equal(read(reader, got, 7), 4);
 	assert_string_equal(got, "said");
 	assert_int_equal(kind_of("a/pipe"), S_IFIFO);
@@ -110,9 +110,9 @@ static void pipes_and_devices_stay(void **state)
 	if (mknod("a/null", S_IFCHR | 0600, makedev(1, 3)) == 0) {
 		int fd = open("a/null", O_WRONLY);
 		if (fd >= 0) { /* not where devices do not work */
-			writes("a/null", "gone");
+			expect_written("a/null", "gone");
 			assert_int_equal(symlink("null", "a/to-null"), 0);
-			writes("a/to-null", "gone");
+			expect_written("a/to-null", "gone");
 			assert_int_equal(kind_of("a/to-null"), S_IFLNK);
 			close(fd);
 		}
@@ -122,17 +122,17 @@ static void pipes_and_devices_stay(void **state)
 	int fd = open("a/log", O_RDWR | O_CREAT, 0600);
 	assert_int_equal(write(fd, "1,", 2), 2);
 	snprintf(name, sizeof name, "/dev/fd/%d", fd);
-	writes(name, "2");
-	holds("a/log", "1,2");
+	expect_written(name, "2");
+	expect_content("a/log", "1,2");
 	close(fd);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup_teardown(files_are_replaced, enter, leave),
-		cmocka_unit_test_setup_teardown(of_links_what_they_lead_to, enter, leave),
-		cmocka_unit_test_setup_teardown(pipes_and_devices_stay, enter, leave),
+		cmocka_unit_test_setup_teardown(files_are_replaced, enter_folder, leave_folder),
+		cmocka_unit_test_setup_teardown(of_links_what_they_lead_to, enter_folder, leave_folder),
+		cmocka_unit_test_setup_teardown(pipes_and_devices_stay, enter_folder, leave_folder),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

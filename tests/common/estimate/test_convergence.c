@@ -74,7 +74,7 @@ static void close_to(double a, double b, double tolerance)
 		fail_msg("%.17g is not %.17g", a, b);
 }
 
-static void says(const struct convergence *a, const char *words)
+static void expect_words(const struct convergence *a, const char *words)
 {
 	if (!strstr(a->text, words))
 		fail_msg("'%s' is not in '%s'", words, a->text);
@@ -119,7 +119,7 @@ static void all_is_well(void **state)
 	assert_true(isnan(a.r_hat_median) && isnan(a.r_hat_worst));
 }
 
-static void medians(void **state)
+static void medians_of_odd_and_even_counts(void **state)
 {
 	(void)state;
 	struct fixture f;
@@ -144,7 +144,9 @@ static void tiles_that_have_not_mixed(void **state)
 	assert_int_equal(verdict_of(&f, &a), CHAINS_DISAGREE);
 	assert_int_equal(a.tiles_flagged, 1);
 	close_to(a.energy_flagged, 0.05, 1e-6);
-	says(&a, "chains disagree: they have not mixed in 1 of 20 tiles, with 5 % of the energy (R-hat 1.3 at 135,75)");
+	expect_words(
+		&a,
+		"chains disagree: they have not mixed in 1 of 20 tiles, with 5 % of the energy (R-hat 1.3 at 135,75)");
 	f.tile_error[6] = 0.09F;
 	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 	f.tile_error[6] = 0.2F;
@@ -158,7 +160,8 @@ static void tiles_that_have_not_mixed(void **state)
 	assert_int_equal(verdict_of(&f, &a), CHAINS_DISAGREE);
 	f.img.rounds = 9;
 	assert_int_equal(verdict_of(&f, &a), CHAINS_TOO_SHORT);
-	says(&a, "chains are too short to be judged, 9000 mutations each: they have not mixed in 1 of 20 tiles");
+	expect_words(&a,
+		     "chains are too short to be judged, 9000 mutations each: they have not mixed in 1 of 20 tiles");
 }
 
 static void classes_that_differ(void **state)
@@ -175,7 +178,7 @@ static void classes_that_differ(void **state)
 	rough->difference_t = -7;
 	assert_int_equal(verdict_of(&f, &a), CHAINS_DISAGREE);
 	assert_int_equal(a.classes_flagged, 1U << path_class(4, PATH_ROUGH));
-	says(&a, "to paths (rough, 3-4 edges) they give 70 % of the light, the bootstrap 75 %");
+	expect_words(&a, "to paths (rough, 3-4 edges) they give 70 % of the light, the bootstrap 75 %");
 	/* As significant, but small. */
 	*rough = (struct path_class_energy){1.5, 0.001, 1.47, 0.001, -20};
 	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
@@ -210,8 +213,9 @@ static void groups_that_are_apart(void **state)
 	assert_int_equal(verdict_of(&f, &a), CHAINS_DISAGREE);
 	assert_int_equal(a.classes_apart, 1U << path_class(4, PATH_BOTH));
 	assert_int_equal(a.classes_flagged, 0);
-	says(&a,
-	     "chains disagree: groups of them differ in paths (reflected caustic, 3-4 edges): 20 +- 5.1 % of the light");
+	expect_words(
+		&a,
+		"chains disagree: groups of them differ in paths (reflected caustic, 3-4 edges): 20 +- 5.1 % of the light");
 	f.plan.groups = 7;
 	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 	f.plan.groups = 16;
@@ -229,7 +233,7 @@ static void chains_that_stand_still(void **state)
 	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 	f.img.counts.counters[COUNT_STUCK] = 14;
 	assert_int_equal(verdict_of(&f, &a), CHAINS_DISAGREE);
-	says(&a, "in 1.09 % of their epochs of 1000 mutations they accepted nothing");
+	expect_words(&a, "in 1.09 % of their epochs of 1000 mutations they accepted nothing");
 	f.plan.epoch = 999; /* too short an epoch to mean much */
 	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 }
@@ -263,9 +267,11 @@ static void words_fit(void **state)
 			(struct path_class_energy){1.23456789, 0.000123, 0.987654321e-1, 0.123456, -1234.5678};
 	f.img.counts.counters[COUNT_STUCK] = 1234;
 	assert_int_equal(verdict_of(&f, &a), CHAINS_DISAGREE);
-	says(&a, "in 20 of 20 tiles");
-	says(&a, "and 18 classes more; groups of them differ in paths (rough, 1-2 edges): 4.94 +- 6.2 % of the light");
-	says(&a, "they accepted nothing");
+	expect_words(&a, "in 20 of 20 tiles");
+	expect_words(
+		&a,
+		"and 18 classes more; groups of them differ in paths (rough, 1-2 edges): 4.94 +- 6.2 % of the light");
+	expect_words(&a, "they accepted nothing");
 	convergence_table(f.img.classes, f.img.b, &a, table, sizeof table);
 	int lines = 0;
 	for (const char *c = table; *c; c++)
@@ -337,7 +343,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(tails_of_student),
 		cmocka_unit_test(all_is_well),
-		cmocka_unit_test(medians),
+		cmocka_unit_test(medians_of_odd_and_even_counts),
 		cmocka_unit_test(tiles_that_have_not_mixed),
 		cmocka_unit_test(classes_that_differ),
 		cmocka_unit_test(groups_that_are_apart),

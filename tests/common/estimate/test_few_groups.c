@@ -39,7 +39,7 @@ struct found {
 	double light[3];
 };
 
-static double found(void *user, uint32_t group, uint32_t pixel)
+static double light_found(void *user, uint32_t group, uint32_t pixel)
 {
 	const struct found *f = user;
 	double sign = (group + pixel) % 2 ? 1 : -1;
@@ -53,7 +53,7 @@ static void one_group_of_any_number(void **state)
 	for (uint32_t groups = 5; groups <= 16; groups++) {
 		struct plan p = plan_of(groups, WIDTH, HEIGHT);
 		struct canvas_image img;
-		group_image(&p, found, &f, &img);
+		group_image(&p, light_found, &f, &img);
 		print_message("%u groups: doubt %d about %.2f\n", groups, (int)img.rel_mse_doubt, img.doubtful_share);
 		assert_int_equal(img.rel_mse_doubt, ERROR_ONE_GROUP);
 		assert_true(img.doubtful_share > 0.9);
@@ -65,7 +65,7 @@ static double rel_mse_of(uint32_t groups, struct found f)
 {
 	struct plan p = plan_of(groups, WIDTH, HEIGHT);
 	struct canvas_image img;
-	group_image(&p, found, &f, &img);
+	group_image(&p, light_found, &f, &img);
 	double rel_mse = img.rel_mse;
 	canvas_image_fini(&img);
 	return rel_mse;
@@ -90,7 +90,7 @@ static double grain(void *user, uint32_t group, uint32_t pixel)
 }
 
 /* Grain and a little light of a Pareto law of index 1.5, which has no variance. */
-static double unequal(void *user, uint32_t group, uint32_t pixel)
+static double unequal_light(void *user, uint32_t group, uint32_t pixel)
 {
 	(void)group;
 	(void)pixel;
@@ -124,7 +124,7 @@ static void four_groups_need_many_pixels(void **state)
 	assert_non_null(strstr(text, "relative error about 10 %, its interval is not known: so few groups"));
 	assert_int_equal(stated_of("grain", grain, plan_of(8, 8, 8), &doubt), 50);
 	assert_int_equal(stated_of("grain", grain, plan_of(4, 64, 32), &doubt), 50);
-	assert_true(stated_of("index 1.5", unequal, plan_of(4, 64, 32), &doubt) <= 10);
+	assert_true(stated_of("index 1.5", unequal_light, plan_of(4, 64, 32), &doubt) <= 10);
 }
 
 int main(void)

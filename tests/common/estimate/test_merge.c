@@ -120,7 +120,7 @@ static struct batch round_of(struct render *r, const struct plan *p, uint64_t ro
 	return b;
 }
 
-static double realised(const struct canvas_image *img)
+static double realised_error(const struct canvas_image *img)
 {
 	static const double white[3] = {3.2404541621141054 - 1.5371385127977166 - 0.4985314095560162,
 					-0.9692660305051868 + 1.8760108454466942 + 0.0415560175303498,
@@ -153,7 +153,7 @@ static struct stop stop_of(const struct plan *p, struct render *r)
 		struct canvas_image img;
 		assert_int_equal(canvas_image(c, false, &img, NULL), 0);
 		if (merge_end_of(p, round + 1, 0, &img) == MERGE_ERROR)
-			s = (struct stop){round + 1, sqrt(realised(&img)) / p->target_error};
+			s = (struct stop){round + 1, sqrt(realised_error(&img)) / p->target_error};
 		canvas_image_fini(&img);
 	}
 	canvas_free(c);

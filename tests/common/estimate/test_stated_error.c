@@ -66,7 +66,7 @@ static double hits(void *user, uint32_t group, uint32_t pixel)
 }
 
 /* A quarter of the light comes with one in ten groups of a pixel. */
-static double seldom(void *user, uint32_t group, uint32_t pixel)
+static double rare_light(void *user, uint32_t group, uint32_t pixel)
 {
 	(void)group;
 	double b = brightness(pixel);
@@ -84,7 +84,7 @@ static double strip(uint32_t pixel)
 
 /* Grain on the wall. Of the checks ten hits of equal energy in the lit ones, of all groups, and three in the dark ones,
  * whose errors are divided by a brightness between the two. */
-static double checks(void *user, uint32_t group, uint32_t pixel)
+static double checked_light(void *user, uint32_t group, uint32_t pixel)
 {
 	(void)group;
 	double hits = 10.0 / GROUPS;
@@ -101,7 +101,7 @@ static double edges(uint32_t pixel)
 }
 
 /* Each of a group's samples meets it or does not. */
-static double seen(void *user, uint32_t group, uint32_t pixel)
+static double edge_light(void *user, uint32_t group, uint32_t pixel)
 {
 	(void)group;
 	enum { SAMPLES = 8 };
@@ -115,7 +115,7 @@ static double seen(void *user, uint32_t group, uint32_t pixel)
 
 typedef double truth_of(uint32_t pixel);
 
-static double realised(const struct canvas_image *img, truth_of *truth)
+static double realised_error(const struct canvas_image *img, truth_of *truth)
 {
 	double mean = 0, sum = 0;
 	for (uint32_t i = 0; i < PIXELS; i++)
@@ -143,7 +143,7 @@ static void check_interval(const char *name, group_image_value *of, truth_of *tr
 	for (int i = 0; i < pictures; i++) {
 		struct canvas_image img;
 		group_image(&p, of, &d, &img);
-		double x = realised(&img, truth);
+		double x = realised_error(&img, truth);
 		assert_true((img.rel_mse_doubt == ERROR_KNOWN) ==
 			    (isfinite(img.rel_mse_95[0]) && isfinite(img.rel_mse_95[1])));
 		if (img.rel_mse_doubt == ERROR_KNOWN) {
@@ -168,9 +168,9 @@ static void intervals_hold(void **state)
 	(void)state;
 	check_interval("grain", grain, brightness, (struct least){1, 0.9}, 0.15, 2);
 	check_interval("hits", hits, brightness, (struct least){0.25, 0.9}, 0.2, 2);
-	check_interval("seldom", seldom, brightness, (struct least){0.05, 0.9}, 0.15, 2);
-	check_interval("checks", checks, strip, (struct least){0.2, 0.9}, 0.4, 8);
-	check_interval("edges", seen, edges, (struct least){0.15, 0.8}, 0.45, 4);
+	check_interval("seldom", rare_light, brightness, (struct least){0.05, 0.9}, 0.15, 2);
+	check_interval("checks", checked_light, strip, (struct least){0.2, 0.9}, 0.4, 8);
+	check_interval("edges", edge_light, edges, (struct least){0.15, 0.8}, 0.45, 4);
 }
 
 /* ---- colours that cancel */
@@ -302,7 +302,7 @@ static void unknown_brightness_is_doubtful(void **state)
 
 /* Grain, and a little light of a Pareto law: of index 1.5 it has no variance, however little it adds to this picture's;
  * of 4 it has one. */
-static double unequal(struct dice *d, double index)
+static double pareto_deviate(struct dice *d, double index)
 {
 	double rare = pow(1 - dice_throw(d), -1 / index) * (index - 1) / index;
 	return 0.9 + 0.3 * dice_normal(d) + 0.1 * rare;
@@ -312,14 +312,14 @@ static double very_unequal(void *user, uint32_t group, uint32_t pixel)
 {
 	(void)group;
 	(void)pixel;
-	return unequal(user, 1.5);
+	return pareto_deviate(user, 1.5);
 }
 
 static double less_unequal(void *user, uint32_t group, uint32_t pixel)
 {
 	(void)group;
 	(void)pixel;
-	return unequal(user, 4);
+	return pareto_deviate(user, 4);
 }
 
 static int doubtful_of(const char *name, group_image_value *of, enum error_doubt doubt, double index, int *stated)
@@ -418,7 +418,7 @@ static void fireflies_are_divided_by_what_others_found(void **state)
 	canvas_image_fini(&img);
 }
 
-static void words(void **state)
+static void what_is_said_about_the_error(void **state)
 {
 	(void)state;
 	struct canvas_image img = {.width = 10,
@@ -539,7 +539,7 @@ int main(void)
 		cmocka_unit_test(unseen_light_is_doubtful),
 		cmocka_unit_test(chains_find_by_independent_samples),
 		cmocka_unit_test(fireflies_are_divided_by_what_others_found),
-		cmocka_unit_test(words),
+		cmocka_unit_test(what_is_said_about_the_error),
 		cmocka_unit_test(black_is_divided_by_the_floor),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

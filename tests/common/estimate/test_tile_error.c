@@ -35,7 +35,8 @@ static double rare_light(void *user, uint32_t group, uint32_t pixel)
 
 /* Of 50 pictures, from column `first` on: the share of values more than three errors from the truth, and the mean
  * squared error over the mean squared deviation. */
-static void judge(group_image_value *of, struct rare *r, double truth, uint32_t first, double *beyond, double *ratio)
+static void compare_with_truth(group_image_value *of, struct rare *r, double truth, uint32_t first, double *beyond,
+			       double *ratio)
 {
 	struct plan p = group_image_plan(PLAN_SAMPLES, WIDTH, HEIGHT);
 	double stated = 0, realised = 0, values = 3. * (WIDTH - first) * HEIGHT * 50;
@@ -59,7 +60,7 @@ static void judge(group_image_value *of, struct rare *r, double truth, uint32_t 
 static void rare_light_of(double hits_per_group, double *beyond, double *ratio)
 {
 	struct rare r = {.d = dice_of("rare light"), .hits_per_group = hits_per_group};
-	judge(rare_light, &r, 2, 0, beyond, ratio);
+	compare_with_truth(rare_light, &r, 2, 0, beyond, ratio);
 }
 
 /*
@@ -98,7 +99,7 @@ static void a_highlight_says_nothing_about_the_wall(void **state)
 	double beyond, ratio;
 	(void)state;
 	/* from column 3 on: neighbours of unreliable pixels share some of their variance */
-	judge(beside_a_highlight, &r, 1, 3, &beyond, &ratio);
+	compare_with_truth(beside_a_highlight, &r, 1, 3, &beyond, &ratio);
 	print_message("beside a highlight: squares %.3f of the truth\n", ratio);
 	assert_true(fabs(ratio - 1) < 0.15);
 }

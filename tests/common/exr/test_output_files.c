@@ -17,14 +17,14 @@
 
 static char folder[64];
 
-static int enter(void **state)
+static int enter_folder(void **state)
 {
 	(void)state;
 	snprintf(folder, sizeof folder, "/tmp/hslt-outputs.XXXXXX");
 	return mkdtemp(folder) && chdir(folder) == 0 && mkdir("a", 0700) == 0 ? 0 : -1;
 }
 
-static int leave(void **state)
+static int leave_folder(void **state)
 {
 	(void)state;
 	char command[128];
@@ -152,5 +152,5 @@ int main(void)
 		cmocka_unit_test(test_formats),
 		cmocka_unit_test(test_names),
 	};
-	return cmocka_run_group_tests(tests, enter, leave);
+	return cmocka_run_group_tests(tests, enter_folder, leave_folder);
 }

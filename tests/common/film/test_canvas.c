@@ -36,7 +36,7 @@ static void shuffle(uint32_t *order, uint32_t n)
 	}
 }
 
-static int scaled(int n)
+static int scaled_count(int n)
 {
 	return n / (int)test_scale();
 }
@@ -51,7 +51,7 @@ static void bits_do_not_depend_on_the_order(void **unused)
 	for (int live_job_seed = 0; live_job_seed < 3; live_job_seed++) {
 		struct canvas *c;
 		assert_int_equal(canvas_new(&c, &p, -8, live_job_seed == 2 ? "/tmp" : NULL, NULL), 0);
-		for (int pair = 0; pair < scaled(79); pair++) {
+		for (int pair = 0; pair < scaled_count(79); pair++) {
 			struct batch batches[2 * LEASES];
 			uint32_t order[2 * LEASES];
 			for (uint32_t i = 0; i < 2 * LEASES; i++) {
@@ -87,7 +87,7 @@ static void bits_do_not_depend_on_the_order(void **unused)
 	canvas_image_fini(&first);
 }
 
-static float huge(void)
+static float random_huge(void)
 {
 	return 1e12f;
 }
@@ -109,7 +109,7 @@ static void a_sum_beyond_the_grid_adds_nothing(void **unused)
 		canvas_image_fini(&before);
 		assert_int_equal(canvas_image(c, false, &before, NULL), 0);
 		b = canvas_batch(&p, rounds, 0, 0, 4, canvas_one);
-		b.tiles[2].xyz[100] = huge();
+		b.tiles[2].xyz[100] = random_huge();
 		rc = canvas_add(c, &b, NULL);
 		rounds += rc == 0;
 		batch_fini(&b);
@@ -138,7 +138,7 @@ static void a_sum_beyond_the_grid_adds_nothing(void **unused)
 	for (uint64_t r = 0; r < rounds + 2; r++) {
 		b = canvas_batch(&p, r, 0, 0, 4, canvas_one);
 		if (r > 0 && r < rounds)
-			b.tiles[2].xyz[100] = huge();
+			b.tiles[2].xyz[100] = random_huge();
 		assert_int_equal(canvas_add(c, &b, NULL), 0);
 		batch_fini(&b);
 	}
@@ -250,7 +250,7 @@ static void grids_fit_their_values(void **unused)
 	assert_int_equal(canvas_grid_exponent(&p, 1e9, 1e9), -32);
 }
 
-static float some(void)
+static float random_float(void)
 {
 	return (float)canvas_uniform();
 }
@@ -293,7 +293,7 @@ static void blocks_of_groups_make_the_image(void **unused)
 		assert_int_equal(canvas_new(&c, &p, -32, NULL, NULL), 0);
 		for (uint64_t round = 0; round < 2; round++)
 			for (uint32_t g = 0; g < 4; g++) {
-				struct batch b = canvas_batch(&p, round, g, 0, 4, some);
+				struct batch b = canvas_batch(&p, round, g, 0, 4, random_float);
 				b.independent_sum = (g + 1) * (double)p.epoch;
 				assert_int_equal(canvas_add(c, &b, NULL), 0);
 				batch_fini(&b);

@@ -29,7 +29,7 @@ static struct plan make_plan(enum plan_kind kind)
 	return canvas_plan(kind, WIDTH, HEIGHT, GROUPS, PARTS);
 }
 
-static float small(void)
+static float random_float(void)
 {
 	return (float)(canvas_uniform() * pow(10, -6 * canvas_uniform()));
 }
@@ -45,7 +45,7 @@ static struct batch make_batch(const struct plan *p, enum lease_kind kind, uint6
 	for (uint32_t i = 0; kind == LEASE_RENDER && i < across * down; i++) {
 		if (canvas_next() % 3 == 0 || i == 4) /* the fifth tile is never touched */
 			continue;
-		b.tiles[b.tile_count++] = canvas_tile(p, i, small);
+		b.tiles[b.tile_count++] = canvas_tile(p, i, random_float);
 	}
 	b.counters[COUNT_SAMPLES] = 2 * p->epoch;
 	b.counters[COUNT_INDEPENDENT] = p->epoch + canvas_next() % 4;

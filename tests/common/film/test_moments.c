@@ -349,7 +349,7 @@ static void only_complete_rounds_of_chains(void **state)
 }
 
 /* More chains than sequences: one a lease. And sums that would leave the grid. */
-static void bounds(void **state)
+static void more_chains_than_sequences_and_sums_beyond_the_grid(void **state)
 {
 	(void)state;
 	struct plan p = make_plan(8192, 4, 2, 1000);
@@ -399,7 +399,7 @@ int main(void)
 		cmocka_unit_test(order_changes_no_bit),
 		cmocka_unit_test(classes_by_hand),
 		cmocka_unit_test(only_complete_rounds_of_chains),
-		cmocka_unit_test(bounds),
+		cmocka_unit_test(more_chains_than_sequences_and_sums_beyond_the_grid),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

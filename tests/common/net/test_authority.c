@@ -71,7 +71,7 @@ static int run_until(const char *ca, const char *root, const char *after, uint64
 	return WEXITSTATUS(status);
 }
 
-static void opens(const char *ca, const char *name)
+static void expect_opens(const char *ca, const char *name)
 {
 	char path[200];
 	struct tls *t;
@@ -90,7 +90,7 @@ static void same_file(const char *ca, const char *one, const char *other)
 }
 
 /* Certificates of that name, and how many of them are revoked. */
-static size_t listed(const char *ca, const char *name, size_t *revoked)
+static size_t count_certificates(const char *ca, const char *name, size_t *revoked)
 {
 	struct authority_entry *list;
 	struct error e;
@@ -111,17 +111,17 @@ static void what_was_reported_is_there(const char *ca, int done)
 {
 	size_t revoked;
 	if (done > INIT)
-		listed(ca, "nobody", &revoked);
+		count_certificates(ca, "nobody", &revoked);
 	if (done > FARM)
-		opens(ca, "farm");
+		expect_opens(ca, "farm");
 	if (done > NODE) { /* also while it is renewed */
-		assert_true(listed(ca, "node", &revoked) >= 1);
-		opens(ca, "node");
+		assert_true(count_certificates(ca, "node", &revoked) >= 1);
+		expect_opens(ca, "node");
 	}
 	if (done > RENEWED)
-		assert_int_equal(listed(ca, "node", &revoked), 2);
+		assert_int_equal(count_certificates(ca, "node", &revoked), 2);
 	if (done > REVOKED) {
-		assert_true(listed(ca, "node", &revoked) == 2 && revoked == 2);
+		assert_true(count_certificates(ca, "node", &revoked) == 2 && revoked == 2);
 		same_file(ca, "crl.pem", "farm/crl.pem");
 	}
 }
@@ -136,9 +136,9 @@ static void the_rest_can_be_done(const char *ca, int done)
 		if (rc && !(s == done && rc == -EEXIST && s < RENEWED))
 			fail_msg("command %d: %s", s, e.text);
 	}
-	opens(ca, "farm");
-	opens(ca, "node");
-	size_t all = listed(ca, "node", &revoked);
+	expect_opens(ca, "farm");
+	expect_opens(ca, "node");
+	size_t all = count_certificates(ca, "node", &revoked);
 	assert_true(all >= 2 && all == revoked);
 	same_file(ca, "crl.pem", "farm/crl.pem");
 }
@@ -170,7 +170,7 @@ static void a_loss_of_power_undoes_nothing_that_was_reported(void **state)
 	for (uint64_t seed = 0; seed < SEEDS; seed++) { /* of the names that were changed last, either may be lost */
 		assert_int_equal(system(command), 0);
 		assert_int_equal(run_until(ca, root, after, renewed, CALLS_MOST + seed), FAULTY_DISK_EXIT);
-		opens(ca_after, "node");
+		expect_opens(ca_after, "node");
 	}
 }
 
@@ -197,8 +197,8 @@ static void a_failure_between_key_and_certificate(void **state)
 	fails = true;
 	assert_int_equal(run_step(ca, RENEWED, &e), -EIO);
 	disk_use(NULL);
-	opens(ca, "node");
-	assert_int_equal(listed(ca, "node", &revoked), 2);
+	expect_opens(ca, "node");
+	assert_int_equal(count_certificates(ca, "node", &revoked), 2);
 	the_rest_can_be_done(ca, RENEWED);
 }
 
@@ -232,7 +232,7 @@ static void a_damaged_record(void **state)
 	assert_non_null(strstr(e.text, "if that was a certificate of node, it is not revoked"));
 	snprintf(copy, sizeof copy, "%s/away", ca);
 	assert_int_equal(rename(path, copy), 0);
-	assert_int_equal(listed(ca, "node", &n), 1);
+	assert_int_equal(count_certificates(ca, "node", &n), 1);
 	assert_int_equal(n, 1);
 	same_file(ca, "crl.pem", "farm/crl.pem");
 }

@@ -193,7 +193,7 @@ static void begin(struct coordinator *c)
 	assert_int_equal(pthread_create(&c->thread, NULL, coordinate, c), 0);
 }
 
-static struct client *meet(struct coordinator *c)
+static struct client *connect_client(struct coordinator *c)
 {
 	struct client *cl;
 	struct error e;
@@ -202,7 +202,7 @@ static struct client *meet(struct coordinator *c)
 	return cl;
 }
 
-static void part(struct coordinator *c, struct client *cl)
+static void disconnect_client(struct coordinator *c, struct client *cl)
 {
 	client_close(cl);
 	pthread_join(c->thread, NULL);
@@ -214,14 +214,14 @@ static void part(struct coordinator *c, struct client *cl)
 static int fetch_as(const char *name, char taken[CLIENT_NAME_BYTES])
 {
 	struct coordinator c = {.name = name};
-	struct client *cl = meet(&c);
+	struct client *cl = connect_client(&c);
 	struct error e;
 	int rc = client_fetch_here(cl, 1, FARM__WHAT__WHAT_RESULT, taken, &e);
-	part(&c, cl);
+	disconnect_client(&c, cl);
 	return rc;
 }
 
-static bool holds(const char *path, const void *bytes, size_t size)
+static bool file_holds(const char *path, const void *bytes, size_t size)
 {
 	char there[64];
 	FILE *f = fopen(path, "r");
@@ -260,9 +260,9 @@ static void lead_nowhere(const char *here)
 	snprintf(path, sizeof path, "%s/above.exr", folder);
 	assert_int_equal(fetch_as(path, taken), 0);
 	assert_string_equal(taken, "above.exr");
-	assert_true(holds("above.exr", image, sizeof image) && holds(path, "precious", 8));
+	assert_true(file_holds("above.exr", image, sizeof image) && file_holds(path, "precious", 8));
 	assert_int_equal(fetch_as("../room.exr", taken), 0);
-	assert_true(holds("room.exr", image, sizeof image));
+	assert_true(file_holds("room.exr", image, sizeof image));
 	assert_int_not_equal(stat("../room.exr", &st), 0);
 	assert_int_equal(fetch_as("\xc3\xa4 b.exr", taken), 0);
 	/* what would be no file's name, or a file that others look for */
@@ -279,7 +279,7 @@ static void lead_nowhere(const char *here)
 	assert_int_equal(fetch_as("/tmp/mine.exr", taken), -EEXIST);
 	assert_int_equal(fetch_as("link.exr", taken), -EEXIST);
 	assert_int_equal(fetch_as("other.exr", taken), -EEXIST);
-	assert_true(holds("mine.exr", "precious", 8) && holds("../above.exr", "precious", 8));
+	assert_true(file_holds("mine.exr", "precious", 8) && file_holds("../above.exr", "precious", 8));
 	assert_int_not_equal(stat("../nobody.exr", &st), 0);
 	assert_int_equal(files_here(), 6); /* and nothing half done */
 	assert_int_equal(chdir(".."), 0);
@@ -305,21 +305,21 @@ static void previews_leave_the_name(void **state)
 	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
 		for (int again = 0; again < 2; again++) {
 			struct coordinator c = {.name = names[i][0]};
-			struct client *cl = meet(&c);
+			struct client *cl = connect_client(&c);
 			int rc = client_fetch_here(cl, 1, FARM__WHAT__WHAT_PREVIEW, taken, &e);
-			part(&c, cl);
+			disconnect_client(&c, cl);
 			assert_int_equal(rc, again ? -EEXIST : 0);
 			assert_string_equal(taken, names[i][1]);
-			assert_true(holds(taken, image, sizeof image));
+			assert_true(file_holds(taken, image, sizeof image));
 		}
 	assert_int_not_equal(access("soon.exr", F_OK), 0);
 	/* no room for the addition */
 	memset(longest, 'x', sizeof longest - 1);
 	longest[sizeof longest - 1] = 0;
 	struct coordinator c = {.name = longest};
-	struct client *cl = meet(&c);
+	struct client *cl = connect_client(&c);
 	assert_int_equal(client_fetch_here(cl, 1, FARM__WHAT__WHAT_PREVIEW, taken, &e), -EEXIST);
-	part(&c, cl);
+	disconnect_client(&c, cl);
 }
 
 static void who_names_a_file_gets_it(void **state)
@@ -328,10 +328,10 @@ static void who_names_a_file_gets_it(void **state)
 	struct coordinator c = {.name = "/etc/passwd"};
 	struct error e;
 	write_text("old.exr");
-	struct client *cl = meet(&c);
+	struct client *cl = connect_client(&c);
 	assert_int_equal(client_fetch(cl, 1, FARM__WHAT__WHAT_RESULT, "old.exr", &e), 0);
-	part(&c, cl);
-	assert_true(holds("old.exr", image, sizeof image));
+	disconnect_client(&c, cl);
+	assert_true(file_holds("old.exr", image, sizeof image));
 }
 
 static void a_file_of_another_size_is_another_file(void **state)
@@ -340,10 +340,10 @@ static void a_file_of_another_size_is_another_file(void **state)
 	static const uint64_t sizes[] = {3 * sizeof image, 2 * sizeof image - 1, 2 * sizeof image};
 	for (size_t i = 0; i < 3; i++) {
 		struct coordinator c = {.sizes = {2 * sizeof image, sizes[i]}};
-		struct client *cl = meet(&c);
+		struct client *cl = connect_client(&c);
 		struct error e;
 		int rc = client_fetch(cl, 1, FARM__WHAT__WHAT_RESULT, "two.exr", &e);
-		part(&c, cl);
+		disconnect_client(&c, cl);
 		assert_int_equal(rc == 0, i == 2);
 		assert_int_equal(access("two.exr", F_OK) == 0, i == 2);
 	}
@@ -396,15 +396,15 @@ static void a_dropped_fetch_begins_again(void **state)
 	static const char twice[] = "the image\0the image";
 	for (int drops = 1; drops <= 5; drops += 2) {
 		struct coordinator c = {.drops = drops, .sizes = {2 * sizeof image, 2 * sizeof image}};
-		struct client *cl = meet(&c);
+		struct client *cl = connect_client(&c);
 		struct error e;
 		int rc = client_fetch(cl, 1, FARM__WHAT__WHAT_RESULT, "dropped.exr", &e);
-		part(&c, cl);
+		disconnect_client(&c, cl);
 		assert_int_equal(rc, drops < 5 ? 0 : -EAGAIN);
 		if (rc)
 			assert_string_equal(e.text, "given up after 5 attempts: dropped");
 		else
-			assert_true(holds("dropped.exr", twice, sizeof twice));
+			assert_true(file_holds("dropped.exr", twice, sizeof twice));
 		assert_int_equal(unlink("dropped.exr"), rc ? -1 : 0);
 	}
 	assert_int_equal(client_exit_code(-EAGAIN), 1);
@@ -417,14 +417,14 @@ static void a_dropped_stream_begins_again(void **state)
 	static const char twice[] = "the image\0the image";
 	for (int drops = 0; drops < 2; drops++) {
 		struct coordinator c = {.drops = drops, .sizes = {2 * sizeof image, 2 * sizeof image}};
-		struct client *cl = meet(&c);
+		struct client *cl = connect_client(&c);
 		struct error e;
 		int fd = open("stream", O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
 		int rc = client_fetch_log(cl, 1, fd, &e);
-		part(&c, cl);
+		disconnect_client(&c, cl);
 		close(fd);
 		assert_int_equal(rc, 0);
-		assert_true(holds("stream", twice, sizeof twice));
+		assert_true(file_holds("stream", twice, sizeof twice));
 	}
 	assert_int_equal(unlink("stream"), 0);
 }
@@ -439,13 +439,13 @@ static void own_files_are_own_faults(void **state)
 		skip();
 	}
 	struct coordinator c = {.name = "room.exr"};
-	struct client *cl = meet(&c);
+	struct client *cl = connect_client(&c);
 	struct error e;
 	assert_int_equal(mkdir("closed", 0500), 0);
 	assert_true(!root || seteuid(65534) == 0);
 	int rc = client_fetch(cl, 1, FARM__WHAT__WHAT_RESULT, "closed/room.exr", &e);
 	assert_true(!root || seteuid(0) == 0);
-	part(&c, cl);
+	disconnect_client(&c, cl);
 	assert_non_null(strstr(e.text, "closed/room.exr: cannot make a file there: Permission denied"));
 	assert_int_equal(client_exit_code(rc), 1);
 }
@@ -478,7 +478,7 @@ static void floods_are_dammed(void **state)
 	} floods[] = {{5000, 0, 4096}, {80, 1 << 20, 1 << 26}};
 	for (int i = 0; i < 2; i++) {
 		struct coordinator c = {.flood = floods[i].count, .payload = floods[i].payload, .deaf = true};
-		struct client *cl = meet(&c);
+		struct client *cl = connect_client(&c);
 		struct error e;
 		unsigned char *question = calloc(1, 1 << 22);
 		/* Nobody reads them, and they are more than the system holds between the two: the client stays in one
@@ -489,7 +489,7 @@ static void floods_are_dammed(void **state)
 		size_t taken = take_all(cl);
 		assert_true(taken <= floods[i].most && taken > floods[i].most / 2);
 		c.deaf = false;
-		part(&c, cl);
+		disconnect_client(&c, cl);
 	}
 }
 
@@ -497,7 +497,7 @@ static void the_second_address_answers(void **state)
 {
 	(void)state;
 	struct coordinator c = {.host = "two"};
-	part(&c, meet(&c));
+	disconnect_client(&c, connect_client(&c));
 }
 
 /* One allocation after the other fails: nobody waits for a message that was lost. */
@@ -507,7 +507,7 @@ static void no_memory_for_a_message(void **state)
 	int rc = -1;
 	for (long n = 0; rc; n++) {
 		struct coordinator c = {.flood = 1, .hold = true};
-		struct client *cl = meet(&c);
+		struct client *cl = connect_client(&c);
 		struct client_message m;
 		struct error e;
 		c.hold = false;
@@ -518,7 +518,7 @@ static void no_memory_for_a_message(void **state)
 		mem_fail_after(-1);
 		assert_true(rc == 0 || rc == -ECONNRESET);
 		client_message_fini(&m);
-		part(&c, cl);
+		disconnect_client(&c, cl);
 	}
 }
 

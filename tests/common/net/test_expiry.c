@@ -36,7 +36,7 @@ static int remove_folder(void **state)
 }
 
 /* An authority of `whole` days, and a worker's certificate of `own` days by it. */
-static struct tls *party(const char *name, double whole, double own)
+static struct tls *open_party(const char *name, double whole, double own)
 {
 	char ca[128], folder[160];
 	struct error e = {""};
@@ -53,7 +53,7 @@ static void a_long_one_is_no_matter(void **state)
 {
 	(void)state;
 	char text[384];
-	struct tls *t = party("long", 100, 50);
+	struct tls *t = open_party("long", 100, 50);
 	time_t now = time(NULL);
 	assert_in_range(tls_self(t)->until, now + 50 * DAY - 60, now + 50 * DAY + 60);
 	assert_in_range(tls_authority_until(t), now + 100 * DAY - 60, now + 100 * DAY + 60);
@@ -73,7 +73,7 @@ static void it_is_said_once_a_day_and_after_files_were_read(void **state)
 	(void)state;
 	char text[384], ca[128];
 	struct error e;
-	struct tls *t = party("daily", 400, 10);
+	struct tls *t = open_party("daily", 400, 10);
 	time_t now = time(NULL);
 	assert_true(tls_warning_due(t, now, text, sizeof text));
 	assert_false(tls_warning_due(t, now + 1, text, sizeof text));
@@ -97,13 +97,13 @@ static void the_authoritys_end_is_named(void **state)
 	(void)state;
 	char text[384], command[512];
 	struct error e;
-	struct tls *t = party("old", 7, 825);
+	struct tls *t = open_party("old", 7, 825);
 	time_t now = time(NULL);
 	assert_true(tls_warning(t, now, text, sizeof text));
 	assert_non_null(strstr(text, "the certificate of node expires in 7 days"));
 	assert_non_null(strstr(text, "; the authority's certificate expires in 7 days"));
 	tls_close(t);
-	t = party("new", 3650, 825);
+	t = open_party("new", 3650, 825);
 	snprintf(command, sizeof command, "cat %s/old/ca.pem >>%s/new/node/ca.pem", root, root);
 	assert_int_equal(system(command), 0);
 	assert_int_equal(tls_refresh(t, &e), 1);
@@ -118,7 +118,7 @@ static void what_could_not_be_read_is_read_later(void **state)
 	char ca[128];
 	struct error e;
 	struct rlimit limit, none;
-	struct tls *t = party("later", 400, 10);
+	struct tls *t = open_party("later", 400, 10);
 	time_t before = tls_self(t)->until;
 	snprintf(ca, sizeof ca, "%s/later", root);
 	assert_int_equal(authority_issue(ca, "node", TLS_WORKER, 300, true, &e), 0);
@@ -141,7 +141,7 @@ static void renewed_is_what_it_was(void **state)
 	(void)state;
 	char ca[128], from[160], to[160];
 	struct error e;
-	tls_close(party("kept", 100, 50));
+	tls_close(open_party("kept", 100, 50));
 	snprintf(ca, sizeof ca, "%s/kept", root);
 	for (enum tls_role r = TLS_COORDINATOR; r < TLS_ROLES; r++)
 		assert_int_equal(authority_issue(ca, "node", r, 5, true, &e), r == TLS_WORKER ? 0 : -EEXIST);

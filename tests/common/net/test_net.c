@@ -20,7 +20,7 @@
 #include <string.h>
 #include <time.h>
 
-static void addresses(void **state)
+static void what_is_an_address(void **state)
 {
 	(void)state;
 	struct net_addr a;
@@ -565,7 +565,7 @@ static void a_date_is_told_apart(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest plain[] = {cmocka_unit_test(addresses), EITHER_WAY};
+	const struct CMUnitTest plain[] = {cmocka_unit_test(what_is_an_address), EITHER_WAY};
 	const struct CMUnitTest encrypted[] = {
 		EITHER_WAY, cmocka_unit_test(only_one_speaks_it), cmocka_unit_test(silence_is_no_handshake),
 		cmocka_unit_test(a_live_connection_is_checked_again), cmocka_unit_test(a_date_is_told_apart)};

@@ -19,7 +19,7 @@
 #include <unistd.h>
 
 /* A bound socket of the type at an abstract name of this process; "@..." in name. */
-static int bound(int type, char name[64], const char *what)
+static int bind_abstract(int type, char name[64], const char *what)
 {
 	struct sockaddr_un a = {.sun_family = AF_UNIX};
 	int fd = socket(AF_UNIX, type | SOCK_CLOEXEC, 0);
@@ -31,7 +31,7 @@ static int bound(int type, char name[64], const char *what)
 	return fd;
 }
 
-static void heard(int fd, const char *what)
+static void expect_datagram(int fd, const char *what)
 {
 	char text[64];
 	ssize_t n = recv(fd, text, sizeof text - 1, MSG_DONTWAIT);
@@ -40,18 +40,18 @@ static void heard(int fd, const char *what)
 	assert_string_equal(text, what);
 }
 
-static void sends(void **state)
+static void notices_reach_the_service_manager(void **state)
 {
 	(void)state;
 	char name[64], path[64];
 	unsetenv("NOTIFY_SOCKET");
 	assert_false(notify_send("READY=1"));
-	int manager = bound(SOCK_DGRAM, name, "manager");
+	int manager = bind_abstract(SOCK_DGRAM, name, "manager");
 	setenv("NOTIFY_SOCKET", name, 1);
 	assert_true(notify_send("READY=1"));
 	assert_true(notify_send("WATCHDOG=1"));
-	heard(manager, "READY=1");
-	heard(manager, "WATCHDOG=1");
+	expect_datagram(manager, "READY=1");
+	expect_datagram(manager, "WATCHDOG=1");
 	/* One that does not listen, or listens no more, holds nobody up. */
 	int sent = 0;
 	while (sent < 100000 && notify_send("WATCHDOG=1"))
@@ -67,7 +67,7 @@ static void sends(void **state)
 	assert_int_equal(bind(manager, (struct sockaddr *)&a, sizeof a), 0);
 	setenv("NOTIFY_SOCKET", path, 1);
 	assert_true(notify_send("STOPPING=1"));
-	heard(manager, "STOPPING=1");
+	expect_datagram(manager, "STOPPING=1");
 	unlink(path);
 	close(manager);
 
@@ -85,28 +85,28 @@ static void sends(void **state)
 	unsetenv("NOTIFY_SOCKET");
 }
 
-static void awaited(const char *us, const char *pid, double seconds)
+static void expect_watchdog(const char *us, const char *pid, double seconds)
 {
 	us ? setenv("WATCHDOG_USEC", us, 1) : unsetenv("WATCHDOG_USEC");
 	pid ? setenv("WATCHDOG_PID", pid, 1) : unsetenv("WATCHDOG_PID");
 	assert_true(notify_watchdog() >= seconds && notify_watchdog() <= seconds);
 }
 
-static void watchdogs(void **state)
+static void the_watchdogs_period_is_read(void **state)
 {
 	(void)state;
 	char me[32];
 	snprintf(me, sizeof me, "%ld", (long)getpid());
-	awaited(NULL, NULL, 0);
-	awaited("30000000", NULL, 30);
-	awaited("30000000", me, 30);
-	awaited("30000000", "1", 0);
-	awaited("30000000", "x", 0);
-	awaited("0", me, 0);
-	awaited("-1", me, 0);
-	awaited("1s", me, 0);
-	awaited("99999999999999999999", me, 0);
-	awaited(NULL, NULL, 0);
+	expect_watchdog(NULL, NULL, 0);
+	expect_watchdog("30000000", NULL, 30);
+	expect_watchdog("30000000", me, 30);
+	expect_watchdog("30000000", "1", 0);
+	expect_watchdog("30000000", "x", 0);
+	expect_watchdog("0", me, 0);
+	expect_watchdog("-1", me, 0);
+	expect_watchdog("1s", me, 0);
+	expect_watchdog("99999999999999999999", me, 0);
+	expect_watchdog(NULL, NULL, 0);
 }
 
 static int code_of(pid_t child)
@@ -119,7 +119,7 @@ static int code_of(pid_t child)
 
 /* In a child whose descriptors from 3 on are these: which one it takes (3...), 0 for none; 99: it leaks into programs.
  */
-static int takes(const int *fds, int count, const char *announced, bool other_pid)
+static int socket_taken(const int *fds, int count, const char *announced, bool other_pid)
 {
 	pid_t child = fork();
 	assert_true(child >= 0);
@@ -140,27 +140,27 @@ static int takes(const int *fds, int count, const char *announced, bool other_pi
 	_exit(fd < 0 ? 0 : fd);
 }
 
-static void sockets(void **state)
+static void the_right_socket_is_taken_over(void **state)
 {
 	(void)state;
 	char name[64];
 	int null = open("/dev/null", O_RDONLY | O_CLOEXEC);
-	int datagrams = bound(SOCK_DGRAM, name, "datagrams");
-	int idle = bound(SOCK_STREAM, name, "idle");
-	int listening = bound(SOCK_STREAM, name, "listening");
+	int datagrams = bind_abstract(SOCK_DGRAM, name, "datagrams");
+	int idle = bind_abstract(SOCK_STREAM, name, "idle");
+	int listening = bind_abstract(SOCK_STREAM, name, "listening");
 	int tcp = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
 	assert_int_equal(listen(listening, 1), 0);
 	assert_int_equal(listen(tcp, 1), 0); /* an unbound one gets a free port */
 	const int all[] = {null, datagrams, idle, tcp, listening};
-	assert_int_equal(takes(all, 5, "5", false), 7);
-	assert_int_equal(takes(all + 4, 1, "1", false), 3);
-	assert_int_equal(takes(all, 5, "4", false), 0);
-	assert_int_equal(takes(all + 4, 1, "1", true), 0);
-	assert_int_equal(takes(all + 4, 1, NULL, false), 0);
-	assert_int_equal(takes(all + 4, 1, "0", false), 0);
-	assert_int_equal(takes(all + 4, 1, "-1", false), 0);
-	assert_int_equal(takes(all + 4, 1, "1x", false), 0);
-	assert_int_equal(takes(all, 4, "2000000000", false), 0);
+	assert_int_equal(socket_taken(all, 5, "5", false), 7);
+	assert_int_equal(socket_taken(all + 4, 1, "1", false), 3);
+	assert_int_equal(socket_taken(all, 5, "4", false), 0);
+	assert_int_equal(socket_taken(all + 4, 1, "1", true), 0);
+	assert_int_equal(socket_taken(all + 4, 1, NULL, false), 0);
+	assert_int_equal(socket_taken(all + 4, 1, "0", false), 0);
+	assert_int_equal(socket_taken(all + 4, 1, "-1", false), 0);
+	assert_int_equal(socket_taken(all + 4, 1, "1x", false), 0);
+	assert_int_equal(socket_taken(all, 4, "2000000000", false), 0);
 	for (int i = 0; i < 5; i++)
 		close(all[i]);
 }
@@ -168,9 +168,9 @@ static void sockets(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(sends),
-		cmocka_unit_test(watchdogs),
-		cmocka_unit_test(sockets),
+		cmocka_unit_test(notices_reach_the_service_manager),
+		cmocka_unit_test(the_watchdogs_period_is_read),
+		cmocka_unit_test(the_right_socket_is_taken_over),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

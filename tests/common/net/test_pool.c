@@ -49,7 +49,7 @@ static int start(int most, struct error *e)
 }
 
 /* Where the system refuses one of the threads, libuv would abort: its pool is not asked for any. */
-static void refused(void **state)
+static void a_refused_thread_fails_the_start(void **state)
 {
 	struct error e;
 	(void)state;
@@ -62,7 +62,7 @@ static void refused(void **state)
 	}
 }
 
-static void started(void **state)
+static void all_threads_start(void **state)
 {
 	struct error e;
 	(void)state;
@@ -76,6 +76,7 @@ static void started(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(refused), cmocka_unit_test(started)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(a_refused_thread_fails_the_start),
+					   cmocka_unit_test(all_threads_start)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -28,16 +28,16 @@
 static struct receive_turn turns[5];
 static char went[16];
 
-static void note(struct receive_turn *t)
+static void note_turn(struct receive_turn *t)
 {
 	size_t n = strlen(went);
 	went[n] = (char)('a' + (t - turns));
 	went[n + 1] = 0;
 }
 
-static bool take(struct receive_pool *p, int i, uint64_t bytes)
+static bool take_bytes(struct receive_pool *p, int i, uint64_t bytes)
 {
-	turns[i].go = note;
+	turns[i].go = note_turn;
 	return receive_pool_take(p, &turns[i], bytes);
 }
 
@@ -46,11 +46,11 @@ static void in_turn(void **state)
 	(void)state;
 	struct receive_pool p = {.limit = 100};
 	memset(turns, 0, sizeof turns);
-	assert_true(take(&p, 0, 60));
-	assert_true(take(&p, 1, 40));
-	assert_false(take(&p, 2, 70));
-	assert_false(take(&p, 3, 1000)); /* alone, later */
-	assert_false(take(&p, 4, 1));	 /* there is room for it once one has gone, but others were first */
+	assert_true(take_bytes(&p, 0, 60));
+	assert_true(take_bytes(&p, 1, 40));
+	assert_false(take_bytes(&p, 2, 70));
+	assert_false(take_bytes(&p, 3, 1000)); /* alone, later */
+	assert_false(take_bytes(&p, 4, 1));    /* there is room for it once one has gone, but others were first */
 	receive_pool_give(&p, &turns[1]);
 	assert_string_equal(went, "");
 	receive_pool_give(&p, &turns[0]);
@@ -71,13 +71,13 @@ static void whoever_leaves_the_queue(void **state)
 	struct receive_pool p = {.limit = 100};
 	memset(turns, 0, sizeof turns);
 	went[0] = 0;
-	assert_true(take(&p, 0, 100));
+	assert_true(take_bytes(&p, 0, 100));
 	for (int i = 1; i < 5; i++)
-		assert_false(take(&p, i, 50));
+		assert_false(take_bytes(&p, i, 50));
 	receive_pool_give(&p, &turns[4]); /* the last, one in the middle, the first */
 	receive_pool_give(&p, &turns[2]);
 	receive_pool_give(&p, &turns[1]);
-	assert_false(take(&p, 4, 10));
+	assert_false(take_bytes(&p, 4, 10));
 	assert_string_equal(went, "");
 	receive_pool_give(&p, &turns[0]);
 	assert_string_equal(went, "de");
@@ -92,10 +92,10 @@ static void owners_take_turns(void **state)
 	went[0] = 0;
 	turns[3].owner = turns[4].owner = 7;
 	for (int i = 0; i < 4; i++)
-		assert_true(take(&p, i, 100) == (i == 0));
+		assert_true(take_bytes(&p, i, 100) == (i == 0));
 	receive_pool_give(&p, &turns[0]);
-	assert_false(take(&p, 4, 100));
-	assert_false(take(&p, 0, 100));
+	assert_false(take_bytes(&p, 4, 100));
+	assert_false(take_bytes(&p, 0, 100));
 	receive_pool_give(&p, &turns[1]);
 	receive_pool_give(&p, &turns[3]);
 	receive_pool_give(&p, &turns[2]);
@@ -156,7 +156,7 @@ static void on_connection(uv_stream_t *l, int status)
 	accepted++;
 }
 
-static void once(void)
+static void run_loop_once(void)
 {
 	uv_run(&loop, UV_RUN_ONCE);
 }
@@ -197,7 +197,7 @@ static int open_foreign(void)
 	assert_int_equal(send(fd, frame, size, 0), size);
 	mem_free(frame);
 	while (accepted == i || !ends[i].messages)
-		once();
+		run_loop_once();
 	return fd;
 }
 
@@ -223,10 +223,10 @@ static void open_all(double stall_seconds)
 	for (int i = 0; i < PEERS; i++) {
 		assert_int_equal(conn_connect(&callers[i].conn, &loop, &bound, &caller, &events, &callers[i], &e), 0);
 		while (accepted <= i)
-			once();
+			run_loop_once();
 		send_short(i); /* the first frame, which has no checksum */
 		while (!ends[i].messages)
-			once();
+			run_loop_once();
 	}
 }
 
@@ -247,10 +247,10 @@ static void close_all(void)
 static void wait_for_turn(void)
 {
 	while (!pool.first)
-		once();
+		run_loop_once();
 }
 
-static unsigned waiting(void)
+static unsigned count_waiting(void)
 {
 	unsigned n = 0;
 	for (const struct receive_turn *t = pool.first; t; t = t->next)
@@ -267,29 +267,29 @@ static void one_after_the_other(void **state)
 	open_all(1000);
 	send_bytes(0, frame, HALF);
 	while (!pool.used)
-		once();
+		run_loop_once();
 	for (int i = 1; i < 3; i++) {
 		send_bytes(i, frame, size);
-		while (waiting() < (unsigned)i)
-			once();
+		while (count_waiting() < (unsigned)i)
+			run_loop_once();
 	}
 	send_short(3);
 	while (ends[3].messages < 2)
-		once();
-	assert_true(arrived == 0 && waiting() == 2 && pool.used <= pool.limit);
+		run_loop_once();
+	assert_true(arrived == 0 && count_waiting() == 2 && pool.used <= pool.limit);
 	send_bytes(0, frame + HALF, size - HALF);
 	while (arrived < 3)
-		once();
+		run_loop_once();
 	assert_true(order[0] == 0 && order[1] == 1 && order[2] == 2);
 	/* whoever hangs up lets others go on */
 	send_bytes(0, frame, HALF);
 	while (!pool.used)
-		once();
+		run_loop_once();
 	send_bytes(1, frame, size);
 	wait_for_turn();
 	conn_close(callers[0].conn, "enough");
 	while (arrived < 4)
-		once();
+		run_loop_once();
 	assert_int_equal(order[3], 1);
 	close_all();
 	free(frame);
@@ -312,14 +312,14 @@ static void machines_take_turns(void **state)
 	int fd = open_foreign();
 	send_bytes(0, frame, HALF);
 	while (!pool.used)
-		once();
+		run_loop_once();
 	for (int i = 1; i < 4; i++) {
 		send_bytes(i, frame, size);
-		while (waiting() < (unsigned)i)
-			once();
+		while (count_waiting() < (unsigned)i)
+			run_loop_once();
 	}
 	size_t at = 0;
-	while (waiting() < 4)
+	while (count_waiting() < 4)
 		at += send_some(fd, frame + at, size - at);
 	send_bytes(0, frame + HALF, size - HALF);
 	while (arrived < ENDS)
@@ -349,14 +349,14 @@ static void whoever_keeps_others_waiting(void **state)
 	open_all(0.5);
 	send_promise(0);
 	while (!pool.used)
-		once();
+		run_loop_once();
 	for (int i = 0; i < PEERS; i++)
 		conn_set_quiet(ends[i].conn, i ? 0.5 : 0);
 	send_bytes(1, frame, size);
 	wait_for_turn();
 	int heard = ends[1].partial;
 	while (!arrived) /* for longer than it may be silent, and than a frame of its length may take to go on */
-		once();
+		run_loop_once();
 	assert_true(ends[0].closed && strstr(ends[0].why, "not completed in time"));
 	assert_true(ends[1].partial > heard && !ends[1].closed);
 	close_all();

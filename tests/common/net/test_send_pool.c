@@ -24,7 +24,7 @@ static uint64_t left_of(const struct send_share *s)
 	return ((const struct peer *)s)->left;
 }
 
-static void note(struct send_share *s)
+static void note_giving_way(struct send_share *s)
 {
 	size_t n = strlen(gave_way);
 	gave_way[n] = (char)('a' + ((struct peer *)s - peers));
@@ -38,7 +38,7 @@ static int begin(void **state)
 	memset(peers, 0, sizeof peers);
 	memset(gave_way, 0, sizeof gave_way);
 	for (int i = 0; i < PEERS; i++)
-		peers[i].share = (struct send_share){.pool = &pool, .left = left_of, .give_way = note};
+		peers[i].share = (struct send_share){.pool = &pool, .left = left_of, .give_way = note_giving_way};
 	return 0;
 }
 

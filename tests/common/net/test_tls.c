@@ -144,7 +144,7 @@ static FILE *file(const char *folder, const char *name, const char *mode)
 }
 
 /* What hslt-ca never makes, signed by our authority nevertheless: good for both purposes, with any words in it. */
-static const char *forge(const char *name, const char *shown, const char *other_names)
+static const char *forge_certificate(const char *name, const char *shown, const char *other_names)
 {
 	static char folder[256];
 	snprintf(folder, sizeof folder, "%s/%s", pair_root, name);
@@ -233,16 +233,17 @@ static void certificates_need_one_role_and_a_name(void **state)
 	raw_caller(pair_at(pair_ours, "node"), TLS1_3_VERSION, ""); /* the caller of this test can be let in */
 	raw_caller(NULL, TLS1_3_VERSION, "the peer has no certificate");
 	raw_caller(pair_at(pair_ours, "node"), TLS1_2_VERSION, "unsupported protocol");
-	raw_caller(forge("good", "good", "URI:hslt:role:client"), TLS1_3_VERSION, "");
-	raw_caller(forge("none", "none", NULL), TLS1_3_VERSION, "no role");
-	raw_caller(forge("two", "two", "URI:hslt:role:client,URI:hslt:role:worker"), TLS1_3_VERSION, "no role");
-	raw_caller(forge("like", "like", "URI:hslt:role:workers"), TLS1_3_VERSION, "no role");
-	raw_caller(forge("part", "part", "URI:hslt:role:work"), TLS1_3_VERSION, "no role");
-	raw_caller(forge("dns", "dns", "DNS:hslt:role:worker"), TLS1_3_VERSION, "no role");
-	raw_caller(forge("name", "../name", "URI:hslt:role:client"), TLS1_3_VERSION, "no name");
-	raw_caller(forge("line", "a\nb", "URI:hslt:role:client"), TLS1_3_VERSION, "no name");
+	raw_caller(forge_certificate("good", "good", "URI:hslt:role:client"), TLS1_3_VERSION, "");
+	raw_caller(forge_certificate("none", "none", NULL), TLS1_3_VERSION, "no role");
+	raw_caller(forge_certificate("two", "two", "URI:hslt:role:client,URI:hslt:role:worker"), TLS1_3_VERSION,
+		   "no role");
+	raw_caller(forge_certificate("like", "like", "URI:hslt:role:workers"), TLS1_3_VERSION, "no role");
+	raw_caller(forge_certificate("part", "part", "URI:hslt:role:work"), TLS1_3_VERSION, "no role");
+	raw_caller(forge_certificate("dns", "dns", "DNS:hslt:role:worker"), TLS1_3_VERSION, "no role");
+	raw_caller(forge_certificate("name", "../name", "URI:hslt:role:client"), TLS1_3_VERSION, "no name");
+	raw_caller(forge_certificate("line", "a\nb", "URI:hslt:role:client"), TLS1_3_VERSION, "no name");
 	/* Whose purpose would do, but who is no coordinator, cannot play one. */
-	const char *farm = forge("false", "farm", "URI:hslt:role:worker"); /* uses what pair_at returns */
+	const char *farm = forge_certificate("false", "farm", "URI:hslt:role:worker"); /* uses what pair_at returns */
 	refuses(pair_at(pair_ours, "node"), farm, "certificate of a worker, not of a coordinator",
 		"does not accept this certificate");
 }
@@ -321,7 +322,7 @@ static ssize_t write_until_full(int fd, const void *bytes, size_t size)
 	return -1;
 }
 
-static size_t certificates(void)
+static size_t count_certificates(void)
 {
 	struct authority_entry *list;
 	struct error e;
@@ -343,14 +344,14 @@ static void a_full_disk_takes_no_certificate_away(void **state)
 	for (int renew = 1; renew >= 0; renew--) {
 		unsigned room = 0;
 		const char *name = renew ? "steady" : "late";
-		const size_t before = certificates();
+		const size_t before = count_certificates();
 		for (int rc = -1; rc; room++) {
 			writes_left = room;
 			disk_use(&full);
 			rc = authority_issue(pair_ours, name, TLS_WORKER, 5, renew, &e);
 			disk_use(NULL);
 			assert_true(rc == 0 || rc == -ENOSPC);
-			assert_int_equal(certificates(), before + (rc == 0));
+			assert_int_equal(count_certificates(), before + (rc == 0));
 			assert_int_equal(access(pair_at(pair_ours, "steady/cert.pem.next"), F_OK), -1);
 			if (renew || !rc)
 				accepts(name, name, TLS_WORKER);
@@ -385,7 +386,7 @@ static void an_error_leaves_nothing_behind(void **state)
 	struct error e;
 	bad.rename = rename_until;
 	pair_issue(pair_ours, "tidy", TLS_WORKER, 5);
-	size_t before = certificates();
+	size_t before = count_certificates();
 	unsigned most = 0, half = 0;
 	for (int rc = -1; rc; most++) {
 		renames_left = most;
@@ -396,7 +397,7 @@ static void an_error_leaves_nothing_behind(void **state)
 		bool is_half = access(pair_at(pair_ours, "tidy/cert.pem.next"), F_OK) == 0;
 		half += is_half;
 		before += is_half;
-		assert_int_equal(certificates(), before + (rc == 0));
+		assert_int_equal(count_certificates(), before + (rc == 0));
 		assert_true(rc != 0 || !is_half);
 		assert_int_equal(access(pair_at(pair_ours, "tidy/key.pem.next"), F_OK), -1);
 		accepts("tidy", "tidy", TLS_WORKER);

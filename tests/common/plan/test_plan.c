@@ -150,7 +150,7 @@ static void rounds_without_a_bound_follow_the_film(void **state)
 		}
 }
 
-static struct plan made(const struct plan_request *r)
+static struct plan make_plan(const struct plan_request *r)
 {
 	struct plan p;
 	struct error e = {""};
@@ -161,7 +161,7 @@ static struct plan made(const struct plan_request *r)
 
 static bool ends_with_rule(const struct plan_request *r, const char *words)
 {
-	struct plan p = made(r);
+	struct plan p = make_plan(r);
 	char text[PLAN_TEXT];
 	plan_describe_epoch(r, &p, text, sizeof text);
 	return *words ? strstr(text, words) != NULL : !*text;
@@ -186,30 +186,30 @@ static void samples_notice_time_and_error(void **state)
 	r.height = 27;
 	r.spp = 0;
 	r.seconds = 1e6;
-	uint64_t longest = made(&r).epoch;
+	uint64_t longest = make_plan(&r).epoch;
 	assert_true(ends_with_rule(&r, "size of the film"));
 	uint64_t before = 0;
 	for (double seconds = 0.1; seconds < 1e5; seconds *= 1.7) {
 		r.seconds = seconds;
-		uint64_t epoch = made(&r).epoch, round = epoch * 16 * 32 * 27;
+		uint64_t epoch = make_plan(&r).epoch, round = epoch * 16 * 32 * 27;
 		assert_true(epoch >= before && epoch <= longest);
 		assert_true(epoch == 1 || (double)round <= 50000 * seconds / 8);
 		before = epoch;
 	}
 	assert_int_equal(before, longest);
 	r.seconds = 20;
-	assert_true(made(&r).epoch > 1 && ends_with_rule(&r, "for the requested time or error"));
+	assert_true(make_plan(&r).epoch > 1 && ends_with_rule(&r, "for the requested time or error"));
 	r.seconds = 0;
 	r.target_error = 0.5;
-	assert_int_equal(made(&r).epoch, 1);
+	assert_int_equal(make_plan(&r).epoch, 1);
 	r.target_error = 0.02; /* 2,500 samples a pixel in 8 rounds of 16 groups */
-	assert_int_equal(made(&r).epoch, 19);
+	assert_int_equal(make_plan(&r).epoch, 19);
 	r.seconds = 1; /* the nearer bound counts */
-	assert_int_equal(made(&r).epoch, 1);
+	assert_int_equal(make_plan(&r).epoch, 1);
 	r.spp = 1 << 20; /* a number of samples that does not fit into the time changes nothing */
-	assert_int_equal(made(&r).epoch, 1);
+	assert_int_equal(make_plan(&r).epoch, 1);
 	r.seconds = 1e6; /* one that does has its own rule, whatever error is asked for */
-	assert_true(made(&r).epoch > 400 && ends_with_rule(&r, "in a lease"));
+	assert_true(make_plan(&r).epoch > 400 && ends_with_rule(&r, "in a lease"));
 }
 
 /* The same with chains: as much as without the number, or as an eighth of the time has room for. */
@@ -219,12 +219,12 @@ static void a_time_also_ends_what_is_counted(void **state)
 	struct plan_request r = request(PLAN_CHAINS, "");
 	r.spp = 0;
 	r.seconds = 2;
-	uint64_t open = round_of(made(&r));
+	uint64_t open = round_of(make_plan(&r));
 	r.spp = 1 << 20;
-	assert_int_equal(round_of(made(&r)), open);
+	assert_int_equal(round_of(make_plan(&r)), open);
 	assert_true(ends_with_rule(&r, "size of the film"));
 	r.seconds = 2000;
-	uint64_t longer = round_of(made(&r));
+	uint64_t longer = round_of(make_plan(&r));
 	assert_true(longer > open && (double)longer <= 50000.0 * r.seconds / 8);
 	assert_true(ends_with_rule(&r, "requested time"));
 	r.seconds = 1e6;
@@ -240,17 +240,17 @@ static void a_bootstrap_follows_the_time(void **state)
 	struct plan_request r = request(PLAN_CHAINS, "");
 	r.spp = 0;
 	r.seconds = 5;
-	assert_int_equal(made(&r).bootstrap, 31296); /* 5 x 50,000 / 8, of equal leases */
+	assert_int_equal(make_plan(&r).bootstrap, 31296); /* 5 x 50,000 / 8, of equal leases */
 	r.seconds = 0.1;
-	assert_int_equal(made(&r).bootstrap, 16384);
+	assert_int_equal(make_plan(&r).bootstrap, 16384);
 	r.seconds = 3600;
-	assert_int_equal(made(&r).bootstrap, 1000000);
+	assert_int_equal(make_plan(&r).bootstrap, 1000000);
 	r.seconds = 0;
 	r.target_error = 0.02;
-	assert_int_equal(made(&r).bootstrap, 1000000);
+	assert_int_equal(make_plan(&r).bootstrap, 1000000);
 	r.spp = 1 << 20;
 	r.seconds = 5;
-	assert_int_equal(made(&r).bootstrap, 31296);
+	assert_int_equal(make_plan(&r).bootstrap, 31296);
 }
 
 /* Of a scene whose samples take many rays. */
@@ -263,7 +263,7 @@ static struct plan slow(enum plan_kind kind, double seconds, double bootstrap_ra
 	r.seconds = seconds;
 	r.target_error = seconds > 0 ? 0 : 0.02;
 	r.rays = (struct plan_rays){bootstrap_rays, step_rays};
-	return made(&r);
+	return make_plan(&r);
 }
 
 /* At two million rays a second: a quarter of the time for the bootstrap and an eighth for the starts of chains, but for
@@ -291,8 +291,8 @@ static void a_slow_bootstrap_is_short(void **state)
 	r.rays = (struct plan_rays){1e5, 1};
 	r.bootstrap = 64000; /* what is asked for stays */
 	r.chains = 512;
-	assert_int_equal(made(&r).bootstrap, 64000);
-	assert_int_equal(made(&r).chains, 512);
+	assert_int_equal(make_plan(&r).bootstrap, 64000);
+	assert_int_equal(make_plan(&r).chains, 512);
 	assert_int_equal(plan_bootstrap_room(&r, 100), 2000);
 	assert_int_equal(plan_bootstrap_room(&r, 1), 256);
 }
@@ -332,12 +332,12 @@ static void a_round_fits_into_the_time(void **state)
 	r.spp = 0;
 	r.seconds = 2;
 	r.rays = (struct plan_rays){1, 1e5};
-	p = made(&r);
+	p = make_plan(&r);
 	plan_options(&p, 1, text, sizeof text);
 	assert_non_null(strstr(text, " --groups 4 --parts 16 "));
 	r.groups = 12;
-	assert_int_equal(made(&r).groups, 12);
-	assert_int_equal(made(&r).parts, 4);
+	assert_int_equal(make_plan(&r).groups, 12);
+	assert_int_equal(make_plan(&r).parts, 4);
 }
 
 /* Where a time or an error ends a job that leaves something to be found out. */
@@ -372,12 +372,12 @@ static void parts_are_asked_for(void **state)
 	struct error e;
 	char text[PLAN_TEXT];
 	r.width = r.height = 1024;
-	p = made(&r);
+	p = make_plan(&r);
 	assert_int_equal(p.parts, 4);
 	plan_options(&p, 1, text, sizeof text);
 	assert_null(strstr(text, "--parts"));
 	r.parts = 64;
-	p = made(&r);
+	p = make_plan(&r);
 	assert_int_equal(p.groups * p.parts, 1024);
 	assert_int_equal(p.chains, 1024);
 	plan_options(&p, 1, text, sizeof text);
@@ -386,7 +386,7 @@ static void parts_are_asked_for(void **state)
 	r.parts = 48;
 	assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
 	r.chains = 0; /* the rule's can be more */
-	p = made(&r);
+	p = make_plan(&r);
 	assert_int_equal(p.chains % (16 * 48), 0);
 	r.parts = 65;
 	assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
@@ -394,7 +394,7 @@ static void parts_are_asked_for(void **state)
 	r.chains = PLAN_MAX_CHAINS;
 	r.parts = 64;
 	r.groups = 1;
-	assert_int_equal(made(&r).chains, PLAN_MAX_CHAINS);
+	assert_int_equal(make_plan(&r).chains, PLAN_MAX_CHAINS);
 	r.parts = 32;
 	assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
 	assert_non_null(strstr(e.text, "32768 to a lease; at most 16384: take more groups or parts"));
@@ -402,11 +402,11 @@ static void parts_are_asked_for(void **state)
 	r.parts = 33;
 	assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
 	r.parts = 32;
-	assert_int_equal(made(&r).parts, 32);
+	assert_int_equal(make_plan(&r).parts, 32);
 	r.parts = 5; /* of 34 rows one has 7 */
 	r.border = 1;
 	r.epoch = 3;
-	p = made(&r);
+	p = make_plan(&r);
 	assert_int_equal(plan_lease_mutations(&p), 7 * 66 * 3);
 }
 
@@ -420,10 +420,10 @@ static void leases_take_twenty_seconds(void **state)
 			r.width = 1280;
 			r.height = 720;
 			r.spp = 1 << 24;
-			struct plan p = made(&r);
+			struct plan p = make_plan(&r);
 			assert_true(plan_wants_speed(&r, &p));
 			r.speed = speed;
-			p = made(&r);
+			p = make_plan(&r);
 			double seconds = (double)lease_work(&p) / speed;
 			assert_int_equal(plan_lease_mutations(&p), lease_work(&p)); /* 720 rows in 4 parts */
 			bool least = p.epoch == 1;				    /* a strip cannot be cut further */
@@ -439,9 +439,9 @@ static void leases_take_twenty_seconds(void **state)
 	uint32_t differ = 0;
 	for (int i = 0; i < 100; i++) {
 		r.speed = 20000 * exp(0.07 * i);
-		uint64_t epoch = made(&r).epoch;
+		uint64_t epoch = make_plan(&r).epoch;
 		r.speed *= 1.1;
-		differ += made(&r).epoch != epoch;
+		differ += make_plan(&r).epoch != epoch;
 	}
 	assert_true(differ > 0 && differ < 25); /* log2 1.1 = 0.14 of all */
 }
@@ -454,25 +454,25 @@ static void short_jobs_ask_for_no_pilot(void **state)
 	struct plan_request r = request(PLAN_CHAINS, "");
 	r.width = 320;
 	r.height = 180;
-	struct plan p = made(&r), q;
+	struct plan p = make_plan(&r), q;
 	assert_false(plan_wants_speed(&r, &p));
 	assert_true(ends_with_rule(&r, "for 8 rounds"));
 	struct plan_request one = request(PLAN_SAMPLES, "");
-	assert_int_equal(made(&one).rounds, 1);
+	assert_int_equal(make_plan(&one).rounds, 1);
 	assert_true(ends_with_rule(&one, "for at most 8 rounds"));
 	r.speed = 5000;
-	q = made(&r);
+	q = make_plan(&r);
 	assert_memory_equal(&p, &q, sizeof p);
 	r.spp = 0;
 	r.target_error = 0.02;
-	p = made(&r);
+	p = make_plan(&r);
 	r.speed = 100; /* so slow that the film's rule gives way */
-	assert_true(made(&r).epoch < p.epoch);
+	assert_true(make_plan(&r).epoch < p.epoch);
 	r.speed = 1e6;
-	assert_int_equal(made(&r).epoch, p.epoch);
+	assert_int_equal(make_plan(&r).epoch, p.epoch);
 	assert_true(ends_with_rule(&r, "size of the film"));
 	r.epoch = 77;
-	p = made(&r);
+	p = make_plan(&r);
 	assert_int_equal(p.epoch, 77);
 	assert_false(plan_wants_speed(&r, &p));
 	assert_true(ends_with_rule(&r, ""));
@@ -488,21 +488,21 @@ static void a_bandwidth_makes_epochs_longer(void **state)
 		r.height = 720;
 		r.spp = 1 << 20;
 		r.speed = kind == PLAN_CHAINS ? 30000 : 300000;
-		uint64_t free = made(&r).epoch;
+		uint64_t free = make_plan(&r).epoch;
 		r.bandwidth = 10e6;
-		assert_int_equal(made(&r).epoch, free);
+		assert_int_equal(make_plan(&r).epoch, free);
 		r.bandwidth = 1e5 / (kind == PLAN_CHAINS ? 1 : 4);
-		struct plan p = made(&r);
+		struct plan p = make_plan(&r);
 		double seconds = (double)lease_work(&p) / r.speed;
 		assert_true(seconds >= 12 * 1280 * 720 / 1e5 && seconds < 2.2 * 12 * 1280 * 720 / 1e5);
 		assert_true(ends_with_rule(&r, "MB of tiles per lease"));
 		r.spp = 32; /* not longer than the job */
-		assert_true(made(&r).rounds == 1);
+		assert_true(make_plan(&r).rounds == 1);
 		r.speed = 0; /* nobody knows: something is assumed */
 		r.spp = 1 << 20;
-		uint64_t assumed = made(&r).epoch;
+		uint64_t assumed = make_plan(&r).epoch;
 		r.bandwidth = 0;
-		assert_true(made(&r).epoch < assumed);
+		assert_true(make_plan(&r).epoch < assumed);
 	}
 }
 

@@ -93,7 +93,7 @@ static struct batch chain_batch(const struct plan *p)
 }
 
 /* Packs, takes the frame apart as a connection does. */
-static void travel(const struct batch *b, const struct plan *p, struct envelope *env, struct frame_reader *r)
+static void pack_and_read(const struct batch *b, const struct plan *p, struct envelope *env, struct frame_reader *r)
 {
 	unsigned char *frame;
 	size_t size, used;
@@ -115,7 +115,7 @@ static void a_batch_travels(void **state)
 	struct envelope env;
 	struct frame_reader r;
 	struct error e = {""};
-	travel(&b, &p, &env, &r);
+	pack_and_read(&b, &p, &env, &r);
 	int rc = batch_unpack(&back, &p, env.message->lease_result, r.payload.bytes, r.payload.size, &e);
 	if (rc)
 		print_message("%s\n", e.text);
@@ -160,7 +160,7 @@ static void strategies_are_the_plans(void **state)
 	struct envelope env;
 	struct frame_reader r;
 	struct error e;
-	travel(&b, &p, &env, &r);
+	pack_and_read(&b, &p, &env, &r);
 	Farm__LeaseResult *m = env.message->lease_result;
 	assert_int_equal(m->n_strategies, 2 * STRATEGY_COUNTERS);
 	static const struct {
@@ -196,7 +196,7 @@ static void tiles_are_counted_first(void **state)
 	struct envelope env;
 	struct frame_reader r;
 	struct error e;
-	travel(&b, &p, &env, &r);
+	pack_and_read(&b, &p, &env, &r);
 	Farm__LeaseResult *m = env.message->lease_result;
 	uint32_t sizes[5] = {m->tile_sizes[0], m->tile_sizes[1]}, *own = m->tile_sizes;
 	m->tile_sizes = sizes;
@@ -221,7 +221,7 @@ static void memory_may_end_anywhere(void **state)
 	struct envelope env;
 	struct frame_reader r;
 	struct error e;
-	travel(&b, &p, &env, &r);
+	pack_and_read(&b, &p, &env, &r);
 	int rc = -ENOMEM;
 	for (long n = 0; rc; n++) {
 		mem_fail_after(n);
@@ -247,7 +247,7 @@ static void moments_are_the_plans(void **state)
 	uint64_t tiles = batch_film_tiles(&p), sequences = batch_sequences(&p), count = b.moment_count;
 	assert_int_equal(sequences, b.state_count);
 	assert_int_equal(count, (sequences + 1) * tiles);
-	travel(&b, &p, &env, &r);
+	pack_and_read(&b, &p, &env, &r);
 	Farm__LeaseResult *m = env.message->lease_result;
 	const uint64_t counts[] = {0, count - 1, count + 1, UINT64_MAX / 4 + 2};
 	for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
@@ -353,7 +353,7 @@ static void weights_travel(void **state)
 		b.independent_sum += (double)b.weights[i];
 		b.independent_square += (double)b.weights[i] * (double)b.weights[i];
 	}
-	travel(&b, &p, &env, &r);
+	pack_and_read(&b, &p, &env, &r);
 	int rc = batch_unpack(&back, &p, env.message->lease_result, r.payload.bytes, r.payload.size, &e);
 	if (rc)
 		print_message("%s\n", e.text);
@@ -520,7 +520,7 @@ static void the_largest_lease_travels(void **state)
 	for (int i = 0; i < COUNT; i++)
 		b.states[i] = (struct chain_state){mem_alloc(STATE, 1), STATE};
 	p.chains = COUNT * p.groups * p.parts;
-	travel(&b, &p, &env, &r);
+	pack_and_read(&b, &p, &env, &r);
 	envelope_fini(&env);
 	frame_reader_fini(&r);
 	batch_fini(&b);

@@ -152,7 +152,7 @@ static void a_changed_hello_is_none(void **state)
 	mem_free(bytes);
 }
 
-static int answer(const char *bytes, size_t size)
+static int unpack_code(const char *bytes, size_t size)
 {
 	struct envelope env;
 	struct error e;
@@ -177,13 +177,13 @@ static void memory_is_out(void **state)
 static void what_is_not_known_is_refused(void **state)
 {
 	(void)state;
-	assert_int_equal(answer("", 0), -EBADMSG);
-	assert_int_equal(answer("\x1a\x00", 2), 0);		       /* a heartbeat */
-	assert_int_equal(answer("\x1a\x02\x78\x01", 4), -EBADMSG);     /* with an unknown field 15 inside */
-	assert_int_equal(answer("\x1a\x00\xf8\x3f\x01", 5), -EBADMSG); /* and beside it */
+	assert_int_equal(unpack_code("", 0), -EBADMSG);
+	assert_int_equal(unpack_code("\x1a\x00", 2), 0);		    /* a heartbeat */
+	assert_int_equal(unpack_code("\x1a\x02\x78\x01", 4), -EBADMSG);	    /* with an unknown field 15 inside */
+	assert_int_equal(unpack_code("\x1a\x00\xf8\x3f\x01", 5), -EBADMSG); /* and beside it */
 	/* Submit{files{unknown}}: deep inside a repeated field (Submit is field 40, files is field 8) */
-	assert_int_equal(answer("\xc2\x02\x02\x42\x00", 5), 0);
-	assert_int_equal(answer("\xc2\x02\x04\x42\x02\x78\x01", 7), -EBADMSG);
+	assert_int_equal(unpack_code("\xc2\x02\x02\x42\x00", 5), 0);
+	assert_int_equal(unpack_code("\xc2\x02\x04\x42\x02\x78\x01", 7), -EBADMSG);
 }
 
 /* A megabyte of empty strings would take some 60 MB: cut off at 16 bytes a byte. */
@@ -197,7 +197,7 @@ static void a_bomb_is_defused(void **state)
 	memcpy(bytes, head, sizeof head);
 	for (size_t i = 0; i < INNER; i += 2)
 		bytes[sizeof head + i] = 0x1a; /* an empty Define */
-	assert_int_equal(answer(bytes, sizeof head + INNER), -EBADMSG);
+	assert_int_equal(unpack_code(bytes, sizeof head + INNER), -EBADMSG);
 	free(bytes);
 }
 

@@ -149,7 +149,7 @@ static void error_with_the_last_round(void **state)
 	expect_end(f, JOB_DONE, END_ERROR, 0);
 }
 
-static void black(void **state)
+static void no_light_in_the_bootstrap_ends_the_job(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
@@ -203,7 +203,7 @@ static void cannot_be_prepared(void **state)
 	expect_end(f, JOB_FAILED, END_FAILED, 3);
 }
 
-static void broken(void **state)
+static void an_overflown_sum_fails_the_job(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
@@ -436,10 +436,10 @@ int main(void)
 		cmocka_unit_test(bound_before_error),
 		cmocka_unit_test(chains_disagree),
 		cmocka_unit_test(error_with_the_last_round),
-		cmocka_unit_test(black),
+		cmocka_unit_test(no_light_in_the_bootstrap_ends_the_job),
 		cmocka_unit_test(black_samples),
 		cmocka_unit_test(cannot_be_prepared),
-		cmocka_unit_test(broken),
+		cmocka_unit_test(an_overflown_sum_fails_the_job),
 		cmocka_unit_test(progress_and_rate),
 		cmocka_unit_test(no_eta_without_leases),
 		cmocka_unit_test(no_eta_by_bootstrap),

@@ -24,7 +24,7 @@
 
 #define WORKER(N, NAME) "[3] w" #N " joins A threads=1 name=" NAME " -> -"
 
-static uint32_t wrong(const struct farm *f, uint64_t who)
+static uint32_t wrong_count(const struct farm *f, uint64_t who)
 {
 	struct worker_status w;
 	assert_true(farm_worker(f, who, &w));
@@ -59,8 +59,8 @@ static void without_what_came_before_the_chains_begin_anew(void **state)
 				   NULL,
 			   });
 	struct peer_status p;
-	assert_int_equal(wrong(f, 1), 1);
-	assert_int_equal(wrong(f, 2) + wrong(f, 3), 0);
+	assert_int_equal(wrong_count(f, 1), 1);
+	assert_int_equal(wrong_count(f, 2) + wrong_count(f, 3), 0);
 	assert_true(farm_peer(f, 2, &p) && p.failures == 0 && p.faults == 0);
 	assert_string_equal(doubt_maker(f, &(struct lease_key){1, LEASE_RENDER, 0, 0, 2}), "b");
 	/* Who made the states of other leases is not said: of an epoch before, of one that nobody has, of no states at
@@ -90,8 +90,8 @@ static void a_third_that_goes_on_is_right(void **state)
 			"#2 refused good chain states: j1 render group 0 part 0 epoch 1, j1 round 2, w2 gets j1 g0 p0 e2",
 			NULL,
 		});
-	assert_int_equal(wrong(f, 2), 1);
-	assert_int_equal(wrong(f, 1) + wrong(f, 3), 0);
+	assert_int_equal(wrong_count(f, 2), 1);
+	assert_int_equal(wrong_count(f, 1) + wrong_count(f, 3), 0);
 	farm_free(f);
 }
 
@@ -111,7 +111,7 @@ static void without_a_third_the_chains_begin_anew(void **state)
 				   "[7] w1 denies j1 g0 p0 e2 no -> anew, w2 gets j1 g0 p0 e2 anew",
 				   NULL,
 			   });
-	assert_int_equal(wrong(f, 1) + wrong(f, 2), 0);
+	assert_int_equal(wrong_count(f, 1) + wrong_count(f, 2), 0);
 	farm_free(f);
 }
 
@@ -130,7 +130,7 @@ static void a_third_that_leaves(void **state)
 				   "[6] w2 denies j1 g0 p0 e1 no -> anew, w2 gets j1 g0 p0 e1 anew",
 				   NULL,
 			   });
-	assert_int_equal(wrong(f, 1) + wrong(f, 2), 0);
+	assert_int_equal(wrong_count(f, 1) + wrong_count(f, 2), 0);
 	farm_free(f);
 }
 
@@ -151,7 +151,7 @@ static void the_maker_goes_on(void **state)
 				   "[6] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2",
 				   NULL,
 			   });
-	assert_int_equal(wrong(f, 1) + wrong(f, 2), 0);
+	assert_int_equal(wrong_count(f, 1) + wrong_count(f, 2), 0);
 	farm_free(f);
 }
 
@@ -190,8 +190,8 @@ static void a_second_refusal_takes_the_epoch_back(void **state)
 				   "[9] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w2 gets j1 g0 p0 e2",
 				   NULL,
 			   });
-	assert_int_equal(wrong(f, 1), 1);
-	assert_int_equal(wrong(f, 2) + wrong(f, 3), 0);
+	assert_int_equal(wrong_count(f, 1), 1);
+	assert_int_equal(wrong_count(f, 2) + wrong_count(f, 3), 0);
 	farm_free(f);
 }
 
@@ -215,8 +215,8 @@ static void a_late_refusal_is_of_no_consequence(void **state)
 				   "[8] w3 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w3 gets j1 g0 p0 e2",
 				   NULL,
 			   });
-	assert_int_equal(wrong(f, 1), 1);
-	assert_int_equal(wrong(f, 2) + wrong(f, 3), 0);
+	assert_int_equal(wrong_count(f, 1), 1);
+	assert_int_equal(wrong_count(f, 2) + wrong_count(f, 3), 0);
 	farm_free(f);
 }
 
@@ -278,7 +278,7 @@ static void after_four_times_the_chains_begin_anew(void **state)
 				   "[7] w2 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w2 gets j1 g0 p0 e2",
 				   NULL,
 			   });
-	assert_int_equal(wrong(f, 1) + wrong(f, 2), 0);
+	assert_int_equal(wrong_count(f, 1) + wrong_count(f, 2), 0);
 	farm_free(f);
 }
 
@@ -323,13 +323,13 @@ static void one_epoch_after_the_other_is_taken_back(void **state)
 			"[9] w2 batch j1 g0 p0 e3 -> merge, merged, j1 round 4, j1 publish 4, j1 is done (mutations)",
 			NULL,
 		});
-	assert_int_equal(wrong(f, 1), 2);
-	assert_int_equal(wrong(f, 2) + wrong(f, 3), 0);
+	assert_int_equal(wrong_count(f, 1), 2);
+	assert_int_equal(wrong_count(f, 2) + wrong_count(f, 3), 0);
 	farm_free(f);
 }
 
 /* Whoever refuses what others can go on from is quarantined after three times. */
-static void a_liar_is_set_aside(void **state)
+static void a_liar_is_quarantined(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
@@ -367,7 +367,7 @@ static void a_liar_is_set_aside(void **state)
 				   "w2 loses j1 g0 p0 e2, w2 loses j1 g1 p0 e2, j1 round 2",
 				   NULL,
 			   });
-	assert_int_equal(wrong(f, 1) + wrong(f, 3), 0);
+	assert_int_equal(wrong_count(f, 1) + wrong_count(f, 3), 0);
 	farm_free(f);
 }
 
@@ -384,7 +384,7 @@ int main(void)
 		cmocka_unit_test(who_has_states_that_are_given_up_loses_them),
 		cmocka_unit_test(after_four_times_the_chains_begin_anew),
 		cmocka_unit_test(one_epoch_after_the_other_is_taken_back),
-		cmocka_unit_test(a_liar_is_set_aside),
+		cmocka_unit_test(a_liar_is_quarantined),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -17,7 +17,7 @@ static enum job_state state_of(const struct farm *f, uint64_t job, double now, s
 	return s->state;
 }
 
-static void play(struct farm *f, const char *line)
+static void play_line(struct farm *f, const char *line)
 {
 	transcript_play(f, (const char *const[]){line, NULL});
 }
@@ -63,7 +63,7 @@ static void told_by_the_next_life(void **state)
 	assert_int_equal(state_of(f, 2, 4, &s), JOB_BOOTSTRAP);
 	assert_int_equal(s.leases, 1);
 	/* something is made of it: it is as good as any */
-	play(f, "[5] w4 batch j2 g0 p0 boot -> merge, merged, w5 gets j2 g0 p1 boot, w4 gets j2 g1 p0 boot");
+	play_line(f, "[5] w4 batch j2 g0 p0 boot -> merge, merged, w5 gets j2 g0 p1 boot, w4 gets j2 g1 p0 boot");
 	farm_free(f);
 }
 
@@ -112,18 +112,18 @@ static void never_heard_again(void **state)
 	(void)state;
 	char line[160];
 	struct farm *f = transcript_farm();
-	play(f, JOB);
+	play_line(f, JOB);
 	for (int i = 1; i <= 8; i++) {
 		snprintf(line, sizeof line, "[%d] w%d joins A threads=1 -> -", i, i);
-		play(f, line);
+		play_line(f, line);
 		snprintf(line, sizeof line, "[%d] w%d wants 1 -> %sw%d gets j1 g0 p0 boot", i, i,
 			 i == 1 ? "j1 is bootstrap, " : "", i);
-		play(f, line);
+		play_line(f, line);
 		snprintf(line, sizeof line, "[%d] w%d leaves -> %s", i, i,
 			 i < 8 ? "-"
 			       : "j1 is failed (failed: job: 8 of 8 workers that were lost in a row while they held "
 				 "bootstrap group 0 part 0 epoch 0; the last one: w8)");
-		play(f, line);
+		play_line(f, line);
 	}
 	farm_free(f);
 }
@@ -136,15 +136,15 @@ static void back_again(void **state)
 	char line[160];
 	struct job_status s;
 	struct farm *f = transcript_farm();
-	play(f, JOB);
+	play_line(f, JOB);
 	for (int i = 1; i <= 20; i++) {
 		snprintf(line, sizeof line, "[%d] w%d joins A threads=1 name=a home=a start=%d -> -", i, i, 1 + i / 2);
-		play(f, line);
+		play_line(f, line);
 		snprintf(line, sizeof line, "[%d] w%d wants 1 -> %sw%d gets j1 g0 p0 boot", i, i,
 			 i == 1 ? "j1 is bootstrap, " : "", i);
-		play(f, line);
+		play_line(f, line);
 		snprintf(line, sizeof line, "[%d] w%d leaves -> -", i, i);
-		play(f, line);
+		play_line(f, line);
 	}
 	assert_int_equal(state_of(f, 1, 21, &s), JOB_BOOTSTRAP);
 	assert_int_equal(s.counts.failures, 0);
@@ -153,18 +153,18 @@ static void back_again(void **state)
 
 /* Racks of four workers lose their power again and again in the middle of all leases; they come back, or others do.
  * What is merged in between begins the count anew. */
-static void racks(void **state)
+static void racks_that_lose_power_fail_no_job(void **state)
 {
 	(void)state;
 	char line[200];
 	struct job_status s;
 	struct farm *f = transcript_farm();
-	play(f, "[0] submit groups=4 rounds=9 -> j1 submitted, j1 is queued");
+	play_line(f, "[0] submit groups=4 rounds=9 -> j1 submitted, j1 is queued");
 	int peer = 0;
 	for (int rack = 0; rack < 14; rack++) {
 		for (int i = 0; i < 4; i++) {
 			snprintf(line, sizeof line, "[%d] w%d joins A threads=1 -> -", rack, peer + i + 1);
-			play(f, line);
+			play_line(f, line);
 		}
 		struct update u;
 		for (int i = 1; i <= 4; i++)
@@ -201,16 +201,16 @@ static void one_certificate(void **state)
 	char line[160];
 	struct job_status s;
 	struct farm *f = transcript_farm();
-	play(f, JOB);
-	play(f, "[0] w90 joins A threads=1 certificate=b -> -");
+	play_line(f, JOB);
+	play_line(f, "[0] w90 joins A threads=1 certificate=b -> -");
 	for (int i = 1; i <= 12; i++) {
 		snprintf(line, sizeof line, "[%d] w%d joins A threads=1 certificate=a -> -", i, i);
-		play(f, line);
+		play_line(f, line);
 		snprintf(line, sizeof line, "[%d] w%d wants 1 -> %sw%d gets j1 g0 p0 boot", i, i,
 			 i == 1 ? "j1 is bootstrap, " : "", i);
-		play(f, line);
+		play_line(f, line);
 		snprintf(line, sizeof line, "[%d] w%d leaves -> -", i, i);
-		play(f, line);
+		play_line(f, line);
 	}
 	assert_int_equal(state_of(f, 1, 13, &s), JOB_BOOTSTRAP);
 	farm_free(f);
@@ -223,7 +223,7 @@ int main(void)
 		cmocka_unit_test(limit_ends),
 		cmocka_unit_test(never_heard_again),
 		cmocka_unit_test(back_again),
-		cmocka_unit_test(racks),
+		cmocka_unit_test(racks_that_lose_power_fail_no_job),
 		cmocka_unit_test(one_certificate),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-static struct job_status status(const struct farm *f, uint64_t job, double now)
+static struct job_status status_of(const struct farm *f, uint64_t job, double now)
 {
 	struct job_status s;
 	assert_true(farm_job(f, job, now, &s));
@@ -29,8 +29,8 @@ static void hold_and_release(void **state)
 				   "[2] w1 batch j1 g0 p0 boot -> merge, merged",
 				   NULL,
 			   });
-	assert_int_equal(status(f, 1, 2).state, JOB_HELD);
-	assert_string_equal(status(f, 1, 2).waiting, "held by bob");
+	assert_int_equal(status_of(f, 1, 2).state, JOB_HELD);
+	assert_string_equal(status_of(f, 1, 2).waiting, "held by bob");
 	transcript_play(
 		f,
 		(const char *const[]){
@@ -44,7 +44,7 @@ static void hold_and_release(void **state)
 			"[5] hold order j1 held by ann -> rejected: the job is over",
 			NULL,
 		});
-	assert_int_equal(status(f, 1, 5).state, JOB_CANCELLED);
+	assert_int_equal(status_of(f, 1, 5).state, JOB_CANCELLED);
 	farm_free(f);
 }
 
@@ -64,13 +64,13 @@ static void damaged_files_are_nobodys_fault(void **state)
 				   "[4] w1 fails j1 g1 p0 boot it has the file no more -> w1 gets j1 g1 p0 boot",
 				   NULL,
 			   });
-	assert_int_equal(status(f, 1, 4).counts.failures, 0);
+	assert_int_equal(status_of(f, 1, 4).counts.failures, 0);
 	transcript_play(f, (const char *const[]){
 				   "[5] w1 lacks j1 g2 p0 boot no memory -> -",
 				   "[6] w1 fails j1 g0 p0 boot it has the file no more -> -",
 				   NULL,
 			   });
-	assert_int_equal(status(f, 1, 6).counts.failures, 2);
+	assert_int_equal(status_of(f, 1, 6).counts.failures, 2);
 	farm_free(f);
 }
 
@@ -86,19 +86,19 @@ static void two_reasons(void **state)
 				   "[0] w1 wants 1 -> -",
 				   NULL,
 			   });
-	assert_string_equal(status(f, 1, 0).waiting, "held by ann; no room");
+	assert_string_equal(status_of(f, 1, 0).waiting, "held by ann; no room");
 	transcript_play(f, (const char *const[]){
 				   "[1] release order j1 -> -",
 				   NULL,
 			   });
-	assert_string_equal(status(f, 1, 1).waiting, "no room");
+	assert_string_equal(status_of(f, 1, 1).waiting, "no room");
 	transcript_play(f, (const char *const[]){
 				   "[1] hold order j1 held by ann -> -",
 				   "[2] release j1 -> -",
 				   NULL,
 			   });
-	assert_string_equal(status(f, 1, 2).waiting, "held by ann");
-	assert_int_equal(status(f, 1, 2).state, JOB_HELD);
+	assert_string_equal(status_of(f, 1, 2).waiting, "held by ann");
+	assert_int_equal(status_of(f, 1, 2).state, JOB_HELD);
 	transcript_play(f, (const char *const[]){
 				   "[3] release order j1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
 				   NULL,
@@ -136,7 +136,7 @@ static void the_clock_stands_still(void **state)
 	farm_free(f);
 }
 
-static void priority(void **state)
+static void a_priority_moves_a_job_ahead(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
@@ -167,7 +167,7 @@ static void priority(void **state)
 			"w1 gets j2 g1 p0 boot",
 			NULL,
 		});
-	assert_int_equal(status(f, 3, 5).priority, 100);
+	assert_int_equal(status_of(f, 3, 5).priority, 100);
 	farm_free(f);
 }
 
@@ -286,7 +286,7 @@ int main(void)
 		cmocka_unit_test(hold_and_release),
 		cmocka_unit_test(two_reasons),
 		cmocka_unit_test(the_clock_stands_still),
-		cmocka_unit_test(priority),
+		cmocka_unit_test(a_priority_moves_a_job_ahead),
 		cmocka_unit_test(extend_while_it_runs),
 		cmocka_unit_test(extend_while_it_ends),
 		cmocka_unit_test(extend_when_it_has_ended),

@@ -98,7 +98,7 @@ static void before_anything(void **state)
 
 /* What the last complete round had met is met: the end, a look at the error, the time that it took, not that in
  * between. */
-static void bounds(void **state)
+static void bounds_that_were_met_stay_met(void **state)
 {
 	(void)state;
 	transcript((const char *const[]){
@@ -130,7 +130,7 @@ static void bounds(void **state)
 		NULL});
 }
 
-static void held(void **state)
+static void a_job_on_hold_gets_no_leases(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
@@ -203,7 +203,7 @@ static void more_than_are_taken(void **state)
 
 /* A job that is extended brings back what its makers reported then: what is known of those that are connected stays,
  * and of the others the latest counts. */
-static void makers(void **state)
+static void makers_reports_are_restored(void **state)
 {
 	(void)state;
 	const struct plan plan = {.kind = PLAN_CHAINS,
@@ -257,9 +257,14 @@ static void makers(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(in_the_bootstrap),    cmocka_unit_test(in_a_round), cmocka_unit_test(stored_results),
-		cmocka_unit_test(before_anything),     cmocka_unit_test(bounds),     cmocka_unit_test(held),
-		cmocka_unit_test(more_than_are_taken), cmocka_unit_test(makers),
+		cmocka_unit_test(in_the_bootstrap),
+		cmocka_unit_test(in_a_round),
+		cmocka_unit_test(stored_results),
+		cmocka_unit_test(before_anything),
+		cmocka_unit_test(bounds_that_were_met_stay_met),
+		cmocka_unit_test(a_job_on_hold_gets_no_leases),
+		cmocka_unit_test(more_than_are_taken),
+		cmocka_unit_test(makers_reports_are_restored),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

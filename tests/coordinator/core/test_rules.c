@@ -44,7 +44,7 @@ static void two_rounds_open(void **state)
 	});
 }
 
-static void repeats(void **state)
+static void a_lease_counts_once(void **state)
 {
 	(void)state;
 	transcript((const char *const[]){
@@ -60,7 +60,7 @@ static void repeats(void **state)
 	});
 }
 
-static void refused(void **state)
+static void unknown_workers_and_ended_jobs_are_refused(void **state)
 {
 	(void)state;
 	transcript((const char *const[]){
@@ -75,7 +75,7 @@ static void refused(void **state)
 	});
 }
 
-static void set_aside_after_faults(void **state)
+static void quarantined_after_faults(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
@@ -155,7 +155,7 @@ static void hung_up(void **state)
 	});
 }
 
-static void timeout(void **state)
+static void an_overdue_lease_is_given_again(void **state)
 {
 	(void)state;
 	transcript((const char *const[]){
@@ -201,7 +201,7 @@ static void timeout_after_median(void **state)
 	});
 }
 
-static void straggler(void **state)
+static void a_late_lease_gets_a_second_worker(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
@@ -230,7 +230,7 @@ static void straggler(void **state)
 }
 
 /* Who was overtaken by a copy may hold half as many leases, not who had the copy. */
-static void overtaken(void **state)
+static void an_overtaken_worker_gets_half_as_many_leases(void **state)
 {
 	(void)state;
 	static const char *const before[] = {
@@ -291,7 +291,7 @@ static void bounded_wish(void **state)
 	});
 }
 
-static bool joins(struct farm *f, uint64_t id, const char *name)
+static bool is_joined(struct farm *f, uint64_t id, const char *name)
 {
 	struct event ev = {.kind = EVENT_JOINED, .join = {.peer = id, .name = name, .fingerprint = "A", .threads = 1}};
 	struct update u;
@@ -308,12 +308,12 @@ static void long_names(void **state)
 	char name[JOIN_NAME + 1];
 	for (size_t i = 0; i + 1 < sizeof name; i += 2)
 		memcpy(name + i, "\xc3\xa4", 3);
-	assert_false(joins(f, 1, name));
-	assert_false(joins(f, 1, ""));
+	assert_false(is_joined(f, 1, name));
+	assert_false(is_joined(f, 1, ""));
 	name[JOIN_NAME - 2] = 0;
-	assert_true(joins(f, 1, name));
+	assert_true(is_joined(f, 1, name));
 	name[JOIN_NAME - 4] = 0;
-	assert_true(joins(f, 2, name));
+	assert_true(is_joined(f, 2, name));
 	assert_true(farm_peer(f, 2, &p) && farm_peer(f, 1, &q));
 	assert_string_equal(p.name, name);
 	assert_true(p.who != q.who);
@@ -325,16 +325,16 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(whole_job),
 		cmocka_unit_test(two_rounds_open),
-		cmocka_unit_test(repeats),
-		cmocka_unit_test(refused),
-		cmocka_unit_test(set_aside_after_faults),
+		cmocka_unit_test(a_lease_counts_once),
+		cmocka_unit_test(unknown_workers_and_ended_jobs_are_refused),
+		cmocka_unit_test(quarantined_after_faults),
 		cmocka_unit_test(worker_gone),
 		cmocka_unit_test(read_late),
 		cmocka_unit_test(hung_up),
-		cmocka_unit_test(timeout),
+		cmocka_unit_test(an_overdue_lease_is_given_again),
 		cmocka_unit_test(timeout_after_median),
-		cmocka_unit_test(straggler),
-		cmocka_unit_test(overtaken),
+		cmocka_unit_test(a_late_lease_gets_a_second_worker),
+		cmocka_unit_test(an_overtaken_worker_gets_half_as_many_leases),
 		cmocka_unit_test(returned_lease),
 		cmocka_unit_test(bounded_wish),
 		cmocka_unit_test(long_names),

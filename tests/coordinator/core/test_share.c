@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-static struct job_status status(const struct farm *f, uint64_t job)
+static struct job_status status_of(const struct farm *f, uint64_t job)
 {
 	struct job_status s;
 	assert_true(farm_job(f, job, 1, &s));
@@ -19,12 +19,12 @@ static struct job_status status(const struct farm *f, uint64_t job)
 
 static void has_share(const struct farm *f, uint64_t job, double share)
 {
-	double is = status(f, job).share;
+	double is = status_of(f, job).share;
 	if (fabs(is - share) > 1e-9 * share)
 		fail_msg("j%d has %g, not %g", (int)job, is, share);
 }
 
-static void play(struct farm *f, const char *line)
+static void play_line(struct farm *f, const char *line)
 {
 	transcript_play(f, (const char *const[]){line, NULL});
 }
@@ -36,9 +36,9 @@ static struct farm *eight(void)
 	char line[64];
 	for (int i = 1; i <= 8; i++) {
 		snprintf(line, sizeof line, "[0] w%d joins A threads=2 -> -", i);
-		play(f, line);
+		play_line(f, line);
 		snprintf(line, sizeof line, "[0] w%d wants 2 -> -", i);
-		play(f, line);
+		play_line(f, line);
 	}
 	return f;
 }
@@ -47,17 +47,18 @@ static void by_priority_and_owner(void **state)
 {
 	(void)state;
 	struct farm *f = eight();
-	play(f, "[0] hold order j1 x -> rejected: no such job");
-	play(f, "[0] restore j1 boot 1,1,1,1,1,1,1,1,1,1,1,1,0,0,0,0 fingerprint=A groups=16 owner=ann -> "
-		"j1 is bootstrap, w1 gets j1 g12 p0 boot, "
-		"w2 gets j1 g13 p0 boot, w3 gets j1 g14 p0 boot, w4 gets j1 g15 p0 boot");
+	play_line(f, "[0] hold order j1 x -> rejected: no such job");
+	play_line(f, "[0] restore j1 boot 1,1,1,1,1,1,1,1,1,1,1,1,0,0,0,0 fingerprint=A groups=16 owner=ann -> "
+		     "j1 is bootstrap, w1 gets j1 g12 p0 boot, "
+		     "w2 gets j1 g13 p0 boot, w3 gets j1 g14 p0 boot, w4 gets j1 g15 p0 boot");
 	has_share(f, 1, 2); /* it has a use for four leases */
-	assert_int_equal(status(f, 1).workers, 4);
-	assert_string_equal(status(f, 1).place, "4 of 8 machines");
-	play(f,
-	     "[0] cancel j1 -> j1 cancelled, w1 loses j1 g12 p0 boot, w2 loses j1 g13 p0 boot, w3 loses j1 g14 p0 boot, "
-	     "w4 loses j1 g15 p0 boot, j1 is cancelled (cancelled: cancelled)");
-	assert_string_equal(status(f, 1).place, "");
+	assert_int_equal(status_of(f, 1).workers, 4);
+	assert_string_equal(status_of(f, 1).place, "4 of 8 machines");
+	play_line(
+		f,
+		"[0] cancel j1 -> j1 cancelled, w1 loses j1 g12 p0 boot, w2 loses j1 g13 p0 boot, w3 loses j1 g14 p0 boot, "
+		"w4 loses j1 g15 p0 boot, j1 is cancelled (cancelled: cancelled)");
+	assert_string_equal(status_of(f, 1).place, "");
 	farm_free(f);
 
 	/* nobody asks for work yet: what they would have stays the same */
@@ -65,35 +66,35 @@ static void by_priority_and_owner(void **state)
 	for (int i = 1; i <= 8; i++) {
 		char line[64];
 		snprintf(line, sizeof line, "[0] w%d joins A threads=1 -> -", i);
-		play(f, line);
+		play_line(f, line);
 	}
-	play(f, "[0] submit groups=16 owner=ann -> j1 submitted, j1 is queued");
+	play_line(f, "[0] submit groups=16 owner=ann -> j1 submitted, j1 is queued");
 	has_share(f, 1, 8);
-	assert_string_equal(status(f, 1).place, "0 of 8 machines");
-	play(f, "[0] submit groups=3 priority=5 owner=ann -> j2 submitted, j2 is queued");
+	assert_string_equal(status_of(f, 1).place, "0 of 8 machines");
+	play_line(f, "[0] submit groups=3 priority=5 owner=ann -> j2 submitted, j2 is queued");
 	has_share(f, 1, 5);
 	has_share(f, 2, 3);
-	assert_string_equal(status(f, 1).place, "0 of 8 machines; j2 comes first");
-	assert_string_equal(status(f, 2).place, "0 of 8 machines");
-	play(f, "[0] submit groups=16 owner=bob -> j3 submitted, j3 is queued");
-	play(f, "[0] submit groups=1 owner=bob -> j4 submitted, j4 is queued");
+	assert_string_equal(status_of(f, 1).place, "0 of 8 machines; j2 comes first");
+	assert_string_equal(status_of(f, 2).place, "0 of 8 machines");
+	play_line(f, "[0] submit groups=16 owner=bob -> j3 submitted, j3 is queued");
+	play_line(f, "[0] submit groups=1 owner=bob -> j4 submitted, j4 is queued");
 	has_share(f, 1, 2.5); /* half of five is ann's; bob's other job leaves him the rest */
 	has_share(f, 3, 1.5);
 	has_share(f, 4, 1);
-	assert_string_equal(status(f, 3).place, "0 of 8 machines; j2 comes first; by turns with j1 and j4");
-	assert_string_equal(status(f, 3).owners_place,
+	assert_string_equal(status_of(f, 3).place, "0 of 8 machines; j2 comes first; by turns with j1 and j4");
+	assert_string_equal(status_of(f, 3).owners_place,
 			    "0 of 8 machines; 1 job of another owner comes first; by turns with j4 and 1 more");
-	play(f, "[0] submit groups=16 priority=-1 owner=eve -> j5 submitted, j5 is queued");
+	play_line(f, "[0] submit groups=16 priority=-1 owner=eve -> j5 submitted, j5 is queued");
 	has_share(f, 5, 0);
-	assert_string_equal(status(f, 5).place, "0 of 8 machines; j2, j1, j3 and 1 more come first");
-	assert_string_equal(status(f, 5).owners_place, "0 of 8 machines; 4 jobs of other owners come first");
-	play(f, "[0] hold order j2 held by ann -> -");
+	assert_string_equal(status_of(f, 5).place, "0 of 8 machines; j2, j1, j3 and 1 more come first");
+	assert_string_equal(status_of(f, 5).owners_place, "0 of 8 machines; 4 jobs of other owners come first");
+	play_line(f, "[0] hold order j2 held by ann -> -");
 	has_share(f, 2, 0);
 	has_share(f, 1, 4);
 	has_share(f, 3, 3);
-	play(f, "[0] hold order j3 held by bob -> -");
+	play_line(f, "[0] hold order j3 held by bob -> -");
 	has_share(f, 1, 7); /* bob has a use for one */
-	play(f, "[0] priority j5 1 -> -");
+	play_line(f, "[0] priority j5 1 -> -");
 	has_share(f, 5, 8);
 	has_share(f, 1, 0);
 	farm_free(f);
@@ -114,13 +115,13 @@ static void by_fingerprint(void **state)
 			   });
 	has_share(f, 1, 2);
 	has_share(f, 2, 1);
-	assert_string_equal(status(f, 1).place, "0 of 2 machines");
+	assert_string_equal(status_of(f, 1).place, "0 of 2 machines");
 	transcript_play(f, (const char *const[]){
 				   "[30] tick -> -",
 				   NULL,
 			   }); /* all are silent */
 	has_share(f, 1, 0);
-	assert_string_equal(status(f, 2).place, "0 of 0 machines");
+	assert_string_equal(status_of(f, 2).place, "0 of 0 machines");
 	farm_free(f);
 }
 
@@ -135,16 +136,16 @@ static void who_comes_first(void **state)
 				   "[0] w1 wants 2 -> j2 is bootstrap, w1 gets j2 g0 p0 boot, w1 gets j2 g1 p0 boot",
 				   NULL,
 			   });
-	assert_string_equal(status(f, 1).waiting, "waits for j2 of higher priority (7)");
-	assert_string_equal(status(f, 1).owners_waiting, status(f, 1).waiting); /* both are his own */
-	assert_int_equal(status(f, 2).workers, 1);				/* one machine, two leases */
-	assert_string_equal(status(f, 2).place, "1 of 1 machine");
-	play(f, "[0] submit groups=4 owner=ann -> j3 submitted, j3 is queued");
-	assert_string_equal(status(f, 3).waiting, "waits for j2 of higher priority (7)");
-	assert_string_equal(status(f, 3).owners_waiting, "waits for a job of higher priority of another owner");
-	play(f, "[0] priority j2 0 -> -");
-	assert_string_equal(status(f, 3).waiting, "workers busy with j2 (priority 0)");
-	assert_string_equal(status(f, 3).owners_waiting, "workers busy with a job of another owner");
+	assert_string_equal(status_of(f, 1).waiting, "waits for j2 of higher priority (7)");
+	assert_string_equal(status_of(f, 1).owners_waiting, status_of(f, 1).waiting); /* both are his own */
+	assert_int_equal(status_of(f, 2).workers, 1);				      /* one machine, two leases */
+	assert_string_equal(status_of(f, 2).place, "1 of 1 machine");
+	play_line(f, "[0] submit groups=4 owner=ann -> j3 submitted, j3 is queued");
+	assert_string_equal(status_of(f, 3).waiting, "waits for j2 of higher priority (7)");
+	assert_string_equal(status_of(f, 3).owners_waiting, "waits for a job of higher priority of another owner");
+	play_line(f, "[0] priority j2 0 -> -");
+	assert_string_equal(status_of(f, 3).waiting, "workers busy with j2 (priority 0)");
+	assert_string_equal(status_of(f, 3).owners_waiting, "workers busy with a job of another owner");
 	farm_free(f);
 }
 

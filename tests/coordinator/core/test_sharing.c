@@ -11,14 +11,14 @@
 
 #include <cmocka.h>
 
-static const char *waiting(const struct farm *f, uint64_t job)
+static const char *why_waiting(const struct farm *f, uint64_t job)
 {
 	static struct job_status s;
 	assert_true(farm_job(f, job, 1000, &s));
 	return s.waiting;
 }
 
-static void priority(void **state)
+static void higher_priorities_are_served_first(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
@@ -33,7 +33,7 @@ static void priority(void **state)
 			"[0] submit priority=5 groups=1 -> j3 submitted, j3 is queued",
 			NULL,
 		});
-	assert_string_equal(waiting(f, 3), "workers busy with j1 (priority -1)");
+	assert_string_equal(why_waiting(f, 3), "workers busy with j1 (priority -1)");
 	transcript_play(
 		f,
 		(const char *const[]){
@@ -41,8 +41,8 @@ static void priority(void **state)
 			"[2] w1 batch j3 g0 p0 boot -> merge, merged, j3 prepare, j2 is bootstrap, w1 gets j2 g0 p0 boot",
 			NULL,
 		});
-	assert_string_equal(waiting(f, 3), "the bootstrap is being evaluated");
-	assert_string_equal(waiting(f, 2), "");
+	assert_string_equal(why_waiting(f, 3), "the bootstrap is being evaluated");
+	assert_string_equal(why_waiting(f, 2), "");
 	transcript_play(f, (const char *const[]){
 				   "[2] prepared j3 -> j3 is running",
 				   "[3] w1 batch j2 g0 p0 boot -> merge, merged, w1 gets j3 g0 p0 e0",
@@ -191,7 +191,7 @@ static void workers_take_turns(void **state)
 	});
 }
 
-static void fingerprints(void **state)
+static void a_job_is_pinned_to_a_fingerprint(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
@@ -199,13 +199,13 @@ static void fingerprints(void **state)
 				   "[0] submit groups=3 -> j1 submitted, j1 is queued",
 				   NULL,
 			   });
-	assert_string_equal(waiting(f, 1), "no worker");
+	assert_string_equal(why_waiting(f, 1), "no worker");
 	transcript_play(f, (const char *const[]){
 				   "[0] w1 joins A threads=1 -> -",
 				   "[0] w2 joins B threads=1 -> -",
 				   NULL,
 			   });
-	assert_string_equal(waiting(f, 1), "no worker asks for work");
+	assert_string_equal(why_waiting(f, 1), "no worker asks for work");
 	transcript_play(
 		f, (const char *const[]){
 			   "[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
@@ -215,7 +215,7 @@ static void fingerprints(void **state)
 			   "[1] w1 leaves -> -",
 			   NULL,
 		   });
-	assert_string_equal(waiting(f, 1), "no worker with fingerprint A (1 with others)");
+	assert_string_equal(why_waiting(f, 1), "no worker with fingerprint A (1 with others)");
 	transcript_play(
 		f,
 		(const char *const[]){
@@ -255,17 +255,17 @@ static void nobody_is_trusted(void **state)
 				   "[30] tick -> -",
 				   NULL,
 			   });
-	assert_string_equal(waiting(f, 1), "no worker that responds and is not quarantined (1 are known)");
+	assert_string_equal(why_waiting(f, 1), "no worker that responds and is not quarantined (1 are known)");
 	transcript_play(f, (const char *const[]){
 				   "[30] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
 				   "[31] w1 fails j1 g0 p0 boot no such file -> -",
 				   NULL,
 			   });
-	assert_string_equal(waiting(f, 1), "no worker can compute it; worker w1 failed last: no such file");
+	assert_string_equal(why_waiting(f, 1), "no worker can compute it; worker w1 failed last: no such file");
 	farm_free(f);
 }
 
-static void limits(void **state)
+static void limits_of_jobs_and_workers(void **state)
 {
 	(void)state;
 	struct farm_config c;
@@ -347,7 +347,7 @@ static void memory_runs_out(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(priority),
+		cmocka_unit_test(higher_priorities_are_served_first),
 		cmocka_unit_test(priority_before_shares),
 		cmocka_unit_test(first_to_wait),
 		cmocka_unit_test(delivered_is_not_held),
@@ -355,10 +355,10 @@ int main(void)
 		cmocka_unit_test(owners_share_first),
 		cmocka_unit_test(the_nameless_and_the_restored),
 		cmocka_unit_test(workers_take_turns),
-		cmocka_unit_test(fingerprints),
+		cmocka_unit_test(a_job_is_pinned_to_a_fingerprint),
 		cmocka_unit_test(free_again_while_untouched),
 		cmocka_unit_test(nobody_is_trusted),
-		cmocka_unit_test(limits),
+		cmocka_unit_test(limits_of_jobs_and_workers),
 		cmocka_unit_test(memory_runs_out),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -26,7 +26,7 @@
 	"[1] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0, w2 gets j1 g0 p0 e0"
 /* clang-format on */
 
-static void agree(void **state)
+static void what_two_workers_agree_on_counts(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
@@ -151,7 +151,7 @@ static void leaves_between(void **state)
 	});
 }
 
-static void restart(void **state)
+static void a_restart_computes_unverified_leases_anew(void **state)
 {
 	(void)state;
 	transcript((const char *const[]){
@@ -168,7 +168,7 @@ static void restart(void **state)
 }
 
 /* A share: the same leases whoever computes them, about as many as were asked for. */
-static void share(void **state)
+static void a_share_of_the_leases_is_verified(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
@@ -270,7 +270,7 @@ static void notes_of_a_liar(void **state)
 	});
 }
 
-static void remembered(void **state)
+static void quarantined_workers_are_remembered(void **state)
 {
 	(void)state;
 	transcript((const char *const[]){
@@ -284,7 +284,7 @@ static void remembered(void **state)
 	});
 }
 
-static void lives(void **state)
+static void one_identity_is_one_worker_at_a_time(void **state)
 {
 	(void)state;
 	transcript((const char *const[]){
@@ -332,7 +332,7 @@ static void odd_one_out(void **state)
 }
 
 /* Where one answer is there and the other takes long, a third worker is asked. */
-static void straggler(void **state)
+static void a_slow_second_answer_is_asked_of_a_third(void **state)
 {
 	(void)state;
 	transcript((const char *const[]){
@@ -396,13 +396,20 @@ static void names_without_end(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(agree),	   cmocka_unit_test(third_decides),
-		cmocka_unit_test(all_differ),	   cmocka_unit_test(one_worker_twice),
-		cmocka_unit_test(leaves_between),  cmocka_unit_test(restart),
-		cmocka_unit_test(share),	   cmocka_unit_test(set_aside),
-		cmocka_unit_test(notes_of_a_liar), cmocka_unit_test(remembered),
-		cmocka_unit_test(lives),	   cmocka_unit_test(odd_one_out),
-		cmocka_unit_test(straggler),	   cmocka_unit_test(names_without_end),
+		cmocka_unit_test(what_two_workers_agree_on_counts),
+		cmocka_unit_test(third_decides),
+		cmocka_unit_test(all_differ),
+		cmocka_unit_test(one_worker_twice),
+		cmocka_unit_test(leaves_between),
+		cmocka_unit_test(a_restart_computes_unverified_leases_anew),
+		cmocka_unit_test(a_share_of_the_leases_is_verified),
+		cmocka_unit_test(set_aside),
+		cmocka_unit_test(notes_of_a_liar),
+		cmocka_unit_test(quarantined_workers_are_remembered),
+		cmocka_unit_test(one_identity_is_one_worker_at_a_time),
+		cmocka_unit_test(odd_one_out),
+		cmocka_unit_test(a_slow_second_answer_is_asked_of_a_third),
+		cmocka_unit_test(names_without_end),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

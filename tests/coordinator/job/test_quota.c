@@ -54,7 +54,7 @@ static void none_is_none(void **state)
 	plan.rounds = 3;
 }
 
-static void edges(void **state)
+static void each_quota_at_its_limit(void **state)
 {
 	(void)state;
 	uint64_t all = 3 * plan_round_mutations(&plan);
@@ -87,6 +87,6 @@ static void edges(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {cmocka_unit_test(none_is_none), cmocka_unit_test(says_the_limit),
-					   cmocka_unit_test(edges)};
+					   cmocka_unit_test(each_quota_at_its_limit)};
 	return cmocka_run_group_tests(tests, make_plan, NULL);
 }

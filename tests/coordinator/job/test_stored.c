@@ -19,7 +19,7 @@
 static const unsigned char unknown[] = {0xc0, 0x0c, 1}; /* field 200 of any message: a 1 */
 static struct error e;
 
-static struct job_counts counts(void)
+static struct job_counts make_counts(void)
 {
 	struct job_counts c;
 	uint64_t n = UINT64_MAX;
@@ -29,14 +29,14 @@ static struct job_counts counts(void)
 	return c;
 }
 
-static struct forecast_look look(double work)
+static struct forecast_look make_look(double work)
 {
 	return (struct forecast_look){work, 0.1, 1.0 / 3, 1e-300, INFINITY, NAN, 7};
 }
 
 static void assert_look(const struct forecast_look *l, double work)
 {
-	struct forecast_look want = look(work);
+	struct forecast_look want = make_look(work);
 	assert_memory_equal(l, &want, sizeof want);
 }
 
@@ -44,7 +44,7 @@ static void counts_come_back(void **state)
 {
 	(void)state;
 	unsigned char bytes[STORED_NOTE_MOST];
-	struct job_counts c = counts(), back = {0};
+	struct job_counts c = make_counts(), back = {0};
 	size_t size = stored_pack_counts(&c, bytes);
 	assert_int_equal(stored_unpack_counts(bytes, size, &back, &e), 0);
 	assert_memory_equal(&back, &c, sizeof c);
@@ -60,7 +60,7 @@ static void looks_come_back(void **state)
 {
 	(void)state;
 	unsigned char bytes[STORED_NOTE_MOST];
-	struct forecast_look l = look(1e9), back;
+	struct forecast_look l = make_look(1e9), back;
 	size_t size = stored_pack_look(&l, bytes);
 	assert_int_equal(stored_unpack_look(bytes, size, &back, &e), 0);
 	assert_look(&back, 1e9);
@@ -69,7 +69,7 @@ static void looks_come_back(void **state)
 }
 
 /* Of which every number is another. */
-static struct checkpoint_head head(void)
+static struct checkpoint_head make_head(void)
 {
 	struct checkpoint_head h = {.job = 12,
 				    .generation = 1ull << 40,
@@ -79,18 +79,18 @@ static struct checkpoint_head head(void)
 				    .look_written = 3.5,
 				    .times = {4.5, 5.5, NAN},
 				    .lit = {.b_pooled = 6.5, .beyond_share = 7.5, .black = true},
-				    .counts = counts()};
+				    .counts = make_counts()};
 	for (int i = 0; i < PLAN_MAX_GROUPS; i++)
 		h.lit.b[i] = 1.0 / (1 + i);
 	for (; h.looks.count < FORECAST_LOOKS; h.looks.count++)
-		h.looks.looks[h.looks.count] = look(h.looks.count);
+		h.looks.looks[h.looks.count] = make_look(h.looks.count);
 	snprintf(h.fingerprint, sizeof h.fingerprint, "%0255d", 9);
 	return h;
 }
 
 static void assert_head(const struct checkpoint_head *h)
 {
-	struct checkpoint_head want = head();
+	struct checkpoint_head want = make_head();
 	assert_true(h->job == want.job && h->generation == want.generation && h->worker_count == want.worker_count);
 	assert_true(h->cpu_seconds == 1.5 && h->bootstrap_cpu_seconds == 2.5 && h->look_written == 3.5);
 	assert_true(h->times.elapsed == 4.5 && h->times.opened == 5.5 && isnan(h->times.completed));
@@ -107,7 +107,7 @@ static unsigned char bytes[STORED_HEAD_MOST + 64];
 static void heads_come_back(void **state)
 {
 	(void)state;
-	struct checkpoint_head h = head(), back;
+	struct checkpoint_head h = make_head(), back;
 	size_t size = stored_pack_head(&h, bytes);
 	assert_int_equal(stored_unpack_head(bytes, size, &back, &e), 0);
 	assert_head(&back);
@@ -136,7 +136,7 @@ static size_t put_all(size_t at, const double *v, size_t count)
 
 static size_t put_look(size_t at, double work)
 {
-	struct forecast_look l = look(work);
+	struct forecast_look l = make_look(work);
 	at = put_all(at, (double[6]){l.work, l.cpu_seconds, l.seconds, l.rel_mse, l.rel_mse_upper, l.degrees}, 6);
 	put64(bytes + at, l.doubtful);
 	return at + 8;
@@ -175,7 +175,7 @@ static void old_notes_are_read(void **state)
 static void old_heads_are_read(void **state)
 {
 	(void)state;
-	struct checkpoint_head h = head(), back;
+	struct checkpoint_head h = make_head(), back;
 	put64(bytes, h.job);
 	put64(bytes + 8, h.generation);
 	size_t at = put_all(16, (double[6]){1.5, 2.5, 3.5, 4.5, 5.5, NAN}, 6);

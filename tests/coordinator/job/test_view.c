@@ -10,7 +10,7 @@
 #include <string.h>
 #include <cmocka.h>
 
-static struct job_record record(void)
+static struct job_record make_record(void)
 {
 	struct job_record r = {.id = 12, .rel_error = -1, .mixture = "independent=0.1,hslt=0.9", .state = "running"};
 	struct plan p = {.kind = PLAN_CHAINS, .chains = 1024, .epoch = 100, .mutations = "independent=0.1,hslt=0.9"};
@@ -26,7 +26,7 @@ static struct job_record record(void)
 	return r;
 }
 
-static json_int_t whole(const json_t *o, const char *key)
+static json_int_t int_of(const json_t *o, const char *key)
 {
 	const json_t *n = json_object_get(o, key);
 	assert_true(json_is_integer(n));
@@ -36,7 +36,7 @@ static json_int_t whole(const json_t *o, const char *key)
 static void json_shows_the_strategies(void **state)
 {
 	(void)state;
-	struct job_record r = record();
+	struct job_record r = make_record();
 	struct job_view v;
 	view_of_record(&v, &r);
 	json_t *o = view_to_json(&v, true);
@@ -44,12 +44,12 @@ static void json_shows_the_strategies(void **state)
 	assert_int_equal(json_array_size(list), 2);
 	const json_t *hslt = json_array_get(list, 1);
 	assert_string_equal(json_string_value(json_object_get(hslt, "name")), "hslt");
-	assert_int_equal(whole(hslt, "proposed"), 180000);
-	assert_int_equal(whole(hslt, "accepted"), 90000);
-	assert_int_equal(whole(json_object_get(hslt, "failures"), "reverse"), 11);
-	assert_int_equal(whole(json_array_get(list, 0), "proposed"), 20000);
-	assert_int_equal(whole(counts, "stuck"), 3);
-	assert_int_equal(whole(counts, "longestStuck"), 5210);
+	assert_int_equal(int_of(hslt, "proposed"), 180000);
+	assert_int_equal(int_of(hslt, "accepted"), 90000);
+	assert_int_equal(int_of(json_object_get(hslt, "failures"), "reverse"), 11);
+	assert_int_equal(int_of(json_array_get(list, 0), "proposed"), 20000);
+	assert_int_equal(int_of(counts, "stuck"), 3);
+	assert_int_equal(int_of(counts, "longestStuck"), 5210);
 	static const char note[] =
 		"3 of 2,048 chain epochs accepted nothing (1,024 chains); longest run: 5,210 rejections; "
 		"25 % of the light is missing: it comes by paths of more edges than are simulated (128; pssmlt: 32)";
@@ -78,7 +78,7 @@ static void json_of_other_jobs_has_none(void **state)
 static void json_says_why_no_error_is_stated(void **state)
 {
 	(void)state;
-	struct job_record r = record();
+	struct job_record r = make_record();
 	struct canvas_image img = {.rel_mse = 0.04, .rel_mse_upper = 0.09, .rel_mse_doubt = ERROR_SHORT};
 	for (int known = 0; known < 2; known++) {
 		struct job_view v;
@@ -97,7 +97,7 @@ static void json_says_why_no_error_is_stated(void **state)
 static void json_shows_the_forecast(void **state)
 {
 	(void)state;
-	struct job_record r = record();
+	struct job_record r = make_record();
 	struct job_view v;
 	r.target_error = 0.02;
 	for (int i = 1; i < 9; i++)
@@ -148,7 +148,7 @@ static void shows_the_share(void **state)
 	view_of_record(&v, &r);
 	view_add_status(&v, &s);
 	json_t *o = view_to_json(&v, true);
-	assert_true(whole(o, "workers") == 3 && whole(o, "machines") == 8);
+	assert_true(int_of(o, "workers") == 3 && int_of(o, "machines") == 8);
 	assert_true(json_number_value(json_object_get(o, "share")) == 2.5);
 	assert_string_equal(json_string_value(json_object_get(o, "owner")), "ann");
 	assert_string_equal(json_string_value(json_object_get(o, "place")), s.place);
@@ -210,7 +210,7 @@ static void shows_what_the_core_says(void **state)
 static void looks_travel(void **state)
 {
 	(void)state;
-	struct job_record r = record();
+	struct job_record r = make_record();
 	struct job_view v;
 	static struct view_looks looks;
 	Farm__JobStatus wire;

@@ -44,7 +44,7 @@ static int tear_down(void **state)
 	return folder_tear_down(state);
 }
 
-static bool has(const char *file)
+static bool is_there(const char *file)
 {
 	char path[SPOOL_PATH_MAX];
 	spool_job_path(jobs.spool, JOB, file, path);
@@ -141,7 +141,7 @@ static void import(struct ledger_job *j)
 	assert_false(j->damaged);
 	assert_string_equal(j->owner, "ann");
 	assert_string_equal(j->name, "box");
-	assert_false(has("job.json") || has("order"));
+	assert_false(is_there("job.json") || is_there("order"));
 }
 
 static void assert_submission(const struct ledger_job *j, const char *text)
@@ -260,7 +260,7 @@ static void a_damaged_record(void **state)
 	assert_true(r.has_result && r.priority == 5 && r.ended == 9);
 	assert_string_equal(r.state, "done");
 	assert_non_null(strstr(r.note, "was damaged"));
-	assert_true(has("job.json.damaged"));
+	assert_true(is_there("job.json.damaged"));
 }
 
 static void what_is_unknown_stays(void **state)
@@ -272,7 +272,7 @@ static void what_is_unknown_stays(void **state)
 	assert_int_equal(reconcile(&jobs, &e), -EBADMSG);
 	assert_non_null(strstr(e.text, "has lost 1 job: j3 (jobs.db and jobs-copy.db have no row for it"));
 	assert_int_equal(ledger_get(jobs.ledger, JOB, &j, &e), 0);
-	assert_true(has("job.json") && has("checkpoint"));
+	assert_true(is_there("job.json") && is_there("checkpoint"));
 }
 
 /* Both files of the ledger are gone, and of a job that waited nothing else than an empty journal is left. */
@@ -286,11 +286,11 @@ static void a_waiting_job_without_a_ledger_stays(void **state)
 	journal_release(j);
 	assert_int_equal(reconcile(&jobs, &e), -EBADMSG);
 	assert_non_null(strstr(e.text, "has lost 1 job: j3"));
-	assert_true(has("journal.0"));
+	assert_true(is_there("journal.0"));
 	ledger_close(jobs.ledger);
 	jobs.config.accept_loss = true;
 	assert_int_equal(reconcile(&jobs, &e), 0);
-	assert_false(has(NULL));
+	assert_false(is_there(NULL));
 	assert_int_equal(ledger_next_id(jobs.ledger), JOB + 1);
 }
 
@@ -308,7 +308,7 @@ static void a_journal_without_a_row_goes(void **state)
 	assert_int_equal(journal_create(&j, path, JOB, 0, &e), 0);
 	journal_release(j);
 	assert_int_equal(reconcile(&jobs, &e), 0);
-	assert_false(has(NULL));
+	assert_false(is_there(NULL));
 }
 
 static void what_was_never_accepted_goes(void **state)
@@ -317,7 +317,7 @@ static void what_was_never_accepted_goes(void **state)
 	old_record("queued");
 	assert_int_equal(spool_write(jobs.spool, JOB, "log", "line", 4, &e), 0);
 	assert_int_equal(reconcile(&jobs, &e), 0);
-	assert_false(has(NULL));
+	assert_false(is_there(NULL));
 	assert_int_equal(ledger_next_id(jobs.ledger), JOB + 1);
 }
 
@@ -328,10 +328,10 @@ static void of_another_version(void **state)
 	assert_int_equal(spool_write(jobs.spool, JOB, "job.json", "{\"schema\":2}", 12, &e), 0);
 	assert_int_equal(ledger_open(&jobs.ledger, jobs.config.spool, &e), 0);
 	assert_int_equal(import_files(&jobs, &e), -EPROTO);
-	assert_true(has("job.json"));
+	assert_true(is_there("job.json"));
 }
 
-static void notes(void **state)
+static void notes_are_imported(void **state)
 {
 	(void)state;
 	static const char *const names[][2] = {{"clock", "clock"}, {"aside", "quarantined"}};
@@ -372,7 +372,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(a_waiting_job_without_a_ledger_stays, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(a_journal_without_a_row_goes, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(of_another_version, set_up, tear_down),
-		cmocka_unit_test_setup_teardown(notes, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(notes_are_imported, set_up, tear_down),
 	};
 	log_set_level(LOG_LEVEL_ERROR);
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -81,7 +81,7 @@ static int start(int folder_error, int file_error)
 	return rc;
 }
 
-static void unreadable(void **state)
+static void a_file_that_cannot_be_read_stops_the_start(void **state)
 {
 	(void)state;
 	assert_int_equal(spool_write(jobs.spool, JOB, "checkpoint", "films", 5, &e), 0);
@@ -119,7 +119,7 @@ static void listed_in_part(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup_teardown(unreadable, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(a_file_that_cannot_be_read_stops_the_start, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(never_accepted, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(listed_in_part, set_up, tear_down),
 	};

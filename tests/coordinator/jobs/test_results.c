@@ -108,7 +108,7 @@ static void make_preview(char letter)
 	assert_int_equal(rename(temporary, path), 0);
 }
 
-static const Farm__FetchChunk *piece(struct scripted *p, uint64_t offset)
+static const Farm__FetchChunk *fetch_piece(struct scripted *p, uint64_t offset)
 {
 	assert_true(scripted_fetch(p, 1, FARM__WHAT__WHAT_PREVIEW, offset));
 	const Farm__Envelope *answer = scripted_hear(p);
@@ -118,7 +118,7 @@ static const Farm__FetchChunk *piece(struct scripted *p, uint64_t offset)
 
 static void expect_piece(struct scripted *p, uint64_t offset, char letter)
 {
-	const Farm__FetchChunk *c = piece(p, offset);
+	const Farm__FetchChunk *c = fetch_piece(p, offset);
 	assert_string_equal(c->error, "");
 	assert_int_equal(c->size, FILE_SIZE);
 	assert_int_equal(p->reader.payload.size, FILE_SIZE - offset < PIECE ? FILE_SIZE - offset : PIECE);
@@ -135,20 +135,20 @@ static void what_is_fetched_is_one_file(void **state)
 		assert_true(peer_hello(client[i], FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
 	}
 	make_preview('a');
-	assert_true(*piece(client[0], PIECE)->error); /* not begun */
+	assert_true(*fetch_piece(client[0], PIECE)->error); /* not begun */
 	expect_piece(client[0], 0, 'a');
 	make_preview('b');
 	expect_piece(client[1], 0, 'b');
 	expect_piece(client[0], PIECE, 'a');
 	expect_piece(client[0], 2 * PIECE, 'a');
-	assert_true(*piece(client[0], 2 * PIECE)->error); /* it was its last */
+	assert_true(*fetch_piece(client[0], 2 * PIECE)->error); /* it was its last */
 	expect_piece(client[1], PIECE, 'b');
 	/* Of two that may be under way the silent one gives way, and no other one. */
 	expect_piece(client[0], 0, 'b');
 	expect_piece(client[1], PIECE, 'b');
 	expect_piece(client[2], 0, 'b');
 	expect_piece(client[1], 2 * PIECE, 'b');
-	assert_non_null(strstr(piece(client[0], PIECE)->error, "in favour of others"));
+	assert_non_null(strstr(fetch_piece(client[0], PIECE)->error, "in favour of others"));
 	expect_piece(client[0], 0, 'b');
 	expect_piece(client[2], PIECE, 'b');
 	for (int i = 0; i < 3; i++)
@@ -370,7 +370,7 @@ static struct scripted *worker_with_result(struct scripted *client, struct lease
 	return worker;
 }
 
-static double now(void)
+static double seconds_now(void)
 {
 	struct timespec t;
 	clock_gettime(CLOCK_MONOTONIC, &t);
@@ -381,15 +381,15 @@ static double now(void)
 static bool sends_slowly(struct scripted *worker, const unsigned char *frame, size_t size)
 {
 	enum { PIECES = 24 };
-	double begun = now(), last = begun, longest = 0;
+	double begun = seconds_now(), last = begun, longest = 0;
 	size_t at = 0;
 	bool sent = true;
 	for (size_t i = 1; i <= PIECES && sent; i++) {
 		usleep(150000);
 		size_t n = size * i / PIECES - at;
 		sent = send(worker->fd, frame + at, n, MSG_NOSIGNAL) == (ssize_t)n;
-		longest = fmax(longest, now() - last);
-		last = now();
+		longest = fmax(longest, seconds_now() - last);
+		last = seconds_now();
 		at += n;
 	}
 	if (longest > 4 * QUICK)
@@ -398,7 +398,7 @@ static bool sends_slowly(struct scripted *worker, const unsigned char *frame, si
 	assert_true(sent);
 	assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
 	assert_true(worker->heartbeats >= (last - begun) / (QUICK + longest) / 2 &&
-		    worker->heartbeats <= (now() - begun) / QUICK + 2);
+		    worker->heartbeats <= (seconds_now() - begun) / QUICK + 2);
 	return true;
 }
 

@@ -238,7 +238,7 @@ static void what_no_end_makes_room_for(void **state)
 	spool_close(jobs.spool);
 }
 
-static void order(uint64_t job, Farm__Verb verb)
+static void send_order(uint64_t job, Farm__Verb verb)
 {
 	Farm__Control c;
 	Farm__Envelope m;
@@ -263,11 +263,11 @@ static void jobs_with_many_chains_take_turns(void **state)
 		staged_start();
 		uint64_t first = staged_submit();
 		work_until(&sent, 2 * round);
-		order(first, FARM__VERB__VERB_HOLD);
+		send_order(first, FARM__VERB__VERB_HOLD);
 		staged_submit();
 		if (times == 1)
 			work_until(&refused, 1);
-		order(first, FARM__VERB__VERB_RELEASE);
+		send_order(first, FARM__VERB__VERB_RELEASE);
 		work_until(&ended, jobs);
 		assert_true((refused > 0) == (times == 1));
 		staged_end(SIGTERM, true);

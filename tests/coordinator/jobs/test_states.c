@@ -57,7 +57,7 @@ static int tear_down(void **state)
 }
 
 /* Grants may come before the verdict on what was sent before them. */
-static void attend(void)
+static void hear_message(void)
 {
 	struct error e;
 	const Farm__Envelope *m = scripted_hear(t.worker);
@@ -76,14 +76,14 @@ static void attend(void)
 	t.granted = true;
 }
 
-static Farm__Verdict verdict(void)
+static Farm__Verdict hear_verdict(void)
 {
 	for (t.verdict = FARM__VERDICT__VERDICT_NONE; t.verdict == FARM__VERDICT__VERDICT_NONE;)
-		attend();
+		hear_message();
 	return t.verdict;
 }
 
-static struct batch result(uint8_t mark)
+static struct batch make_result(uint8_t mark)
 {
 	struct batch b = scripted_batch(&t.grant.key, &t.plan, STATE_BYTES);
 	for (uint32_t i = 0; i < b.state_count; i++)
@@ -92,33 +92,33 @@ static struct batch result(uint8_t mark)
 }
 
 /* Its states end with this byte. */
-static void answer(uint8_t mark)
+static void send_merged(uint8_t mark)
 {
-	struct batch b = result(mark);
+	struct batch b = make_result(mark);
 	peer_send_batch(t.worker, &b, &t.plan);
 	batch_fini(&b);
-	if (verdict() != FARM__VERDICT__VERDICT_MERGED)
+	if (hear_verdict() != FARM__VERDICT__VERDICT_MERGED)
 		fail_msg("refused: %s", t.text);
 }
 
 static void hear_grant(void)
 {
 	while (!t.granted)
-		attend();
+		hear_message();
 	t.granted = false;
 }
 
 static void come_to_states(void)
 {
 	for (hear_grant(); !t.grant.states; hear_grant())
-		answer(1);
+		send_merged(1);
 }
 
 /* Answers others until it holds this one. */
 static void come_to(const struct lease_key *k)
 {
 	for (hear_grant(); !lease_key_equal(&t.grant.key, k); hear_grant())
-		answer(1);
+		send_merged(1);
 }
 
 static void refuse(const struct lease_key *k, const struct blob_hash *states)
@@ -153,23 +153,23 @@ static void a_refusal_is_of_the_states_that_it_names(void **state)
 	after.epoch++;
 	refuse(&k, &first);
 	come_to(&before);
-	answer(2);
+	send_merged(2);
 	come_to(&k);
 	assert_false(blob_hash_equal(&t.grant.digest, &first));
 	assert_int_equal(t.grant.states[0].bytes[STATE_BYTES - 1], 2);
 	refuse(&k, &first);
-	answer(3); /* else it would be refused: its epoch is not open */
+	send_merged(3); /* else it would be refused: its epoch is not open */
 	/* The ones that are there now can be refused. */
 	come_to(&after);
 	refuse(&after, &t.grant.digest);
 	come_to(&k);
-	answer(3);
+	send_merged(3);
 }
 
 /* Damaged after the digest was made, or without one. */
 static void send_damaged(bool without)
 {
-	struct batch b = result(5);
+	struct batch b = make_result(5);
 	struct envelope env;
 	struct frame_reader r;
 	struct error e;
@@ -200,14 +200,14 @@ static void states_that_are_not_those_of_their_digest_are_refused(void **state)
 	come_to_states();
 	const struct lease_key k = t.grant.key;
 	send_damaged(false);
-	assert_int_equal(verdict(), FARM__VERDICT__VERDICT_REFUSED);
+	assert_int_equal(hear_verdict(), FARM__VERDICT__VERDICT_REFUSED);
 	assert_string_equal(t.text, "the chain states do not match their digest");
 	come_to(&k);
 	send_damaged(true);
-	assert_int_equal(verdict(), FARM__VERDICT__VERDICT_REFUSED);
+	assert_int_equal(hear_verdict(), FARM__VERDICT__VERDICT_REFUSED);
 	assert_string_equal(t.text, "chain states without a digest");
 	come_to(&k);
-	answer(6);
+	send_merged(6);
 }
 
 int main(void)

@@ -17,7 +17,7 @@
 #include <unistd.h>
 #include <cmocka.h>
 
-static char *path(const char *name)
+static char *path_of(const char *name)
 {
 	static char text[128];
 	snprintf(text, sizeof text, "%s/spool/%s", folder, name);
@@ -50,7 +50,7 @@ static FILE *begin(void)
 	char spool[80];
 	snprintf(spool, sizeof spool, "%s/spool", folder);
 	assert_int_equal(mkdir(spool, 0700), 0);
-	FILE *f = fopen(path("aside"), "w");
+	FILE *f = fopen(path_of("aside"), "w");
 	assert_non_null(f);
 	return f;
 }
@@ -102,7 +102,7 @@ static void a_damaged_list(void **state)
 		mem_free(text);
 		server_close(s);
 	}
-	assert_int_equal(access(path("aside"), F_OK), -1);
+	assert_int_equal(access(path_of("aside"), F_OK), -1);
 }
 
 /* One name has changed: whoever was meant is not guessed. In one file it is restored from the other. */

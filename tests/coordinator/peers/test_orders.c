@@ -60,7 +60,7 @@ static struct scripted *call_client(void)
 	return client;
 }
 
-static void order(struct scripted *client, Farm__Verb verb, int priority)
+static void send_order(struct scripted *client, Farm__Verb verb, int priority)
 {
 	Farm__Control c;
 	Farm__Envelope m;
@@ -88,7 +88,7 @@ static int hear_list(struct scripted *client, unsigned jobs)
 	return 0;
 }
 
-static int ask(struct scripted *client, unsigned jobs)
+static int ask_for_list(struct scripted *client, unsigned jobs)
 {
 	peer_say_empty(client, FARM__ENVELOPE__BODY_JOB_LIST);
 	return hear_list(client, jobs);
@@ -112,10 +112,10 @@ static void who_gives_orders_stops_nobody(void **state)
 	assert_int_equal(peer_submit_answer(master)->job, 1);
 	unsigned before = commits->count, looks = 0;
 	for (int i = 1; i <= ORDERS; i++)
-		order(master, FARM__VERB__VERB_PRIORITY, i);
+		send_order(master, FARM__VERB__VERB_PRIORITY, i);
 	peer_say_empty(master, FARM__ENVELOPE__BODY_JOB_LIST);
 	for (int last = 0; last < ORDERS; looks++) { /* some of which are in the middle */
-		int now = ask(other, 1);
+		int now = ask_for_list(other, 1);
 		assert_in_range(now, last, ORDERS);
 		last = now;
 	}
@@ -139,12 +139,12 @@ static void who_asks_for_lists_stops_nobody(void **state)
 		peer_submit(master, NULL, "<scene/>", "s.xml", "s.xml");
 		assert_int_equal(peer_submit_answer(master)->job, i);
 	}
-	ask(other, JOBS);
+	ask_for_list(other, JOBS);
 	for (int i = 0; i < LISTS; i++)
 		peer_say_empty(master, FARM__ENVELOPE__BODY_JOB_LIST);
-	order(master, FARM__VERB__VERB_PRIORITY, PRIORITY);
+	send_order(master, FARM__VERB__VERB_PRIORITY, PRIORITY);
 	unsigned looks = 0;
-	while (ask(other, JOBS) != PRIORITY)
+	while (ask_for_list(other, JOBS) != PRIORITY)
 		looks++;
 	print_message("%u lists for another client during %d\n", looks, LISTS);
 	assert_true(looks > 1); /* a server that first answers all of one client: 0, or 1 */

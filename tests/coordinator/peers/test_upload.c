@@ -265,7 +265,7 @@ static void a_smaller_limit_is_reached_in_pieces(void **state)
 	assert_in_range(flushes->removed_at_once, 1, STORED / 5);
 }
 
-static unsigned leftovers(void)
+static unsigned count_temporary_files(void)
 {
 	char command[128], line[32] = "";
 	snprintf(command, sizeof command, "find %s/spool -name 'tmp.*' | wc -l", served_folder());
@@ -285,9 +285,9 @@ static void who_goes_midway_leaves_nothing(void **state)
 	send_files(client, 0, FILES / 2);
 	scripted_hang_up(client);
 	served_works_again();
-	for (int i = 0; i < 6000 && leftovers(); i++)
+	for (int i = 0; i < 6000 && count_temporary_files(); i++)
 		usleep(10000);
-	assert_int_equal(leftovers(), 0);
+	assert_int_equal(count_temporary_files(), 0);
 	client = call_client();
 	submit_many(client);
 	send_missing(client, peer_submit_answer(client));
@@ -316,11 +316,11 @@ static void the_loop_removes_few_files(void **state)
 	struct scripted *client = sends_half();
 	scripted_hang_up(client);
 	served_works_again();
-	assert_in_range(leftovers(), FILES / 2, FILES);
+	assert_in_range(count_temporary_files(), FILES / 2, FILES);
 	flushes->hold = false;
-	for (int i = 0; i < 6000 && leftovers(); i++)
+	for (int i = 0; i < 6000 && count_temporary_files(); i++)
 		usleep(10000);
-	assert_int_equal(leftovers(), 0);
+	assert_int_equal(count_temporary_files(), 0);
 	served_still_works();
 	assert_in_range(flushes->removed, 0, 10);
 	/* What was flushed for nobody is in the store. */
@@ -344,9 +344,9 @@ static void nobody_flushes_for_nobody(void **state)
 	served_works_again();
 	unsigned before = flushes->elsewhere;
 	flushes->from = 0;
-	for (int i = 0; i < 6000 && leftovers(); i++)
+	for (int i = 0; i < 6000 && count_temporary_files(); i++)
 		usleep(10000);
-	assert_int_equal(leftovers(), 0);
+	assert_int_equal(count_temporary_files(), 0);
 	assert_in_range(flushes->elsewhere - before, 0, FILES / 10);
 	served_still_works();
 }
@@ -435,7 +435,7 @@ static const char *large_file(char letter)
 
 static const size_t LARGE = 600 << 10;
 
-static struct scripted *announce(char letter)
+static struct scripted *submit_file(char letter)
 {
 	struct scripted *client = call_client();
 	peer_submit(client, NULL, large_file(letter), "s.xml", "s.xml");
@@ -453,7 +453,7 @@ static void is_refused(struct scripted *client, const char *why)
 static void announcements_take_no_room(void **state)
 {
 	(void)state;
-	struct scripted *idle = announce('a'), *client = announce('b');
+	struct scripted *idle = submit_file('a'), *client = submit_file('b');
 	send_part(idle, large_file('a'), 0, 0);
 	peer_say_empty(idle, FARM__ENVELOPE__BODY_JOB_LIST);
 	assert_int_equal(scripted_hear(idle)->body_case, FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
@@ -467,9 +467,9 @@ static void announcements_take_no_room(void **state)
 static void who_came_first_has_room(void **state)
 {
 	(void)state;
-	struct scripted *first = announce('a');
+	struct scripted *first = submit_file('a');
 	usleep(20000);
-	struct scripted *second = announce('b');
+	struct scripted *second = submit_file('b');
 	send_part(first, large_file('a'), 0, LARGE / 2);
 	send_part(second, large_file('b'), 0, LARGE - 1);
 	peer_say_empty(second, FARM__ENVELOPE__BODY_JOB_LIST);
@@ -494,7 +494,7 @@ static int set_up_impatient(void **state)
 static void who_stands_still_has_none(void **state)
 {
 	(void)state;
-	struct scripted *idle = announce('a'), *client = call_client();
+	struct scripted *idle = submit_file('a'), *client = call_client();
 	const Farm__SubmitAnswer *a = NULL;
 	send_part(idle, large_file('a'), 0, LARGE - 1);
 	for (int i = 0; i < 600 && !(a && a->job); i++) {

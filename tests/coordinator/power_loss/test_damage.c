@@ -38,7 +38,7 @@ static size_t load(const char *path)
 	return n;
 }
 
-static void store(const char *path, size_t size)
+static void write_file(const char *path, size_t size)
 {
 	FILE *f = fopen(path, "wb");
 	assert_true(f && fwrite(bytes, 1, size, f) == size && fclose(f) == 0);
@@ -48,7 +48,7 @@ static void flip(const char *path, uint64_t at)
 {
 	size_t size = load(path);
 	bytes[at % size] ^= (unsigned char)(1 << at % 8);
-	store(path, size);
+	write_file(path, size);
 }
 
 /* Into path: the largest file of that name. 0: there is none. */
@@ -91,7 +91,7 @@ static void begin(uint64_t seed)
 	run.disk.lose_at = 0;
 }
 
-static void finish(void)
+static void run_to_end(void)
 {
 	assert_true(outage_start(&run) && outage_work(&run));
 	outage_stop(&run);
@@ -99,16 +99,16 @@ static void finish(void)
 	outage.running[0] = 0;
 }
 
-static uint64_t lost(void)
+static uint64_t take_lost(void)
 {
 	return atomic_exchange(&found.harm[LOST], 0);
 }
 
-static void before(uint64_t journal_bytes)
+static void run_before_damage(uint64_t journal_bytes)
 {
 	outage.journal_bytes = journal_bytes;
 	outage_quiet_run();
-	lost();
+	take_lost();
 }
 
 /* One bit anywhere in a journal of many results: one of them is computed again at most, and those behind it are not. */
@@ -117,13 +117,13 @@ static void a_bit_of_a_journal(void **state)
 	(void)state;
 	const uint64_t most = test_scaled() ? 12 : 30;
 	uint64_t all = 0, behind = 0, runs = 0;
-	before(1 << 20);
+	run_before_damage(1 << 20);
 	for (uint64_t seed = 1; seed <= most; seed++) {
 		char path[256];
 		begin(seed);
 		size_t size = largest("jobs/j*/journal.*", path);
 		if (size < 4 * BATCH_LEAST) { /* one job is done, and the next has hardly begun */
-			finish();
+			run_to_end();
 			continue;
 		}
 		runs++;
@@ -139,8 +139,8 @@ static void a_bit_of_a_journal(void **state)
 			outage_swap_folders(&run);
 			run.disk.lose_at = 0;
 		}
-		finish();
-		uint64_t n = lost();
+		run_to_end();
+		uint64_t n = take_lost();
 		if (n > 1)
 			fail_msg("seed %llu: %llu results are computed again", (unsigned long long)seed,
 				 (unsigned long long)n);
@@ -196,7 +196,7 @@ static void damaged_database(void **state)
 	(void)state;
 	enum { KINDS = 12 };
 	const uint64_t runs = test_scaled() ? KINDS : 3 * KINDS;
-	before(0);
+	run_before_damage(0);
 	for (uint64_t seed = 1; seed <= runs; seed++) {
 		const char *file = seed / KINDS % 2 ? "jobs-copy.db" : "jobs.db";
 		char command[300], wal[40];
@@ -249,8 +249,8 @@ static void damaged_database(void **state)
 		}
 		snprintf(outage.running, sizeof outage.running, "seed %llu, kind %d", (unsigned long long)seed,
 			 (int)(seed % KINDS));
-		finish();
-		assert_int_equal(lost(), 0);
+		run_to_end();
+		assert_int_equal(take_lost(), 0);
 	}
 }
 
@@ -260,7 +260,7 @@ static void what_is_lost(void **state)
 {
 	(void)state;
 	static const char *const files[] = {"jobs.db", "jobs-copy.db"};
-	before(0);
+	run_before_damage(0);
 	uint64_t put_aside = 0;
 	/* Whether a life leaves a checkpoint depends on what was under way when it ended. */
 	for (uint64_t seed = 201; put_aside < 4; seed++) {
@@ -289,9 +289,9 @@ static void what_is_lost(void **state)
 		assert_int_equal(run.code, 1);
 		in_root("sha256sum --quiet -c sums && test ! -e lost");
 		outage.accept_loss = true;
-		finish();
+		run_to_end();
 		outage.accept_loss = false;
-		assert_int_equal(lost(), 1);
+		assert_int_equal(take_lost(), 1);
 		in_root("j=$(basename $(cat lost-job)); sed s,jobs/,lost/, sums | sha256sum --quiet -c && grep -q jobs.db lost/$j/why");
 		put_aside++;
 	}

@@ -311,7 +311,7 @@ static size_t load(const char *path, unsigned char bytes[FILE_MOST])
 	return n;
 }
 
-static void store(const char *path, const unsigned char *bytes, size_t size, bool check)
+static void write_file(const char *path, const unsigned char *bytes, size_t size, bool check)
 {
 	struct checked_file out;
 	struct error e;
@@ -412,14 +412,14 @@ static void of_another_version(void **state)
 		size_t size = load(path, before);
 		memcpy(bytes, before, size);
 		memcpy(bytes + 5, "999", 3);
-		store(path, bytes, size, i == 0);
+		write_file(path, bytes, size, i == 0);
 		load(path, bytes);
 		assert_false(outage_start(&f));
 		assert_int_equal(f.code, 1);
 		static unsigned char after_it[FILE_MOST];
 		assert_int_equal(load(path, after_it), size);
 		assert_memory_equal(bytes, after_it, size);
-		store(path, before, size, false);
+		write_file(path, before, size, false);
 	}
 	change_row(id, "99", 1);
 	assert_false(outage_start(&f));

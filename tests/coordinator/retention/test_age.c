@@ -84,7 +84,7 @@ static void what_is_fetched_stays(void **state)
 	expect(jobs, "frrff");
 }
 
-static void both(void **state)
+static void by_age_and_by_size(void **state)
 {
 	(void)state;
 	struct age_job jobs[5];
@@ -101,7 +101,7 @@ int main(void)
 		cmocka_unit_test(by_age),
 		cmocka_unit_test(by_space),
 		cmocka_unit_test(what_is_fetched_stays),
-		cmocka_unit_test(both),
+		cmocka_unit_test(by_age_and_by_size),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -45,7 +45,7 @@ static int no_flush(int fd)
 	return 0;
 }
 
-static bool has(uint64_t job, const char *file)
+static bool is_there(uint64_t job, const char *file)
 {
 	char path[SPOOL_PATH_MAX];
 	spool_job_path(jobs.spool, job, file, path);
@@ -96,7 +96,7 @@ static void open_jobs(void)
 }
 
 /* As a coordinator starts after a reboot that has set the wall clock ahead by so many seconds. */
-static void reboot(double ahead)
+static void restart_after_reboot(double ahead)
 {
 	struct age_clock last = {
 		.seconds = 100.0 * DAY, .up = 1e9, .wall = (double)time(NULL) - ahead, .boot = "the-one-before"};
@@ -124,9 +124,9 @@ static void jumps_of_the_wall_clock_remove_nothing(void **state)
 		for (uint64_t id = 1; id <= 3; id++)
 			add(id, now - 60 * (double)(4 - id));
 		for (unsigned k = 0; k < sizeof jumps / sizeof *jumps; k++) {
-			reboot(jumps[k]);
+			restart_after_reboot(jumps[k]);
 			for (uint64_t id = 1; id <= 3; id++)
-				assert_true(has(id, "result.exr") == (id > 1 || k == 0 || days == 0));
+				assert_true(is_there(id, "result.exr") == (id > 1 || k == 0 || days == 0));
 			jobs.config.clear_bytes = days ? 10 : 0; /* two results */
 		}
 		ledger_close(jobs.ledger);
@@ -144,15 +144,15 @@ static void the_order_outlives_a_loss_of_power(void **state)
 	double now = (double)time(NULL);
 	open_jobs();
 	add(1, now + 1800);
-	reboot(-(double)DAY);
-	assert_true(has(1, "result.exr"));
+	restart_after_reboot(-(double)DAY);
+	assert_true(is_there(1, "result.exr"));
 	add(2, now);
 	jobs.config.clear_bytes = 5; /* one result */
 	jobs.clear_next = 0;
 	do
 		clear_tick(&jobs);
 	while (jobs.clearing);
-	assert_true(!has(1, "result.exr") && has(2, "result.exr"));
+	assert_true(!is_there(1, "result.exr") && is_there(2, "result.exr"));
 	ledger_close(jobs.ledger);
 	spool_close(jobs.spool);
 }
@@ -183,10 +183,10 @@ static void old_jobs_go_bit_by_bit(void **state)
 	assert_true(ticks >= 5);
 	for (uint64_t id = 1; id <= JOBS; id++) {
 		bool stays = id == LIVING || id == YOUNG;
-		assert_true(has(id, NULL) == stays);
+		assert_true(is_there(id, NULL) == stays);
 		assert_int_equal(ledger_get(jobs.ledger, id, &j, &e), stays);
 	}
-	assert_true(!has(YOUNG, "result.exr") && has(LIVING, "result.exr"));
+	assert_true(!is_there(YOUNG, "result.exr") && is_there(LIVING, "result.exr"));
 	ledger_close(jobs.ledger);
 	spool_close(jobs.spool);
 }
@@ -247,7 +247,7 @@ static void of_unknown_age(void **state)
 			clear_tick(&jobs);
 		while (jobs.clearing);
 		for (uint64_t id = 1; id <= 2; id++) {
-			assert_true(has(id, "result.exr") == (day < 2));
+			assert_true(is_there(id, "result.exr") == (day < 2));
 			assert_int_equal(ledger_read_record(jobs.ledger, id, r, &e), 0);
 			assert_true(r->ended_seen >= 100.0 * DAY && r->ended_seen < 100.0 * DAY + 100);
 		}
@@ -281,7 +281,7 @@ static void what_has_changed_stays(void **state)
 	while (jobs.clearing)
 		clear_tick(&jobs);
 	disk_use(NULL);
-	assert_true(has(1, "result.exr") && !has(2, NULL));
+	assert_true(is_there(1, "result.exr") && !is_there(2, NULL));
 	clear_close(&jobs);
 	ledger_close(jobs.ledger);
 	spool_close(jobs.spool);
@@ -302,11 +302,12 @@ static void what_is_read_stays(void **state)
 	jobs.reading = &first;
 	do { /* the last job goes in a later tick than the first: 120 looks are more than one */
 		clear_tick(&jobs);
-		if (!has(1, "result.exr"))
+		if (!is_there(1, "result.exr"))
 			jobs.reading = &second;
 	} while (jobs.clearing);
 	disk_use(NULL);
-	assert_true(has(3, "result.exr") && has(JOBS, "result.exr") && !has(1, NULL) && !has(2, NULL) && !has(4, NULL));
+	assert_true(is_there(3, "result.exr") && is_there(JOBS, "result.exr") && !is_there(1, NULL) &&
+		    !is_there(2, NULL) && !is_there(4, NULL));
 	ledger_close(jobs.ledger);
 	spool_close(jobs.spool);
 }
@@ -337,7 +338,7 @@ static void what_has_just_ended_is_fetched_first(void **state)
 		do
 			clear_tick(&jobs);
 		while (jobs.clearing);
-		assert_true(has(1, "result.exr") == fetching && !has(2, "result.exr"));
+		assert_true(is_there(1, "result.exr") == fetching && !is_there(2, "result.exr"));
 		assert_true((jobs.clear_next - jobs_now(&jobs) < 10) == fetching);
 	}
 	disk_use(NULL);
@@ -363,7 +364,7 @@ static void what_is_left_of_a_folder_has_its_row(void **state)
 			clear_tick(&jobs);
 		while (jobs.clearing);
 		failing_list_end();
-		assert_int_equal(has(1, NULL), round == 0);
+		assert_int_equal(is_there(1, NULL), round == 0);
 		assert_int_equal(ledger_get(jobs.ledger, 1, &j, &e), round == 0);
 	}
 	ledger_close(jobs.ledger);

@@ -45,7 +45,7 @@ static int extend(struct job *j, struct extension x)
 	return rc;
 }
 
-static void says(struct job *j, struct extension x, const char *text)
+static void expect_refusal(struct job *j, struct extension x, const char *text)
 {
 	assert_int_equal(extend(j, x), -EINVAL);
 	if (!strstr(j->e.text, text))
@@ -95,7 +95,7 @@ static void bounds_that_are_met(void **state)
 	j.from.seconds = 5;
 	j.from.error = 0.04;
 	uint64_t rounds = j.plan.rounds;
-	says(&j, (struct extension){.target_error = 0.045}, "already 4 %");
+	expect_refusal(&j, (struct extension){.target_error = 0.045}, "already 4 %");
 	make_job(&j, &r, 3, true);
 	j.from.seconds = 5;
 	j.from.error = 0.04;
@@ -156,7 +156,7 @@ static void to_an_error_that_is_never_known(void **state)
 	r.spp = 1;
 	make_job(&j, &r, 0, true);
 	assert_int_equal(j.plan.groups, 1);
-	says(&j, (struct extension){.target_error = 0.1}, "a single group of samples gives no error");
+	expect_refusal(&j, (struct extension){.target_error = 0.1}, "a single group of samples gives no error");
 	make_job(&j, &r, 0, true);
 	assert_int_equal(extend(&j, (struct extension){.spp = 8, .target_error = 0.1}), 0);
 	make_job(&j, &r, 0, true);
@@ -174,18 +174,18 @@ static void without_a_bound(void **state)
 	assert_int_equal(extend(&j, (struct extension){.mutations = 1}), 0); /* beyond what is done */
 	assert_true(j.plan.rounds == 8 && j.plan.seconds == 0 && j.plan.epoch == epoch);
 	make_job(&j, &r, 7, false);
-	says(&j, (struct extension){.spp = 8}, "no bound on samples");
+	expect_refusal(&j, (struct extension){.spp = 8}, "no bound on samples");
 	make_job(&j, &r, 7, false);
-	says(&j, (struct extension){.job = 1}, "a bound is missing");
-	says(&j, (struct extension){.seconds = NAN, .spp = 1}, "an invalid time or error");
-	says(&j, (struct extension){.seconds = -1, .spp = 1}, "an invalid time or error");
-	says(&j, (struct extension){.target_error = INFINITY}, "an invalid time or error");
+	expect_refusal(&j, (struct extension){.job = 1}, "a bound is missing");
+	expect_refusal(&j, (struct extension){.seconds = NAN, .spp = 1}, "an invalid time or error");
+	expect_refusal(&j, (struct extension){.seconds = -1, .spp = 1}, "an invalid time or error");
+	expect_refusal(&j, (struct extension){.target_error = INFINITY}, "an invalid time or error");
 	r.seconds = 0;
 	r.spp = 4;
 	make_job(&j, &r, 0, true);
-	says(&j, (struct extension){.spp = UINT64_MAX}, "can be counted");
+	expect_refusal(&j, (struct extension){.spp = UINT64_MAX}, "can be counted");
 	make_job(&j, &r, 0, true);
-	says(&j, (struct extension){.mutations = UINT64_MAX}, "can be counted");
+	expect_refusal(&j, (struct extension){.mutations = UINT64_MAX}, "can be counted");
 	make_job(&j, &r, 0, true);
 	assert_int_equal(extend(&j, (struct extension){.mutations = UINT64_C(1) << 63}), -EINVAL);
 }

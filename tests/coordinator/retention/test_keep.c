@@ -29,7 +29,7 @@ static void write_file(uint64_t job, const char *file, off_t size)
 	close(fd);
 }
 
-static bool has(uint64_t job, const char *file)
+static bool is_there(uint64_t job, const char *file)
 {
 	char path[SPOOL_PATH_MAX];
 	spool_job_path(jobs.spool, job, file, path);
@@ -89,17 +89,17 @@ static void the_first_go_first(void **state)
 	fill();
 	jobs.config.keep_bytes = 3000;
 	keep_trim(&jobs);
-	assert_true(has(3, "checkpoint") && has(1, "checkpoint") && has(2, "journal.2"));
+	assert_true(is_there(3, "checkpoint") && is_there(1, "checkpoint") && is_there(2, "journal.2"));
 	jobs.config.keep_bytes = 2999;
 	keep_trim(&jobs);
-	assert_false(has(3, "checkpoint") || has(3, "journal.2"));
-	assert_true(has(1, "journal.2") && has(2, "checkpoint"));
+	assert_false(is_there(3, "checkpoint") || is_there(3, "journal.2"));
+	assert_true(is_there(1, "journal.2") && is_there(2, "checkpoint"));
 	assert_true(!has_submission(3) && has_submission(1));
 	assert_true(keep_drop_all(&jobs));
-	assert_false(has(1, "journal.2") || has(2, "checkpoint"));
+	assert_false(is_there(1, "journal.2") || is_there(2, "checkpoint"));
 	assert_false(keep_drop_all(&jobs)); /* there is nothing more to be had */
 	for (uint64_t id = 1; id <= 3; id++)
-		assert_true(has(id, "result.exr"));
+		assert_true(is_there(id, "result.exr"));
 	ledger_close(jobs.ledger);
 	spool_close(jobs.spool);
 }
@@ -189,11 +189,11 @@ static void what_cannot_go_makes_no_room(void **state)
 	assert_false(keep_drop_all(&jobs));
 	failing_list_end();
 	for (uint64_t id = 1; id <= 3; id++)
-		assert_true(has(id, "checkpoint") && has(id, "journal.2"));
+		assert_true(is_there(id, "checkpoint") && is_there(id, "journal.2"));
 	jobs.reading = &(struct live_job){.id = 1};
 	assert_true(keep_drop_all(&jobs));
 	assert_false(keep_drop_all(&jobs));
-	assert_true(has(1, "checkpoint") && !has(2, "checkpoint") && !has(3, "journal.2"));
+	assert_true(is_there(1, "checkpoint") && !is_there(2, "checkpoint") && !is_there(3, "journal.2"));
 	ledger_close(jobs.ledger);
 	spool_close(jobs.spool);
 }

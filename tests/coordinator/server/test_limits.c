@@ -10,13 +10,13 @@
 #include <sys/resource.h>
 #include <cmocka.h>
 
-static void set(rlim_t now, rlim_t most)
+static void set_file_limit(rlim_t now, rlim_t most)
 {
 	struct rlimit r = {now, most};
 	assert_int_equal(setrlimit(RLIMIT_NOFILE, &r), 0);
 }
 
-static rlim_t now(void)
+static rlim_t file_limit(void)
 {
 	struct rlimit r;
 	assert_int_equal(getrlimit(RLIMIT_NOFILE, &r), 0);
@@ -28,17 +28,17 @@ static void descriptors_bound_connections(void **state)
 	(void)state;
 	struct error e;
 	unsigned n = 0;
-	set(64, 2048);
+	set_file_limit(64, 2048);
 	assert_int_equal(limits_connections(100, &n, &e), 0);
 	assert_int_equal(n, 100);
-	assert_true(now() >= 100 + 3 * 256 && now() < 2048); /* no more than it takes: a job has three */
+	assert_true(file_limit() >= 100 + 3 * 256 && file_limit() < 2048); /* no more than it takes: a job has three */
 	assert_int_equal(limits_connections(2000, &n, &e), -EINVAL);
 	assert_non_null(strstr(
 		e.text, "2000 connections, and 256 jobs, need 3024 file descriptors, and this process may have 2048"));
 	assert_int_equal(limits_connections(0, &n, &e), 0);
 	assert_int_equal(n, 2048 - 1024);
-	assert_int_equal(now(), 2048);
-	set(64, 1030); /* almost all of which the jobs and fetches could have */
+	assert_int_equal(file_limit(), 2048);
+	set_file_limit(64, 1030); /* almost all of which the jobs and fetches could have */
 	assert_int_equal(limits_connections(0, &n, &e), -EINVAL);
 	assert_non_null(strstr(e.text, "16 connections, and 256 jobs, need 1040 file descriptors"));
 }

@@ -47,7 +47,7 @@ static int open_two(struct server **s, const char *first, const char *second, bo
 }
 
 /* Connects to this address, and waits until the server has accepted it. */
-static int call(struct server *s, const char *host)
+static int connect_to(struct server *s, const char *host)
 {
 	struct net_addr a;
 	struct error e;
@@ -74,7 +74,7 @@ static void at_both(void **state)
 	struct server *s;
 	struct error e;
 	assert_int_equal(open_two(&s, "127.0.0.2", "127.0.0.1", false, &e), 0);
-	int first = call(s, "127.0.0.2"), second = call(s, "127.0.0.1");
+	int first = connect_to(s, "127.0.0.2"), second = connect_to(s, "127.0.0.1");
 	server_close(s);
 	close(first);
 	close(second);
@@ -87,7 +87,7 @@ static void one_is_of_no_interface(void **state)
 	struct server *s;
 	struct error e;
 	assert_int_equal(open_two(&s, "192.0.2.1", "127.0.0.1", true, &e), 0);
-	int fd = call(s, "127.0.0.1");
+	int fd = connect_to(s, "127.0.0.1");
 	server_close(s);
 	close(fd);
 }

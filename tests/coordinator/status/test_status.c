@@ -98,13 +98,13 @@ static FILE *call_status(void)
 	return f;
 }
 
-static void say(FILE *f, const char *line)
+static void send_line(FILE *f, const char *line)
 {
 	assert_int_equal(send(fileno(f), line, strlen(line), MSG_NOSIGNAL), strlen(line));
 }
 
 /* The next line; size may be NULL. */
-static json_t *hear(FILE *f, size_t *size)
+static json_t *read_line(FILE *f, size_t *size)
 {
 	static char *line;
 	static size_t room;
@@ -134,7 +134,7 @@ static void a_snapshot_is_small(void **state)
 	(void)state;
 	size_t size;
 	FILE *f = call_status();
-	json_t *o = hear(f, &size);
+	json_t *o = read_line(f, &size);
 	assert_int_equal(json_array_size(json_object_get(o, "jobs")), LISTED);
 	assert_int_equal(json_integer_value(json_object_get(o, "endedOthers")), ENDED - LISTED);
 	assert_string_equal(text_of(job_of(o, 0), "id"), "j251");
@@ -163,11 +163,11 @@ static void the_loop_makes_no_snapshot(void **state)
 	(void)state;
 	unsigned on_loop = made_at_rest(), elsewhere = made->elsewhere;
 	FILE *f = call_status();
-	say(f, "{\"job\":\"j301\"}\n");
-	json_t *o = hear(f, NULL);
+	send_line(f, "{\"job\":\"j301\"}\n");
+	json_t *o = read_line(f, NULL);
 	assert_string_equal(text_of(o, "type"), "snapshot");
 	json_decref(o);
-	o = hear(f, NULL);
+	o = read_line(f, NULL);
 	assert_string_equal(text_of(o, "type"), "error");
 	json_decref(o);
 	fclose(f);
@@ -179,18 +179,18 @@ static void one_job_has_its_details(void **state)
 {
 	(void)state;
 	FILE *f = call_status();
-	json_decref(hear(f, NULL));
-	say(f, "{\"job\":\"j7\"}\n{\"job\":\"j301\"}\n{\"job\":\"7\"}\n");
-	json_t *o = hear(f, NULL);
+	json_decref(read_line(f, NULL));
+	send_line(f, "{\"job\":\"j7\"}\n{\"job\":\"j301\"}\n{\"job\":\"7\"}\n");
+	json_t *o = read_line(f, NULL);
 	const json_t *job = json_object_get(o, "job");
 	assert_string_equal(text_of(o, "type"), "job");
 	assert_string_equal(text_of(job, "id"), "j7");
 	assert_int_equal(json_array_size(json_object_get(job, "effects")), 24);
 	json_decref(o);
-	o = hear(f, NULL);
+	o = read_line(f, NULL);
 	assert_string_equal(text_of(o, "text"), "j301: no such job");
 	json_decref(o);
-	o = hear(f, NULL);
+	o = read_line(f, NULL);
 	assert_string_equal(text_of(o, "text"), "7: no such job");
 	json_decref(o);
 	fclose(f);
@@ -202,10 +202,10 @@ static void pages_list_all_that_ended(void **state)
 	char question[64] = "{\"endedBefore\":null}\n";
 	uint64_t next = ENDED;
 	FILE *f = call_status();
-	json_decref(hear(f, NULL));
+	json_decref(read_line(f, NULL));
 	for (size_t page = 0; page < ENDED / LISTED; page++) {
-		say(f, question);
-		json_t *o = hear(f, NULL);
+		send_line(f, question);
+		json_t *o = read_line(f, NULL);
 		size_t count = json_array_size(json_object_get(o, "jobs"));
 		assert_int_equal(count, LISTED);
 		for (size_t i = count; i-- > 0; next--)
@@ -243,28 +243,28 @@ static void a_slow_reader_gets_the_newest(void **state)
 	FILE *quick = call_status(), *slow = call_status();
 	struct scripted *client = peer_call();
 	uint64_t last = ENDED + SUBMITTED, newest = 0, lines = 0;
-	json_decref(hear(quick, NULL));
-	say(quick, "{\"subscribe\":[\"snapshot\"]}\n");
-	say(slow, "{\"subscribe\":[\"snapshot\"]}\n");
+	json_decref(read_line(quick, NULL));
+	send_line(quick, "{\"subscribe\":[\"snapshot\"]}\n");
+	send_line(slow, "{\"subscribe\":[\"snapshot\"]}\n");
 	assert_true(peer_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
 	for (uint64_t id = ENDED + 1; id <= last; id++) {
 		for (submit(client, id); newest < id;) {
-			json_t *o = hear(quick, NULL);
+			json_t *o = read_line(quick, NULL);
 			newest = newest_of(o);
 			json_decref(o);
 		}
 	}
 	for (newest = 0; newest < last; lines++) {
-		json_t *o = hear(slow, NULL);
+		json_t *o = read_line(slow, NULL);
 		newest = newest_of(o);
 		json_decref(o);
 	}
 	assert_true(lines < SUBMITTED / 2);
-	say(slow, "{\"job\":\"j340\"}\n");
-	json_t *o = hear(slow, NULL);
+	send_line(slow, "{\"job\":\"j340\"}\n");
+	json_t *o = read_line(slow, NULL);
 	while (strcmp(text_of(o, "type"), "snapshot") == 0) {
 		json_decref(o);
-		o = hear(slow, NULL);
+		o = read_line(slow, NULL);
 	}
 	assert_string_equal(text_of(json_object_get(o, "job"), "id"), "j340");
 	json_decref(o);
@@ -284,23 +284,23 @@ static void what_is_sent_to_many_is_made_once(void **state)
 	uint64_t last = ENDED + SUBMITTED, seen = 0;
 	bool same = false;
 	assert_true(peer_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
-	json_decref(hear(quick, NULL));
-	say(quick, "{\"subscribe\":[\"snapshot\"]}\n");
+	json_decref(read_line(quick, NULL));
+	send_line(quick, "{\"subscribe\":[\"snapshot\"]}\n");
 	for (int i = 0; i < 2; i++)
-		say(slow[i], "{\"subscribe\":[\"snapshot\"]}\n");
+		send_line(slow[i], "{\"subscribe\":[\"snapshot\"]}\n");
 	for (int try = 0; try < TRIES && !same; try++) {
 		uint64_t newest[2] = {0, 0}, lines = 0;
 		double time[2] = {0, 0};
 		for (int k = 0; k < EACH; k++)
 			for (submit(client, ++last); seen < last;) {
-				json_t *o = hear(quick, NULL);
+				json_t *o = read_line(quick, NULL);
 				seen = newest_of(o);
 				json_decref(o);
 			}
 		for (int i = 0; newest[0] < last || newest[1] < last; i = !i) {
 			if (newest[i] == last)
 				continue;
-			json_t *o = hear(slow[i], NULL);
+			json_t *o = read_line(slow[i], NULL);
 			newest[i] = newest_of(o);
 			time[i] = json_real_value(json_object_get(o, "time"));
 			json_decref(o);
@@ -336,14 +336,14 @@ static void what_waits_for_all_readers_is_bounded(void **state)
 	FILE *quick = call_status(), *slow[READERS];
 	size_t size = 0, all = 0;
 	int whole = 0;
-	json_decref(hear(quick, NULL));
+	json_decref(read_line(quick, NULL));
 	for (int i = 0; i < READERS; i++) {
 		slow[i] = call_status();
-		json_decref(hear(slow[i], NULL)); /* before that nobody listens to it */
+		json_decref(read_line(slow[i], NULL)); /* before that nobody listens to it */
 		for (int k = 0; k < PAGES; k++)
-			say(slow[i], "{\"endedBefore\":null}\n");
-		say(quick, "{\"endedBefore\":null}\n");
-		json_decref(hear(quick, &size));
+			send_line(slow[i], "{\"endedBefore\":null}\n");
+		send_line(quick, "{\"endedBefore\":null}\n");
+		json_decref(read_line(quick, &size));
 		all += PAGES * size;
 	}
 	assert_true(all > 24 << 20 && PAGES * size < 1 << 20);
@@ -352,8 +352,8 @@ static void what_waits_for_all_readers_is_bounded(void **state)
 		fclose(slow[i]);
 	}
 	assert_true(whole > 0 && whole < READERS);
-	say(quick, "{\"job\":\"j7\"}\n");
-	json_decref(hear(quick, NULL));
+	send_line(quick, "{\"job\":\"j7\"}\n");
+	json_decref(read_line(quick, NULL));
 	fclose(quick);
 }
 
@@ -366,7 +366,7 @@ static bool hears_job(FILE *f, uint64_t id, bool ready)
 	for (bool found = false; !found;) {
 		if (ready && poll(&p, 1, 0) == 0)
 			return false;
-		json_t *o = hear(f, NULL);
+		json_t *o = read_line(f, NULL);
 		found = strcmp(text_of(json_object_get(o, "job"), "id"), name) == 0;
 		json_decref(o);
 	}
@@ -380,19 +380,19 @@ static void who_calls_again_and_again_stops_no_changes(void **state)
 	FILE *watcher = call_status(), *first = call_status();
 	struct scripted *client = peer_call();
 	unsigned calls = 0;
-	json_t *o = hear(watcher, NULL);
+	json_t *o = read_line(watcher, NULL);
 	uint64_t id = newest_of(o) + 1;
 	json_decref(o);
 	setvbuf(watcher, NULL, _IONBF, 0);
 	assert_true(peer_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
-	say(watcher, "{\"subscribe\":[\"jobs\"]}\n");
+	send_line(watcher, "{\"subscribe\":[\"jobs\"]}\n");
 	submit(client, id);
 	hears_job(watcher, id, false);
 	made->slowly = true;
 	submit(client, ++id);
 	for (; !hears_job(watcher, id, true) && calls < 20; calls++) {
 		FILE *next = call_status();
-		json_decref(hear(first, NULL));
+		json_decref(read_line(first, NULL));
 		fclose(first);
 		first = next;
 	}

@@ -14,7 +14,7 @@
 
 #define DAY 86400.0
 
-static double after(const char *boot, double up, double wall)
+static double age_after(const char *boot, double up, double wall)
 {
 	struct age_clock last = {.seconds = 1000, .up = 500, .wall = 100 * DAY, .boot = "first"},
 			 now = {.up = up, .wall = wall};
@@ -29,13 +29,13 @@ static void wall_clock_jumps(void **state)
 	struct age_clock first = {.seconds = 7, .up = 1, .wall = 2};
 	age_clock_advance(&first, NULL, AGE_CLOCK_CREDIT);
 	assert_true(first.seconds == 0);
-	assert_true(after("first", 600, 140 * DAY) == 1100); /* 40 days ahead */
-	assert_true(after("first", 600, 0) == 1100);
-	assert_true(after("first", 400, 100 * DAY) == 1000); /* no clock of a machine does that */
-	assert_true(after("second", 10, 100 * DAY + 300) == 1300);
-	assert_true(after("second", 10, 140 * DAY) == 1000 + AGE_CLOCK_CREDIT);
-	assert_true(after("second", 10, 0) == 1000);
-	assert_true(after("", 600, 100 * DAY + 60) == 1060); /* a system without such a name */
+	assert_true(age_after("first", 600, 140 * DAY) == 1100); /* 40 days ahead */
+	assert_true(age_after("first", 600, 0) == 1100);
+	assert_true(age_after("first", 400, 100 * DAY) == 1000); /* no clock of a machine does that */
+	assert_true(age_after("second", 10, 100 * DAY + 300) == 1300);
+	assert_true(age_after("second", 10, 140 * DAY) == 1000 + AGE_CLOCK_CREDIT);
+	assert_true(age_after("second", 10, 0) == 1000);
+	assert_true(age_after("", 600, 100 * DAY + 60) == 1060); /* a system without such a name */
 }
 
 /* However short results are kept. */

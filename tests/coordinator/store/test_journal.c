@@ -45,7 +45,7 @@ static struct lease_key lease_of(unsigned record)
 		.job = JOB, .kind = LEASE_RENDER, .group = record, .part = 7 * record, .epoch = 100 + record};
 }
 
-static int see(void *user, const struct journal_item *i, struct error *e)
+static int check_item(void *user, const struct journal_item *i, struct error *e)
 {
 	struct seen *s = user;
 	struct lease_key k = lease_of(s->count);
@@ -99,7 +99,7 @@ static int open_again(struct journal **j, struct seen *s, struct journal_found *
 {
 	struct error e;
 	*s = (struct seen){0};
-	return journal_open(j, folder, JOB, GENERATION, see, s, found, &e);
+	return journal_open(j, folder, JOB, GENERATION, check_item, s, found, &e);
 }
 
 static void path_of(char path[512])
@@ -306,12 +306,12 @@ static void of_another_job(void **state)
 	struct error e;
 	char path[512], other[512];
 	write_all(ends);
-	assert_int_equal(journal_open(&j, folder, JOB + 1, GENERATION, see, &s, &found, &e), -EBADMSG);
-	assert_int_equal(journal_open(&j, folder, JOB, GENERATION + 1, see, &s, &found, &e), -ENOENT);
+	assert_int_equal(journal_open(&j, folder, JOB + 1, GENERATION, check_item, &s, &found, &e), -EBADMSG);
+	assert_int_equal(journal_open(&j, folder, JOB, GENERATION + 1, check_item, &s, &found, &e), -ENOENT);
 	path_of(path);
 	snprintf(other, sizeof other, "%s/journal.%d", folder, GENERATION + 1);
 	assert_int_equal(rename(path, other), 0);
-	assert_int_equal(journal_open(&j, folder, JOB, GENERATION + 1, see, &s, &found, &e), -EBADMSG);
+	assert_int_equal(journal_open(&j, folder, JOB, GENERATION + 1, check_item, &s, &found, &e), -EBADMSG);
 	assert_int_equal(s.count, 0);
 }
 
@@ -401,7 +401,7 @@ static void of_another_version(void **state)
 	assert_int_equal(pwrite(fd, "072 another head", 16, 5), 16);
 	close(fd);
 	assert_int_equal(stat(path, &before), 0);
-	assert_int_equal(journal_open(&j, folder, JOB, GENERATION, see, &s, &found, &e), -EPROTO);
+	assert_int_equal(journal_open(&j, folder, JOB, GENERATION, check_item, &s, &found, &e), -EPROTO);
 	assert_non_null(strstr(e.text, "version 072"));
 	assert_int_equal(stat(path, &after), 0);
 	assert_int_equal(before.st_size, after.st_size);
@@ -526,7 +526,7 @@ static void power_lost(void **state)
 }
 
 /* RFC 3720, B.4 */
-static void checksums(void **state)
+static void checksums_of_the_standard(void **state)
 {
 	(void)state;
 	unsigned char zeros[32] = {0}, ones[32], up[32];
@@ -542,7 +542,7 @@ static void checksums(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(checksums),
+		cmocka_unit_test(checksums_of_the_standard),
 		cmocka_unit_test_setup_teardown(all_comes_back, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(torn_at_every_byte, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(zeros_behind, folder_set_up, folder_tear_down),

@@ -33,7 +33,7 @@ static off_t length_of_file(void)
 	return st.st_size;
 }
 
-static struct buf piece(size_t size)
+static struct buf make_piece(size_t size)
 {
 	struct buf b = {.limit = size};
 	assert_true(buf_reserve(&b, size));
@@ -48,13 +48,13 @@ static void memory_is_bounded(void **state)
 	enum { PIECE = 1 << 24, MOST = 1 << 28 };
 	struct journal *j, *other;
 	struct error e;
-	struct buf b = piece(PIECE);
+	struct buf b = make_piece(PIECE);
 	assert_int_equal(journal_create(&other, folder, JOB, GENERATION + 1, &e), 0);
 	assert_int_equal(journal_append(other, JOURNAL_BATCH, NULL, 1, "", 0, &b, &e), 0);
 	assert_int_equal(journal_create(&j, folder, JOB, GENERATION, &e), 0);
 	off_t empty = length_of_file();
 	for (unsigned n = 1; n < MOST / PIECE; n++) { /* with their heads it is a little more */
-		b = piece(PIECE);
+		b = make_piece(PIECE);
 		assert_int_equal(length_of_file(), empty);
 		assert_int_equal(journal_append(j, JOURNAL_BATCH, NULL, 1, "", 0, &b, &e), 0);
 	}

@@ -168,7 +168,7 @@ static void earlier_versions(void **state)
 	ledger_close(l);
 }
 
-static void orders(void **state)
+static void hold_and_priority_are_kept(void **state)
 {
 	(void)state;
 	struct ledger_job j;
@@ -195,7 +195,7 @@ static void orders(void **state)
 
 /* A job that ended lives again with another plan, whether the row knew of its end or not; and that end is not one of
  * its next life. */
-static void extended(void **state)
+static void an_ended_job_can_be_extended(void **state)
 {
 	(void)state;
 	static const unsigned char longer[] = {7, 7, 7};
@@ -261,7 +261,7 @@ static void set_version(const char *file, int32_t version)
 	close(fd);
 }
 
-static void versions(void **state)
+static void other_versions_are_refused(void **state)
 {
 	(void)state;
 	static const char *const files[] = {"jobs.db", "jobs-copy.db"};
@@ -279,7 +279,7 @@ static void versions(void **state)
 }
 
 /* Ids are never given twice, even when no row remembers them. */
-static void ids(void **state)
+static void ids_are_never_given_twice(void **state)
 {
 	(void)state;
 	struct ledger *l = open_ledger();
@@ -301,7 +301,7 @@ static void ids(void **state)
 }
 
 /* Its submission stays as long as its films do, its record as long as its row. */
-static void ended(void **state)
+static void what_is_kept_of_an_ended_job(void **state)
 {
 	(void)state;
 	struct ledger_job j;
@@ -334,7 +334,7 @@ static void ended(void **state)
 	ledger_close(l);
 }
 
-static void notes(void **state)
+static void notes_are_kept(void **state)
 {
 	(void)state;
 	char *text;
@@ -435,13 +435,13 @@ int main(void)
 		cmocka_unit_test_setup_teardown(living_jobs, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(no_memory, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(earlier_versions, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(extended, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(orders, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(ended, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(ids, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(notes, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(an_ended_job_can_be_extended, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(hold_and_priority_are_kept, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(what_is_kept_of_an_ended_job, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(ids_are_never_given_twice, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(notes_are_kept, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(checksums_stay, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(versions, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(other_versions_are_refused, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(stays_small, folder_set_up, folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -79,7 +79,7 @@ static void assert_filled(void)
 	}
 }
 
-static void spoil(const char *file)
+static void overwrite_with_text(const char *file)
 {
 	int fd = open(ledger_files_path(file), O_RDWR | O_TRUNC);
 	static const char text[] = "This is no database, but a text that is long enough to be looked at as one, if any"
@@ -104,7 +104,7 @@ static void a_file_is_no_database(void **state)
 	fill();
 	for (int i = 0; i < 2; i++) {
 		char damaged[40];
-		spoil(files[i]);
+		overwrite_with_text(files[i]);
 		assert_filled();
 		snprintf(damaged, sizeof damaged, "%s.damaged", files[i]);
 		assert_int_equal(access(ledger_files_path(damaged), F_OK), 0);
@@ -191,7 +191,7 @@ static void both_are_damaged(void **state)
 	assert_int_equal(ledger_get(l, 1, &j, &e), 0);
 	ledger_close(l);
 	for (int i = 0; i < 2; i++)
-		spoil(files[i]);
+		overwrite_with_text(files[i]);
 	l = open_ledger();
 	assert_int_equal(ledger_next_id(l), 1);
 	ledger_close(l);
@@ -229,7 +229,8 @@ static int take_connection(sqlite3 *db, const char **text, const struct sqlite3_
 }
 
 /* Called before each write of a table; the copy refuses. */
-static int deny(void *user, int what, const char *a, const char *b, const char *file, const char *trigger)
+static int deny_writes_to_copy(void *user, int what, const char *a, const char *b, const char *file,
+			       const char *trigger)
 {
 	(void)user;
 	(void)a;
@@ -249,7 +250,7 @@ static void the_copy_falls_behind(void **state)
 	struct ledger *l = open_ledger();
 	sqlite3_reset_auto_extension();
 	/* Statements are compiled again for the authorizer. */
-	assert_int_equal(sqlite3_set_authorizer(connection, deny, NULL), SQLITE_OK);
+	assert_int_equal(sqlite3_set_authorizer(connection, deny_writes_to_copy, NULL), SQLITE_OK);
 	refuse = true;
 	assert_int_equal(ledger_priority(l, 3, 9, &e), 0);
 	assert_int_equal(ledger_set(l, "clock", "latest", &e), 0);

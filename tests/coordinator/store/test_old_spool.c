@@ -146,7 +146,7 @@ static void old_file_is_read(void **state)
 }
 
 /* Cut anywhere, whether the checksum fits or not. */
-static void truncated(void **state)
+static void truncated_records_are_refused(void **state)
 {
 	(void)state;
 	unsigned char bytes[256];
@@ -211,7 +211,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(comes_back, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(old_file_is_read, set_up, tear_down),
-		cmocka_unit_test_setup_teardown(truncated, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(truncated_records_are_refused, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(sizes_beyond_bounds, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(of_another_version, set_up, tear_down),
 	};

@@ -106,7 +106,7 @@ static void records_come_back(void **state)
 
 static long until_it_fails; /* allocations of the JSON library; < 0: none fails */
 
-static void *scarce(size_t size)
+static void *alloc_until_it_fails(size_t size)
 {
 	return until_it_fails-- == 0 ? NULL : malloc(size);
 }
@@ -124,7 +124,7 @@ static void whole_or_not(void **state)
 	record_take_effects(&r, json_pack("[{s:s}]", "name", "dispersion"));
 	forecast_add_look(&r.looks, &(struct forecast_look){1e5, 0.1, 0.05, 0.3, 0.4, 20, 0});
 	assert_int_equal(record_to_json(&r, &whole, &e), 0);
-	json_set_alloc_funcs(scarce, free);
+	json_set_alloc_funcs(alloc_until_it_fails, free);
 	unsigned refused = 0;
 	for (long n = 0;; n++) {
 		until_it_fails = n;

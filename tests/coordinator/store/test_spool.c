@@ -85,7 +85,7 @@ static void what_is_larger_than_the_disk(void **state)
 	spool_close(s);
 }
 
-static uint64_t little(const char *path)
+static uint64_t little_space(const char *path)
 {
 	(void)path;
 	return 4 * SPOOL_RESERVE - 1;
@@ -100,7 +100,7 @@ static void room_is_kept(void **state)
 	struct stat st;
 	char path[SPOOL_PATH_MAX];
 	struct disk small = disk_system;
-	small.available = little;
+	small.available = little_space;
 	assert_int_equal(spool_open(&s, folder, &e), 0);
 	spool_path(s, "reserve", path);
 	for (int i = 0; i < 2; i++) {

@@ -9,7 +9,7 @@
 #include <time.h>
 #include <unistd.h>
 
-static long jump(void)
+static long seconds_ahead(void)
 {
 	char text[32] = "";
 	const char *path = getenv("HSLT_CLOCK");
@@ -25,7 +25,7 @@ int clock_gettime(clockid_t id, struct timespec *t)
 {
 	int rc = (int)syscall(SYS_clock_gettime, id, t);
 	if (rc == 0 && (id == CLOCK_REALTIME || id == CLOCK_REALTIME_COARSE))
-		t->tv_sec += jump();
+		t->tv_sec += seconds_ahead();
 	return rc;
 }
 

@@ -46,7 +46,7 @@ static void run_job(struct task *t)
 	atomic_fetch_sub(j->running, 1);
 }
 
-static void done(struct task *t)
+static void count_done(struct task *t)
 {
 	assert_true(pthread_equal(pthread_self(), loop_thread));
 	((struct job *)t)->done++;
@@ -65,8 +65,10 @@ static void the_crew_works(void **state)
 	assert_int_equal(uv_loop_init(&loop), 0);
 	assert_int_equal(thread_pool_new(&c, &loop, 3, &e), 0);
 	for (int i = 0; i < JOBS; i++) {
-		jobs[i] = (struct job){
-			.task = {.run = run_job, .done = done}, .running = &running, .most = &most, .gate = &gate};
+		jobs[i] = (struct job){.task = {.run = run_job, .done = count_done},
+				       .running = &running,
+				       .most = &most,
+				       .gate = &gate};
 		thread_pool_add(c, &jobs[i].task);
 	}
 	while (atomic_load(&running) < 3)

@@ -39,7 +39,7 @@ pid_t __wrap_fork(void)
 	return __real_fork();
 }
 
-static int live(void *user)
+static int run_life(void *user)
 {
 	(void)user;
 	int life = atomic_fetch_add(&plan->lives, 1), end = life < LIVES_MOST ? plan->ends[life] : 99;
@@ -53,7 +53,7 @@ static int live(void *user)
 }
 
 /* The exit code of a supervisor that was started with SIGHUP at that. */
-static int supervised(void (*hang_up)(int))
+static int supervise_code(void (*hang_up)(int))
 {
 	int status;
 	atomic_store(&plan->lives, 0);
@@ -63,7 +63,7 @@ static int supervised(void (*hang_up)(int))
 	if (p == 0) {
 		signal(SIGHUP, hang_up);
 		plan->counts = true;
-		_exit(supervise(1, live, NULL));
+		_exit(supervise(1, run_life, NULL));
 	}
 	assert_int_equal(waitpid(p, &status, 0), p);
 	plan->counts = false;
@@ -76,7 +76,7 @@ static void is_the_last(int process, const int *codes, size_t count)
 {
 	for (size_t i = 0; i < count; i++) {
 		plan->ends[process] = codes[i];
-		assert_int_equal(supervised(SIG_DFL), codes[i]);
+		assert_int_equal(supervise_code(SIG_DFL), codes[i]);
 		assert_int_equal(plan->lives, process + 1);
 	}
 }
@@ -102,7 +102,7 @@ static void no_process_for_a_while(void **state)
 	plan->ends[0] = BY_SIGNAL + SIGKILL;
 	plan->ends[1] = 6;
 	atomic_store(&plan->failing_forks, 2);
-	assert_int_equal(supervised(SIG_DFL), 6);
+	assert_int_equal(supervise_code(SIG_DFL), 6);
 	assert_int_equal(plan->lives, 2);
 	assert_int_equal(plan->forks, 4);
 }
@@ -114,10 +114,10 @@ static void ignored_hang_up(void **state)
 	plan->hang_up = 1;
 	plan->ends[0] = BY_SIGNAL + SIGKILL;
 	plan->ends[1] = 6;
-	assert_int_equal(supervised(SIG_IGN), 6);
+	assert_int_equal(supervise_code(SIG_IGN), 6);
 	assert_int_equal(plan->lives, 2);
 	plan->ends[0] = NEVER; /* it is passed on */
-	assert_int_equal(supervised(SIG_DFL), 0);
+	assert_int_equal(supervise_code(SIG_DFL), 0);
 	assert_int_equal(plan->lives, 1);
 	plan->hang_up = 0;
 }

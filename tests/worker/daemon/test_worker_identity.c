@@ -15,7 +15,7 @@
 
 static char folder[] = "/tmp/hslt-life.XXXXXX";
 
-static struct worker_identity next(const char *name)
+static struct worker_identity begin_identity(const char *name)
 {
 	struct worker_identity l;
 	struct error e;
@@ -35,20 +35,20 @@ static void write_text(const char *name, const char *text)
 	fclose(f);
 }
 
-static void counts(void **state)
+static void starts_are_counted(void **state)
 {
 	(void)state;
-	struct worker_identity first = next("a");
+	struct worker_identity first = begin_identity("a");
 	assert_int_equal(first.restarts, 1);
 	for (uint64_t i = 2; i < 20; i++) {
-		struct worker_identity l = next("a");
+		struct worker_identity l = begin_identity("a");
 		assert_int_equal(l.restarts, i);
 		assert_string_equal(l.home, first.home);
 	}
-	assert_string_not_equal(next("b").home, first.home);
+	assert_string_not_equal(begin_identity("b").home, first.home);
 }
 
-static void damaged(void **state)
+static void a_damaged_identity_is_replaced(void **state)
 {
 	(void)state;
 	static const char *const texts[] = {"",
@@ -59,18 +59,18 @@ static void damaged(void **state)
 					    "0123456789abcdef0123456789abcdef",
 					    "0123456789abcdef0123456789abcdef -1\n",
 					    "0123456789abcdef0123456789abcdef 18446744073709551615\n"};
-	struct worker_identity first = next("c");
+	struct worker_identity first = begin_identity("c");
 	for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
 		write_text("c", texts[i]);
-		struct worker_identity l = next("c");
+		struct worker_identity l = begin_identity("c");
 		assert_int_equal(l.restarts, 1);
 		assert_string_not_equal(l.home, first.home);
 	}
 	write_text("c", "0123456789abcdef0123456789abcdef 41\n");
-	assert_int_equal(next("c").restarts, 42);
+	assert_int_equal(begin_identity("c").restarts, 42);
 }
 
-static int full(int fd)
+static int fail_when_full(int fd)
 {
 	(void)fd;
 	errno = ENOSPC;
@@ -82,15 +82,15 @@ static void disk_full(void **state)
 {
 	(void)state;
 	struct disk bad = disk_system;
-	struct worker_identity before = next("d"), l;
+	struct worker_identity before = begin_identity("d"), l;
 	struct error e;
-	bad.fsync = full;
+	bad.fsync = fail_when_full;
 	disk_use(&bad);
 	int rc = worker_identity_begin(&l, folder, "d", &e);
 	disk_use(NULL);
 	assert_int_equal(rc, -ENOSPC);
 	assert_string_equal(l.home, "");
-	l = next("d");
+	l = begin_identity("d");
 	assert_int_equal(l.restarts, 2);
 	assert_string_equal(l.home, before.home);
 }
@@ -111,7 +111,8 @@ static int end(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(counts), cmocka_unit_test(damaged),
+	const struct CMUnitTest tests[] = {cmocka_unit_test(starts_are_counted),
+					   cmocka_unit_test(a_damaged_identity_is_replaced),
 					   cmocka_unit_test(disk_full)};
 	return cmocka_run_group_tests(tests, begin, end);
 }

@@ -15,7 +15,8 @@
 #include <string.h>
 #include <cmocka.h>
 
-static void choose(const struct world *w, uint64_t seed, uint64_t spp, struct plan_request *r, struct render_choice *c)
+static void choose_for(const struct world *w, uint64_t seed, uint64_t spp, struct plan_request *r,
+		       struct render_choice *c)
 {
 	struct error e = {""};
 	*r = (struct plan_request){.integrator = RENDER_INTEGRATOR_DEFAULT,
@@ -47,7 +48,7 @@ static bool chooses_chains(struct world *w, uint64_t seed)
 {
 	struct plan_request r;
 	struct render_choice c;
-	choose(w, seed, SPP, &r, &c);
+	choose_for(w, seed, SPP, &r, &c);
 	const struct render_integrator *i = render_integrator_find(r.integrator);
 	assert_non_null(i);
 	assert_int_equal(r.kind, i->kind);
@@ -78,7 +79,7 @@ static void samples_that_are_all_alike_have_no_variance(void **state)
 				"<bsdf type='diffuse'><float name='reflectance' value='1'/></bsdf></shape>");
 	struct plan_request r;
 	struct render_choice c;
-	choose(w, 1, SPP, &r, &c);
+	choose_for(w, 1, SPP, &r, &c);
 	assert_true(c.path.cost < 0.1 && c.path.tail > 2);
 	assert_string_equal(r.integrator, "path");
 	world_free(w);
@@ -97,7 +98,7 @@ static void fog_is_not_merged(void **state)
 				"value='4'/><translate z='-2'/></transform></shape>");
 	struct plan_request r;
 	struct render_choice c;
-	choose(w, 1, SPP, &r, &c);
+	choose_for(w, 1, SPP, &r, &c);
 	assert_string_equal(r.integrator, "erpt4");
 	assert_true(c.misses && c.focuses && c.merged.share == 0 && c.merged.seen == 0);
 	world_free(w);
@@ -121,7 +122,7 @@ static void clouds_focus_nothing(void **state)
 			inner[i]);
 		struct plan_request r;
 		struct render_choice c;
-		choose(w, 1, SPP, &r, &c);
+		choose_for(w, 1, SPP, &r, &c);
 		assert_int_equal(c.focuses, i > 0);
 		assert_int_equal(c.refracts, i == 2);
 		assert_string_equal(r.integrator, i == 0 ? "path" : "erpt4");
@@ -134,7 +135,7 @@ static bool merging_finds_rare_light(struct world *w, uint64_t seed)
 {
 	struct plan_request r;
 	struct render_choice c;
-	choose(w, seed, SPP, &r, &c);
+	choose_for(w, seed, SPP, &r, &c);
 	return c.merged.share > 0.03 && c.settled && strcmp(r.integrator, "erpt") == 0;
 }
 
@@ -198,7 +199,7 @@ static void a_small_lamp_in_a_mirror_is_not_rare_light(void **state)
 	for (uint64_t seed = 0; seed < SEEDS; seed++) {
 		struct plan_request r;
 		struct render_choice c;
-		choose(w, seed, SPP, &r, &c);
+		choose_for(w, seed, SPP, &r, &c);
 		assert_string_not_equal(r.integrator, "hslt");
 		rare += c.bdpt.rare / SEEDS;
 	}
@@ -215,7 +216,7 @@ static void light_with_an_end_to_its_tail_is_given_to_erpt4(void **state)
 	for (uint64_t seed = 0; seed < SEEDS; seed++) {
 		struct plan_request r;
 		struct render_choice c;
-		choose(w, seed, SPP, &r, &c);
+		choose_for(w, seed, SPP, &r, &c);
 		assert_true(c.path.tail < 2);
 		times += strcmp(r.integrator, "erpt4") == 0;
 	}
@@ -248,7 +249,7 @@ static void light_that_path_never_finds_may_be_easy_for_bdpt(void **state)
 	for (size_t i = 0; i < sizeof seeds / sizeof *seeds; i++) {
 		struct plan_request r;
 		struct render_choice c;
-		choose(w, seeds[i], 8, &r, &c);
+		choose_for(w, seeds[i], 8, &r, &c);
 		assert_true(c.misses && isinf(c.path.cost));
 		assert_string_equal(r.integrator, "erpt");
 	}
@@ -294,7 +295,7 @@ static void path_is_not_chosen_where_it_misses_light(void **state)
 	for (uint64_t seed = 0; seed < SEEDS; seed++) {
 		struct plan_request r;
 		struct render_choice c;
-		choose(w, seed, 16, &r, &c);
+		choose_for(w, seed, 16, &r, &c);
 		assert_int_equal(strncmp(r.integrator, "erpt", 4), 0);
 		c.misses = c.focuses = c.refracts = false;
 		would += strcmp(render_choice_of(&c), "path") == 0;
@@ -312,7 +313,7 @@ static void path_is_not_chosen_where_glass_may_focus_light(void **state)
 	for (uint64_t seed = 0; seed < SEEDS; seed++) {
 		struct plan_request r;
 		struct render_choice c;
-		choose(w, seed, 8, &r, &c);
+		choose_for(w, seed, 8, &r, &c);
 		assert_true(c.focuses);
 		assert_string_not_equal(r.integrator, "path");
 		clean += c.path.tail >= 2.1;
@@ -377,7 +378,7 @@ static void the_pilot_of_hours_is_bounded(void **state)
 	for (size_t i = 0; i < (test_scaled() ? 1 : sizeof of / sizeof *of); i++) {
 		struct plan_request r;
 		struct render_choice c;
-		choose(w, 0, of[i].spp, &r, &c);
+		choose_for(w, 0, of[i].spp, &r, &c);
 		assert_int_equal(c.samples, 4 * of[i].samples); /* two maps, for the first is black, path, bdpt */
 	}
 	world_free(w);
@@ -389,11 +390,11 @@ static void the_same_request_gives_the_same_choice(void **state)
 	struct world *w = world_of_own_scene("box", "box.xml", 60, 50);
 	struct plan_request r[2];
 	struct render_choice c[2];
-	choose(w, 7, 16, &r[0], &c[0]);
-	choose(w, 7, 16, &r[1], &c[1]);
+	choose_for(w, 7, 16, &r[0], &c[0]);
+	choose_for(w, 7, 16, &r[1], &c[1]);
 	assert_memory_equal(&c[0], &c[1], sizeof c[0]);
 	assert_memory_equal(&r[0], &r[1], sizeof r[0]);
-	choose(w, 8, 16, &r[1], &c[1]);
+	choose_for(w, 8, 16, &r[1], &c[1]);
 	assert_true(c[0].path.cost != c[1].path.cost);
 	world_free(w);
 }
@@ -429,9 +430,9 @@ static void a_short_render_has_a_brief_pilot(void **state)
 	struct world *w = world_of_own_scene("box", "box.xml", 60, 50);
 	struct plan_request r;
 	struct render_choice c;
-	choose(w, 1, 2, &r, &c);
+	choose_for(w, 1, 2, &r, &c);
 	assert_true(c.brief);
-	choose(w, 1, 400, &r, &c);
+	choose_for(w, 1, 400, &r, &c);
 	assert_false(c.brief);
 	world_free(w);
 }
@@ -447,7 +448,7 @@ static void the_pilot_is_a_small_part_of_the_render(void **state)
 	for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
 		struct plan_request r;
 		struct render_choice c;
-		choose(w, 3, of[i].spp, &r, &c);
+		choose_for(w, 3, of[i].spp, &r, &c);
 		double all = 62.0 * 52.0 * (double)of[i].spp;
 		assert_in_range(c.samples, 2 * of[i].least, 3 * of[i].least);
 		if (of[i].spp > 1)

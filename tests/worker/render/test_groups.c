@@ -73,7 +73,7 @@ void __wrap_rng_bits4(uint64_t seed, enum rng_stream stream, uint64_t index, uin
 	__real_rng_bits4(seed, stream, index, step, block, out);
 }
 
-static void listen(bool on)
+static void record_numbers(bool on)
 {
 	noted.on = on;
 	if (!on) {
@@ -185,7 +185,7 @@ static void run_all(const struct world *w, const struct plan *p, void (*look)(vo
 	bootstrap_free(s);
 }
 
-static void ignore(void *user, const struct batch *b)
+static void ignore_batch(void *user, const struct batch *b)
 {
 	(void)user;
 	(void)b;
@@ -198,8 +198,8 @@ static void groups_share_no_random_number(void **state)
 	for (size_t i = 0; render_integrator_at(i); i++) {
 		struct plan p = plan_of(w, render_integrator_at(i));
 		size_t own[GROUPS + 1] = {0};
-		listen(true);
-		run_all(w, &p, ignore, NULL);
+		record_numbers(true);
+		run_all(w, &p, ignore_batch, NULL);
 		qsort(noted.all, noted.count, sizeof *noted.all, by_number);
 		for (size_t n = 0; n < noted.count; n++) {
 			const struct number *a = &noted.all[n], *b = a + 1;
@@ -214,7 +214,7 @@ static void groups_share_no_random_number(void **state)
 		}
 		for (uint32_t g = 0; g < GROUPS; g++)
 			assert_true(own[g] > BOOTSTRAP / GROUPS + ROUNDS * EPOCH);
-		listen(false);
+		record_numbers(false);
 	}
 	world_free(w);
 }
@@ -233,14 +233,14 @@ static void chains_start_from_their_groups_bootstrap(void **state)
 		atomic_bool stop = false;
 		struct local_run r = {.world = w, .plan = &p, .threads = 1, .stop = &stop};
 		struct error e = {""};
-		listen(true);
+		record_numbers(true);
 		if (local_run(&r, &e))
 			fail_msg("%s", e.text);
 		canvas_free(r.canvas);
 		for (size_t n = 0; n < noted.count; n++)
 			if (noted.all[n].stream == RNG_BOOTSTRAP && noted.all[n].block == 0 && noted.all[n].step == 0)
 				looks[noted.all[n].index]++;
-		listen(false);
+		record_numbers(false);
 		for (uint64_t n = 0; n < BOOTSTRAP; n++) {
 			assert_true(looks[n] > 0); /* all groups together have drawn all of it */
 			started[n / (BOOTSTRAP / GROUPS)] += looks[n] > 1;
@@ -272,7 +272,7 @@ static void chains_start_from_the_samples_that_were_chosen(void **state)
 			}
 		batch_fini(&boot);
 		const uint64_t seeds[CHAINS / GROUPS / PARTS] = {first + n, first + n};
-		listen(true);
+		record_numbers(true);
 		boot = lease_done(w, &p, (struct lease_key){1, LEASE_RENDER, 1, 0, 0},
 				  &(struct lease_input){.chain_count = CHAINS / GROUPS / PARTS, .seeds = seeds});
 		batch_fini(&boot);
@@ -281,7 +281,7 @@ static void chains_start_from_the_samples_that_were_chosen(void **state)
 			assert_true(noted.all[k].stream != RNG_BOOTSTRAP || noted.all[k].index == first + n);
 		}
 		assert_true(looks > 0);
-		listen(false);
+		record_numbers(false);
 	}
 	world_free(w);
 }

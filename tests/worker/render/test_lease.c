@@ -98,7 +98,7 @@ static void assert_same(const struct batch *a, const struct batch *b)
 		assert_memory_equal(a->weights, b->weights, a->weight_count * sizeof *a->weights);
 }
 
-static struct lease_key key(enum lease_kind kind, uint32_t group, uint32_t part, uint64_t epoch)
+static struct lease_key make_key(enum lease_kind kind, uint32_t group, uint32_t part, uint64_t epoch)
 {
 	return (struct lease_key){1, kind, group, part, epoch};
 }
@@ -106,7 +106,7 @@ static struct lease_key key(enum lease_kind kind, uint32_t group, uint32_t part,
 /* Seeds that carry light, for one lease of chains. */
 static void find_seeds(const struct world *w, const struct plan *p, uint32_t group, uint64_t *seeds, uint32_t count)
 {
-	struct batch b = lease_done(w, p, key(LEASE_BOOTSTRAP, group, 0, 0), NULL);
+	struct batch b = lease_done(w, p, make_key(LEASE_BOOTSTRAP, group, 0, 0), NULL);
 	uint64_t first = plan_bootstrap_range(p, group, 0).begin;
 	uint32_t n = 0;
 	for (uint64_t i = 0; i < b.weight_count && n < count; i++)
@@ -127,9 +127,9 @@ static void test_any_order(void **state)
 		enum lease_kind kind = p.kind == PLAN_CHAINS ? LEASE_BOOTSTRAP : LEASE_RENDER;
 		struct batch b[GROUPS * PARTS];
 		for (uint32_t i = 0; i < GROUPS * PARTS; i++)
-			b[i] = lease_done(w, &p, key(kind, i % GROUPS, i / GROUPS, 0), NULL);
+			b[i] = lease_done(w, &p, make_key(kind, i % GROUPS, i / GROUPS, 0), NULL);
 		for (uint32_t i = GROUPS * PARTS; i-- > 0;) {
-			struct batch again = lease_done(w, &p, key(kind, i % GROUPS, i / GROUPS, 0), NULL);
+			struct batch again = lease_done(w, &p, make_key(kind, i % GROUPS, i / GROUPS, 0), NULL);
 			assert_same(&b[i], &again);
 			batch_fini(&again);
 			batch_fini(&b[i]);
@@ -150,14 +150,14 @@ static void test_chains(void **state)
 		uint64_t seeds[2];
 		find_seeds(w, &p, 1, seeds, 2);
 		struct lease_input in = {.chain_count = 2, .seeds = seeds};
-		struct batch a = lease_done(w, &p, key(LEASE_RENDER, 1, 1, 0), &in),
-			     b = lease_done(w, &p, key(LEASE_RENDER, 1, 1, 0), &in);
+		struct batch a = lease_done(w, &p, make_key(LEASE_RENDER, 1, 1, 0), &in),
+			     b = lease_done(w, &p, make_key(LEASE_RENDER, 1, 1, 0), &in);
 		assert_same(&a, &b);
 		assert_true(a.counters[COUNT_SAMPLES] == 2 * p.epoch && a.tile_count > 0);
 		struct lease_input next = {.chain_count = 2, .states = a.states},
 				   copy = {.chain_count = 2, .states = b.states};
-		struct batch c = lease_done(w, &p, key(LEASE_RENDER, 1, 1, 1), &next),
-			     d = lease_done(w, &p, key(LEASE_RENDER, 1, 1, 1), &copy);
+		struct batch c = lease_done(w, &p, make_key(LEASE_RENDER, 1, 1, 1), &next),
+			     d = lease_done(w, &p, make_key(LEASE_RENDER, 1, 1, 1), &copy);
 		assert_same(&c, &d);
 		batch_fini(&a);
 		batch_fini(&b);
@@ -194,9 +194,9 @@ static void test_extreme_light(void **state)
 			struct lease_input in = {.chain_count = 2, .seeds = seeds};
 			bool chains = p.kind == PLAN_CHAINS;
 			p.bootstrap = 4096;
-			struct batch a = lease_done(w, &p, key(LEASE_BOOTSTRAP, 1, 0, 0), NULL);
+			struct batch a = lease_done(w, &p, make_key(LEASE_BOOTSTRAP, 1, 0, 0), NULL);
 			batch_fini(&a);
-			struct batch b = lease_done(w, &p, key(LEASE_RENDER, 1, 0, 0), chains ? &in : NULL);
+			struct batch b = lease_done(w, &p, make_key(LEASE_RENDER, 1, 0, 0), chains ? &in : NULL);
 			batch_fini(&b);
 		}
 		world_free(w);
@@ -221,7 +221,7 @@ static void test_refused(void **state)
 	struct plan p = plan_of(w, "pssmlt"), other;
 	uint64_t seeds[3];
 	find_seeds(w, &p, 0, seeds, 3);
-	struct lease_key k0 = key(LEASE_RENDER, 0, 0, 0), k1 = key(LEASE_RENDER, 0, 0, 1);
+	struct lease_key k0 = make_key(LEASE_RENDER, 0, 0, 0), k1 = make_key(LEASE_RENDER, 0, 0, 1);
 	struct lease_input in = {.chain_count = 2, .seeds = seeds};
 	struct batch b = lease_done(w, &p, k0, &in);
 	/* Counts, and nothing at all. */
@@ -260,7 +260,7 @@ static void test_refused(void **state)
 	}
 	print_message("%zu of the noisy states are states\n", good);
 	/* Dark seeds: such a chain looks for light. */
-	struct batch boot = lease_done(w, &p, key(LEASE_BOOTSTRAP, 0, 0, 0), NULL);
+	struct batch boot = lease_done(w, &p, make_key(LEASE_BOOTSTRAP, 0, 0, 0), NULL);
 	for (uint64_t i = 0; i < boot.weight_count; i++)
 		if (!(boot.weights[i] > 0)) {
 			assert_int_equal(
@@ -296,7 +296,7 @@ static void test_refused(void **state)
 						   "<medium type='homogeneous' name='interior'/></shape>");
 	for (size_t i = 0; render_integrator_at(i); i++) {
 		p = plan_of(w, render_integrator_at(i)->name);
-		assert_int_equal(end_of(w, &p, key(LEASE_BOOTSTRAP, 0, 0, 0), NULL), 0);
+		assert_int_equal(end_of(w, &p, make_key(LEASE_BOOTSTRAP, 0, 0, 0), NULL), 0);
 	}
 	world_free(w);
 }
@@ -315,7 +315,7 @@ static void test_invalid_operation(void **state)
 		find_seeds(w, &p, 0, seeds, 2);
 		struct lease_input in = {.chain_count = 2, .seeds = seeds};
 		for (int kind = LEASE_BOOTSTRAP; kind <= LEASE_RENDER; kind++) {
-			struct lease_key k = key((enum lease_kind)kind, 0, 0, 0);
+			struct lease_key k = make_key((enum lease_kind)kind, 0, 0, 0);
 			struct batch good = lease_done(w, &p, k, &in), b;
 			struct error e = {""};
 			enum lease_end end;
@@ -355,7 +355,7 @@ static void test_stop(void **state)
 			atomic_bool stop = true;
 			enum lease_end end = LEASE_DONE;
 			struct batch b;
-			struct lease_key k = key((enum lease_kind)kind, 0, 0, 0);
+			struct lease_key k = make_key((enum lease_kind)kind, 0, 0, 0);
 			assert_int_equal(
 				render_lease(w, &p, &k, p.kind == PLAN_CHAINS ? &in : NULL, &stop, &end, &b, NULL), 0);
 			assert_int_equal(end, LEASE_STOPPED);
@@ -388,7 +388,7 @@ static void test_ticks(void **state)
 		p.epoch = p.kind == PLAN_CHAINS ? 256 : 50;
 		struct lease_input in = {.chain_count = 2, .seeds = seeds};
 		for (int kind = LEASE_BOOTSTRAP; kind <= LEASE_RENDER; kind++) {
-			struct lease_key k = key((enum lease_kind)kind, 1, 0, 0);
+			struct lease_key k = make_key((enum lease_kind)kind, 1, 0, 0);
 			atomic_store(&ticks, 0);
 			tick_counter = &ticks;
 			struct batch b = lease_done(w, &p, k, p.kind == PLAN_CHAINS ? &in : NULL);
@@ -407,7 +407,7 @@ static float *film_of(const struct world *w, const struct plan *p)
 	double *sum = calloc((size_t)p->width * p->height * 3, sizeof *sum);
 	for (uint32_t g = 0; g < p->groups; g++)
 		for (uint32_t part = 0; part < p->parts; part++) {
-			struct batch b = lease_done(w, p, key(LEASE_RENDER, g, part, 0), NULL);
+			struct batch b = lease_done(w, p, make_key(LEASE_RENDER, g, part, 0), NULL);
 			for (uint32_t t = 0; t < b.tile_count; t++)
 				for (uint32_t i = 0; i < b.tiles[t].width * b.tiles[t].height * 3; i++) {
 					uint32_t x = b.tiles[t].x + i / 3 % b.tiles[t].width,
@@ -512,7 +512,7 @@ static void test_no_memory(void **state)
 				struct error e = {""};
 				struct batch b;
 				enum lease_end end;
-				struct lease_key k = key((enum lease_kind)kind, 0, 0, 0);
+				struct lease_key k = make_key((enum lease_kind)kind, 0, 0, 0);
 				mem_fail_after(i);
 				int rc =
 					render_lease(w, &p, &k, p.kind == PLAN_CHAINS ? &in : NULL, NULL, &end, &b, &e);

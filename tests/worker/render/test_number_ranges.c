@@ -53,7 +53,7 @@ static int print_value(char *out, size_t size, const struct param *p, enum value
 }
 
 /* What the property needs beside it to have a meaning. */
-static const char *companions(const struct plugin_decl *d, const struct param *p)
+static const char *needed_beside(const struct plugin_decl *d, const struct param *p)
 {
 	if (strcmp(p->name, "displacement") == 0)
 		return "<integer name='displacement_level' value='1'/>";
@@ -137,7 +137,7 @@ static int try_value(const struct plugin_decl *d, const struct param *p, enum va
 	char property[512];
 	if (!print_value(property, sizeof property, p, type, x))
 		return 0;
-	print_scene(text, d, companions(d, p), property);
+	print_scene(text, d, needed_beside(d, p), property);
 	const struct memory_file files[] = {{"s.xml", text, strlen(text)},
 					    {"sky.hdr", sky, sizeof sky - 1},
 					    {"m.obj", obj, sizeof obj - 1},
@@ -183,7 +183,7 @@ static void check_beyond(const struct plugin_decl *d, const struct param *p, enu
 }
 
 /* Integers reach from one whole number to the next. */
-static double after(enum value_type type, double x, double toward)
+static double next_number(enum value_type type, double x, double toward)
 {
 	return type == VALUE_INT ? x + (toward > x ? 1 : -1) : x == 0 ? copysign(1e-6, toward) : nextafter(x, toward);
 }
@@ -208,8 +208,8 @@ static void check_param(const struct plugin_decl *d, const struct param *p, stru
 		void (*check)(const struct plugin_decl *, const struct param *, enum value_type, double,
 			      struct counts *) =
 			(p->types & VALUE_CLIPPED) && t != VALUE_SPECTRUM ? check_inside : check_beyond;
-		check(d, p, t, after(t, p->max, INFINITY), c);
-		check(d, p, t, after(t, p->min, -INFINITY), c);
+		check(d, p, t, next_number(t, p->max, INFINITY), c);
+		check(d, p, t, next_number(t, p->min, -INFINITY), c);
 	}
 }
 

@@ -76,7 +76,7 @@ static struct plan_rays count(const struct world *w, const struct plan_request *
 	return rays;
 }
 
-static struct plan made(const struct plan_request *r)
+static struct plan make_plan(const struct plan_request *r)
 {
 	struct plan p;
 	struct error e = {""};
@@ -111,7 +111,7 @@ static void a_bright_room_has_a_short_bootstrap(void **state)
 	for (int i = 0; i < NAMES; i += next()) {
 		struct plan_request r = request_of(w, names[i]);
 		r.rays = count(w, &r);
-		struct plan p = made(&r);
+		struct plan p = make_plan(&r);
 		double rays = bootstrap_rays(w, &p), quarter = (double)SECONDS * RAYS_A_SECOND / 4;
 		print_message("%s: %.0f rays a bootstrap sample, %.1f a step; %d samples, %.2f of a quarter\n",
 			      names[i], r.rays.bootstrap, r.rays.step, (int)p.bootstrap, rays / quarter);
@@ -141,7 +141,7 @@ static void the_pilot_counts_what_a_render_takes(void **state)
 		r.groups = 4;
 		r.bootstrap = 256;
 		r.chains = r.kind == PLAN_CHAINS ? 16 : 0;
-		struct plan p = made(&r);
+		struct plan p = make_plan(&r);
 		struct local_run run = {.world = w, .plan = &p, .threads = 1, .stop = &never};
 		struct error e = {""};
 		if (local_run(&run, &e))

@@ -37,12 +37,12 @@ static struct picture make_picture(uint32_t width, uint32_t height, float value)
 	return p;
 }
 
-static float *at(struct picture *p, int rgb, size_t i)
+static float *value_at(struct picture *p, int rgb, size_t i)
 {
 	return &p->image.planes[2 - rgb][i];
 }
 
-static struct compare_result result(const struct picture *a, const struct picture *b, double trim)
+static struct compare_result compare_pictures(const struct picture *a, const struct picture *b, double trim)
 {
 	struct compare_result r;
 	struct error e;
@@ -65,10 +65,10 @@ static void figures_are_those_made_by_hand(void **unused)
 	(void)unused;
 	struct picture a = make_picture(2, 2, 1), b = make_picture(2, 2, 1);
 	for (int k = 0; k < 3; k++)
-		*at(&a, k, 3) = *at(&b, k, 3) = 2 * (float)(k + 1);
-	*at(&a, 0, 0) = 0.5f;
-	*at(&a, 1, 3) = 3;
-	struct compare_result r = result(&a, &b, 0);
+		*value_at(&a, k, 3) = *value_at(&b, k, 3) = 2 * (float)(k + 1);
+	*value_at(&a, 0, 0) = 0.5f;
+	*value_at(&a, 1, 3) = 3;
+	struct compare_result r = compare_pictures(&a, &b, 0);
 	double least = 0.0175 * 0.0175;
 	assert_true(near(r.rel_mse, (0.25 / (1 + least) + 1 / (16 + least)) / 12));
 	assert_true(near(r.relative_error, sqrt(r.rel_mse)));
@@ -87,12 +87,12 @@ static void the_peak_is_a_percentile(void **unused)
 {
 	(void)unused;
 	struct picture b = make_picture(20, 10, 1);
-	*at(&b, 1, 17) = 100; /* of 600 values, rank 597 leaves three out */
-	*at(&b, 0, 30) = 90;
-	*at(&b, 2, 31) = 80;
-	assert_true(near(result(&b, &b, 0).peak, 1));
-	*at(&b, 2, 32) = 70;
-	assert_true(near(result(&b, &b, 0).peak, 70));
+	*value_at(&b, 1, 17) = 100; /* of 600 values, rank 597 leaves three out */
+	*value_at(&b, 0, 30) = 90;
+	*value_at(&b, 2, 31) = 80;
+	assert_true(near(compare_pictures(&b, &b, 0).peak, 1));
+	*value_at(&b, 2, 32) = 70;
+	assert_true(near(compare_pictures(&b, &b, 0).peak, 70));
 	picture_fini(&b);
 }
 
@@ -100,10 +100,10 @@ static void equal_pictures_are_infinitely_good(void **unused)
 {
 	(void)unused;
 	struct picture a = make_picture(3, 1, 0), b = make_picture(3, 1, 0);
-	struct compare_result r = result(&a, &b, 0);
+	struct compare_result r = compare_pictures(&a, &b, 0);
 	assert_true(r.rel_mse == 0 && r.rmse == 0 && isinf(r.psnr) && r.psnr > 0);
-	*at(&a, 0, 0) = 1; /* anything is infinitely far from black nothing */
-	assert_true(isinf(result(&a, &b, 0).rel_mse));
+	*value_at(&a, 0, 0) = 1; /* anything is infinitely far from black nothing */
+	assert_true(isinf(compare_pictures(&a, &b, 0).rel_mse));
 	picture_fini(&a);
 	picture_fini(&b);
 }
@@ -112,23 +112,23 @@ static void trimming_leaves_out_the_worst_pixels(void **unused)
 {
 	(void)unused;
 	struct picture a = make_picture(100, 10, 2), b = make_picture(100, 10, 2);
-	*at(&a, 0, 500) = 1e6f;
-	*at(&a, 2, 7) = 2.5f;
-	*at(&a, 1, 8) = 2.25f;
-	assert_true(result(&a, &b, 0).rmse > 1e4);
-	struct compare_result r = result(&a, &b, 0.001);
+	*value_at(&a, 0, 500) = 1e6f;
+	*value_at(&a, 2, 7) = 2.5f;
+	*value_at(&a, 1, 8) = 2.25f;
+	assert_true(compare_pictures(&a, &b, 0).rmse > 1e4);
+	struct compare_result r = compare_pictures(&a, &b, 0.001);
 	assert_int_equal(r.left_out, 1);
 	assert_true(near(r.rmse, sqrt((0.25 + 0.0625) / (999 * 3))));
 	assert_true(near(r.rel_mse, (0.25 + 0.0625) / (4 + 0.0004) / (999 * 3)));
 	assert_true(r.ratio[0] > 100); /* means are of all pixels */
-	r = result(&a, &b, 0.002);
+	r = compare_pictures(&a, &b, 0.002);
 	assert_true(r.left_out == 2 && near(r.rmse, sqrt(0.0625 / (998 * 3))));
-	assert_true(result(&a, &b, 0.003).rmse == 0);
-	*at(&a, 0, 500) = NAN;
-	*at(&a, 0, 501) = INFINITY;
-	r = result(&a, &b, 0.002);
+	assert_true(compare_pictures(&a, &b, 0.003).rmse == 0);
+	*value_at(&a, 0, 500) = NAN;
+	*value_at(&a, 0, 501) = INFINITY;
+	r = compare_pictures(&a, &b, 0.002);
 	assert_true(r.not_finite == 2 && near(r.rmse, sqrt((0.25 + 0.0625) / (998 * 3))));
-	assert_true(isinf(result(&a, &b, 0.001).rel_mse));
+	assert_true(isinf(compare_pictures(&a, &b, 0.001).rel_mse));
 	picture_fini(&a);
 	picture_fini(&b);
 }
@@ -143,7 +143,7 @@ static void what_cannot_be_compared_is_said(void **unused)
 	assert_non_null(strstr(e.text, "4x2"));
 	picture_fini(&b);
 	b = make_picture(4, 2, 1);
-	*at(&b, 1, 6) = NAN;
+	*value_at(&b, 1, 6) = NAN;
 	assert_int_equal(compare(&a, &b, 0, &r, &e), -EINVAL);
 	assert_non_null(strstr(e.text, "2,1"));
 	picture_fini(&a);
@@ -156,7 +156,7 @@ static void shrinking_takes_means_of_boxes(void **unused)
 	struct picture p = make_picture(4, 6, 0);
 	struct error e;
 	for (size_t i = 0; i < 24; i++)
-		*at(&p, 1, i) = (float)i;
+		*value_at(&p, 1, i) = (float)i;
 	assert_int_equal(picture_shrink(&p, 3, 2, &e), -EINVAL);
 	assert_int_equal(picture_shrink(&p, 0, 2, &e), -EINVAL);
 	assert_int_equal(picture_shrink(&p, 2, 2, &e), 0);
@@ -246,14 +246,14 @@ static void exact_sees_one_bit(void **unused)
 	char why[256];
 	struct picture a = make_picture(5, 3, 1), b = make_picture(5, 3, 1);
 	assert_true(compare_exact(&a.image, &b.image, why, sizeof why));
-	*at(&b, 2, 8) = nextafterf(1, 2);
+	*value_at(&b, 2, 8) = nextafterf(1, 2);
 	assert_false(compare_exact(&a.image, &b.image, why, sizeof why));
 	assert_non_null(strstr(why, "channel B at pixel 3,1"));
-	*at(&b, 2, 8) = 1;
-	*at(&a, 0, 14) = -0.0f;
-	*at(&b, 0, 14) = 0;
+	*value_at(&b, 2, 8) = 1;
+	*value_at(&a, 0, 14) = -0.0f;
+	*value_at(&b, 0, 14) = 0;
 	assert_false(compare_exact(&a.image, &b.image, why, sizeof why)); /* equal as numbers */
-	*at(&a, 0, 14) = *at(&b, 0, 14) = NAN;
+	*value_at(&a, 0, 14) = *value_at(&b, 0, 14) = NAN;
 	assert_true(compare_exact(&a.image, &b.image, why, sizeof why)); /* not as numbers */
 	b.image.x = 1;
 	assert_false(compare_exact(&a.image, &b.image, why, sizeof why));
@@ -298,10 +298,10 @@ static void a_heatmap_is_a_png(void **unused)
 	unsigned char rgb[12], back[12];
 	struct error e;
 	for (int k = 0; k < 3; k++) {
-		*at(&a, k, 1) = 3;
-		*at(&a, k, 2) = 1.03162f; /* half way from 0.1 % to 100 % on a logarithmic scale */
+		*value_at(&a, k, 1) = 3;
+		*value_at(&a, k, 2) = 1.03162f; /* half way from 0.1 % to 100 % on a logarithmic scale */
 	}
-	*at(&a, 1, 3) = NAN;
+	*value_at(&a, 1, 3) = NAN;
 	assert_int_equal(compare_heatmap(&a, &b, rgb, &e), 0);
 	assert_true(rgb[0] == 0 && rgb[1] == 0 && rgb[2] == 0);
 	assert_true(rgb[3] == 255 && rgb[4] == 255 && rgb[5] == 255);

@@ -51,7 +51,7 @@ static int resume(void *user, struct bootstrap *b, struct error *e)
 	return 0;
 }
 
-static void keep(void *user, const struct bootstrap *b)
+static void keep_result(void *user, const struct bootstrap *b)
 {
 	struct trial *t = user;
 	kept_bootstrap_write(&t->kept, b);
@@ -106,7 +106,7 @@ static float *render(const struct world *w, struct trial *t)
 			      .stop = &t->stop,
 			      .progress = count,
 			      .resume = resume,
-			      .keep = keep,
+			      .keep = keep_result,
 			      .user = t};
 	struct error e;
 	struct canvas_image i;

@@ -85,7 +85,7 @@ static int tear_down(void **state)
 	return stop() | folder_tear_down(state);
 }
 
-static struct client *call(void)
+static struct client *connect_client(void)
 {
 	struct client *cl;
 	struct error e;
@@ -103,11 +103,11 @@ static int send_to(struct client *cl, const struct scene_bundle *b, struct submi
 }
 
 /* The error, "" when it was taken. */
-static const char *sent(const struct scene_bundle *b)
+static const char *submit_error(const struct scene_bundle *b)
 {
 	static struct error e;
 	struct submitted job = {0};
-	struct client *cl = call();
+	struct client *cl = connect_client();
 	int rc = send_to(cl, b, &job, &e);
 	client_close(cl);
 	if (!rc)
@@ -116,9 +116,9 @@ static const char *sent(const struct scene_bundle *b)
 	return e.text;
 }
 
-static void says(const struct scene_bundle *b, const char *text)
+static void expect_error(const struct scene_bundle *b, const char *text)
 {
-	const char *said = sent(b);
+	const char *said = submit_error(b);
 	if (!strstr(said, text))
 		fail_msg("'%s' is not in '%s'", text, said);
 }
@@ -136,12 +136,12 @@ static void what_was_checked_is_sent(void **state)
 	assert_string_equal(b.files[1].name, "meshes/wedge.obj");
 	assert_int_equal(rename(mesh, kept), 0);
 	assert_int_equal(symlink(secret, mesh), 0);
-	says(&b, "meshes/wedge.obj: leads out of the scene's folder");
+	expect_error(&b, "meshes/wedge.obj: leads out of the scene's folder");
 	assert_int_equal(unlink(mesh), 0);
 	assert_int_equal(rename(secret, mesh), 0);
-	says(&b, "meshes/wedge.obj has changed meanwhile");
+	expect_error(&b, "meshes/wedge.obj has changed meanwhile");
 	assert_int_equal(rename(kept, mesh), 0);
-	assert_string_equal(sent(&b), "");
+	assert_string_equal(submit_error(&b), "");
 	scene_bundle_fini(&b);
 }
 
@@ -165,7 +165,7 @@ static void what_is_elsewhere_is_sent_too(void **state)
 	assert_int_equal(scene_bundle_read(&b, scene, &o, &none, &e), 0);
 	assert_int_equal(b.count, 2);
 	assert_string_equal(b.files[1].name, "meshes/wedge.obj");
-	assert_string_equal(sent(&b), "");
+	assert_string_equal(submit_error(&b), "");
 	scene_bundle_fini(&b);
 	assert_int_equal(rename(moved, mesh), 0);
 }
@@ -267,7 +267,7 @@ static void cancel(uint64_t job)
 	Farm__Cancel question;
 	Farm__Envelope m;
 	struct client_message answer;
-	struct client *cl = call();
+	struct client *cl = connect_client();
 	struct error e;
 	farm__cancel__init(&question);
 	farm__envelope__init(&m);
@@ -299,7 +299,7 @@ static void one_job_is_waited_for(void **state)
 	struct error e;
 	char same[32];
 	assert_int_equal(scene_bundle_read(&b, scene, &o, &none, &e), 0);
-	struct client *cl = call(), *later = call();
+	struct client *cl = connect_client(), *later = connect_client();
 	assert_int_equal(send_to(cl, &b, &job, &e), 0);
 	snprintf(same, sizeof same, "%s", address);
 	assert_int_equal(stop(), 0);
@@ -311,7 +311,7 @@ static void one_job_is_waited_for(void **state)
 	assert_int_equal(stop(), 0);
 	assert_int_equal(start(same, "other"), 0);
 	do {
-		struct client *guest = call();
+		struct client *guest = connect_client();
 		assert_int_equal(send_to(guest, &b, &other, &e), 0);
 		client_close(guest);
 		cancel(other.job);

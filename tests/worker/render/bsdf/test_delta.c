@@ -46,7 +46,7 @@ static void check_lobe(const char *text, const struct bsdf *b, const struct bsdf
 }
 
 /* The probabilities of the specular lobes that there are. */
-static double chances(const struct bsdf *b, const struct bsdf_point *p, vec3 wo)
+static double sum_of_probabilities(const struct bsdf *b, const struct bsdf_point *p, vec3 wo)
 {
 	double sum = 0;
 	static const unsigned modes[] = {BSDF_REFLECT, BSDF_TRANSMIT, BSDF_TRANSMIT | BSDF_STRAIGHT};
@@ -93,7 +93,7 @@ static void test_specular_lobes_are_those_of_sample(void **state)
 				mirrored += wo.z < 0 && b.ops->decl.type[0] == 't';
 			}
 			/* Where specular and other lobes lie on one side, only frequencies can be compared. */
-			double chance = chances(&b, &p, wo);
+			double chance = sum_of_probabilities(&b, &p, wo);
 			bool mixed = b.has_smooth && chance > 0 && chance < 1;
 			if (!mixed && !(fabs(chance - specular) < 1e-12))
 				fail_msg("%s: from z = %g specular chances add up to %g", case_text(k), wo.z, chance);

@@ -10,7 +10,7 @@
 
 static const double line_f = 486.1327, line_d = 587.5618, line_c = 656.2725;
 
-static struct wavelengths at(double nm)
+static struct wavelengths wavelength_of(double nm)
 {
 	/* The others are not to be looked at. */
 	return (struct wavelengths){.nm = {nm, NAN, NAN, NAN}};
@@ -20,7 +20,7 @@ static double index_of(const char *text, double nm)
 {
 	struct arena a = {0};
 	struct bsdf b;
-	struct wavelengths w = at(nm);
+	struct wavelengths w = wavelength_of(nm);
 	bsdf_make(&a, text, &b);
 	double eta = bsdf_eta(&b, &w);
 	arena_fini(&a);
@@ -128,7 +128,7 @@ static void test_cauchy(void **state)
 }
 
 /* v in the frame whose z is at `angle` from the world's z, in the plane y = 0; and back with -angle. */
-static vec3 turned(vec3 v, double angle)
+static vec3 turned_by(vec3 v, double angle)
 {
 	return (vec3){cos(angle) * v.x - sin(angle) * v.z, v.y, sin(angle) * v.x + cos(angle) * v.z};
 }
@@ -144,15 +144,15 @@ static void test_a_prism_spreads_light(void **state)
 	bsdf_make(&a, "dielectric int_ior=sf11 ext_ior=1 dispersion=true specular_transmittance=0.5", &b);
 	double before = INFINITY, spread = 0;
 	for (double nm = 365; nm < 830; nm += 25) {
-		struct wavelengths w = at(nm);
+		struct wavelengths w = wavelength_of(nm);
 		struct bsdf_point p = {.w = &w};
 		vec3 in = {-sin(incidence), 0, cos(incidence)}, inside, out;
 		double chance, n = 0, l2 = nm * nm * 1e-6;
 		spectrum first = bsdf_eval_delta(&b, &p, in, BSDF_TRANSMIT, &inside, &chance);
 		/* The second face's outward normal is turned by pi - apex; light comes to it from inside. */
-		vec3 from = turned(vec3_neg(inside), PI - apex);
+		vec3 from = turned_by(vec3_neg(inside), PI - apex);
 		if (from.z > 0)
-			from = turned(vec3_neg(inside), -(PI - apex));
+			from = turned_by(vec3_neg(inside), -(PI - apex));
 		spectrum second = bsdf_eval_delta(&b, &p, from, BSDF_TRANSMIT, &out, &chance);
 		assert_true(first.v[0] > 0 && first.v[0] < 0.5 && second.v[0] > 0 && out.z > 0);
 		n = sqrt(1 + 1.73759695 * l2 / (l2 - 0.013188707) + 0.313747346 * l2 / (l2 - 0.0623068142) +

@@ -200,7 +200,7 @@ static void test_ideal_rays(void **state)
 }
 
 /* How often a photon crosses the fibre before it gets out, at most HAIR_LOBES - 1; HAIR_LOBES: it is absorbed. */
-static int passages(vec3 camera, double eta, double sigma, struct dice *d)
+static int count_passages(vec3 camera, double eta, double sigma, struct dice *d)
 {
 	struct ray r = {{0, 0, 1}, vec3_neg(camera)};
 	if (dice_throw(d) < fresnel_dielectric(camera.z, eta).reflected)
@@ -230,7 +230,7 @@ static void test_shares(void **state)
 		hair_shares(&e, t, share);
 		uint64_t n = dice_count(40000), seen[HAIR_LOBES + 1] = {0};
 		for (uint64_t k = 0; k < n; k++) {
-			seen[passages(camera, eta, sigma, &d)]++;
+			seen[count_passages(camera, eta, sigma, &d)]++;
 		}
 		double expected[HAIR_LOBES + 1];
 		for (int p = 0; p < HAIR_LOBES; p++) {

@@ -49,7 +49,7 @@ static wide slope_normal(long double x, long double y)
 }
 
 /* wi for half vector h with wo held; eta: index beyond over index on wo's side. false: there is none. */
-static bool follow(wide wo, wide h, bool reflect, long double eta, wide *wi)
+static bool direction_of_halfvec(wide wo, wide h, bool reflect, long double eta, wide *wi)
 {
 	long double c = dot(wo, h);
 	if (c < 0) {
@@ -93,13 +93,13 @@ static void test_the_jacobian_is_the_derivative(void **state)
 		long double x = wideness * dice_between(&d, -1, 1), y = wideness * dice_between(&d, -1, 1),
 			    step = 1e-6L;
 		wide h = slope_normal(x, y);
-		if (!follow(wo, h, reflect, eta, &wi) || fabsl(dot(wi, h)) < 0.05L || fabsl(dot(wo, h)) < 0.05L ||
-		    fabsl(wi.z) < 1e-2L)
+		if (!direction_of_halfvec(wo, h, reflect, eta, &wi) || fabsl(dot(wi, h)) < 0.05L ||
+		    fabsl(dot(wo, h)) < 0.05L || fabsl(wi.z) < 1e-2L)
 			continue;
-		bool ok = follow(wo, slope_normal(x + step, y), reflect, eta, &side[0]) &&
-			  follow(wo, slope_normal(x - step, y), reflect, eta, &side[1]) &&
-			  follow(wo, slope_normal(x, y + step), reflect, eta, &side[2]) &&
-			  follow(wo, slope_normal(x, y - step), reflect, eta, &side[3]);
+		bool ok = direction_of_halfvec(wo, slope_normal(x + step, y), reflect, eta, &side[0]) &&
+			  direction_of_halfvec(wo, slope_normal(x - step, y), reflect, eta, &side[1]) &&
+			  direction_of_halfvec(wo, slope_normal(x, y + step), reflect, eta, &side[2]) &&
+			  direction_of_halfvec(wo, slope_normal(x, y - step), reflect, eta, &side[3]);
 		if (!ok)
 			continue;
 		wide dx = {side[0].x - side[1].x, side[0].y - side[1].y, side[0].z - side[1].z};
@@ -213,7 +213,7 @@ static long double distribution(const struct setting *s, wide h)
 }
 
 /* Walter's f times cosine times the Jacobian, term by term. 0: no facet. */
-static long double textbook(const struct setting *s, wide wo, wide wi)
+static long double textbook_value(const struct setting *s, wide wo, wide wi)
 {
 	bool reflect = wo.z * wi.z > 0;
 	long double eta = wo.z > 0 ? (long double)s->eta : 1 / (long double)s->eta, eta_h = reflect ? 1 : eta;
@@ -241,19 +241,19 @@ static long double textbook(const struct setting *s, wide wo, wide wi)
 
 /* How much the value moves when each coordinate does by half a unit in its last place, both lengths with them, and the
  * index: the inverse of one that is next to 1 is not the one that was meant. */
-static long double unrest(const struct setting *s, wide wo, wide wi)
+static long double rounding_error(const struct setting *s, wide wo, wide wi)
 {
-	long double here = textbook(s, wo, wi), sum = 0;
+	long double here = textbook_value(s, wo, wi), sum = 0;
 	for (int i = 0; i < 12; i++) {
 		wide o = wo, in = wi;
 		long double *coordinate[6] = {&o.x, &o.y, &o.z, &in.x, &in.y, &in.z}, *x = coordinate[i / 2];
 		*x *= i % 2 ? 1 + 0x1p-53L : 1 - 0x1p-53L;
-		sum += fabsl(textbook(s, o, in) - here);
+		sum += fabsl(textbook_value(s, o, in) - here);
 	}
 	struct setting up = *s, down = *s;
 	up.eta *= 1 + 0x1p-52;
 	down.eta *= 1 - 0x1p-53;
-	return sum + fabsl(textbook(&up, wo, wi) - here) + fabsl(textbook(&down, wo, wi) - here);
+	return sum + fabsl(textbook_value(&up, wo, wi) - here) + fabsl(textbook_value(&down, wo, wi) - here);
 }
 
 /* A pair around corners: grazing wo, steep half vectors, next to total reflection. */
@@ -283,7 +283,7 @@ static bool corner(struct dice *d, const struct setting *s, vec3 *from, vec3 *to
 	}
 	*from = narrow(wo);
 	wo = widen(*from);
-	if (!follow(wo, h, reflect, eta, &wi))
+	if (!direction_of_halfvec(wo, h, reflect, eta, &wi))
 		return false;
 	*to = narrow(wi);
 	return true;
@@ -312,12 +312,12 @@ static void try_setting(const struct setting *s, struct dice *d, struct extreme 
 		vec3 wo, wi;
 		if (!corner(d, s, &wo, &wi))
 			continue;
-		long double expected = textbook(s, widen(wo), widen(wi));
+		long double expected = textbook_value(s, widen(wo), widen(wi));
 		double told = bsdf_eval_halfvec(&b, &point, wo, wi).v[3];
 		assert_true(isfinite(told) && told >= 0);
 		if (expected < 1e-280L)
 			continue;
-		long double noise = unrest(s, widen(wo), widen(wi)), off = fabsl(told - expected);
+		long double noise = rounding_error(s, widen(wo), widen(wi)), off = fabsl(told - expected);
 		out->unrest = fmax(out->unrest, (double)(off / (noise + 0x1p-49L * expected)));
 		out->count++;
 		if (noise < 1e-13L * expected) {

@@ -42,7 +42,7 @@ static bool pass_on(const struct bsdf *boundary, struct dice *d, vec3 v, vec3 *n
 	return *weight > 0;
 }
 
-static void follow(const struct bsdf *boundary, double base, vec3 wo, struct dice *d, struct bins *b)
+static void trace_photon(const struct bsdf *boundary, double base, vec3 wo, struct dice *d, struct bins *b)
 {
 	double weight = 1;
 	vec3 v = wo;
@@ -59,7 +59,7 @@ static void follow(const struct bsdf *boundary, double base, vec3 wo, struct dic
 }
 
 /* What f sends into a bin of cosines: the midpoint rule. */
-static double told(const struct bsdf *plastic, vec3 wo, int bin)
+static double integral_over_bin(const struct bsdf *plastic, vec3 wo, int bin)
 {
 	enum { POLAR = 300, AZIMUTH = 600 };
 	double sum = 0;
@@ -78,7 +78,7 @@ static double compare(const struct bsdf *plastic, const struct bins *b, vec3 wo,
 	double worst = 0;
 	for (int i = 1; i < BINS; i++) {
 		double mean = b->sum[i] / PATHS, error = sqrt((b->square[i] / PATHS - mean * mean) / PATHS);
-		double model = told(plastic, wo, i), beyond = fabs(model - mean) - HIDDEN * model;
+		double model = integral_over_bin(plastic, wo, i), beyond = fabs(model - mean) - HIDDEN * model;
 		*off = fmax(*off, fabs(model / mean - 1));
 		worst = fmax(worst, beyond / error);
 	}
@@ -101,7 +101,7 @@ static void test_roughplastic_is_its_layers(void **state)
 		vec3 wo = {sqrt(1 - z * z), 0, z};
 		struct bins b = {{0}, {0}};
 		for (int i = 0; i < PATHS; i++)
-			follow(&boundary, 0.7, wo, &d, &b);
+			trace_photon(&boundary, 0.7, wo, &d, &b);
 		double worst = compare(&plastic, &b, wo, &off);
 		print_message("from z = %g: largest difference %.2f %%, %.1f standard errors beyond %g %%\n", z,
 			      100 * off, worst, 100 * HIDDEN);

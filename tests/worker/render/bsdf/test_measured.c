@@ -49,7 +49,7 @@ static int try_bytes(struct made *m, const void *bytes, size_t size)
 	return bsdf_create(&m->b, node_bsdf(&m->arena, "measured filename=m.bsdf"), &build, &m->e);
 }
 
-static void make(struct made *m, const struct measured_kind *k)
+static void make_or_fail(struct made *m, const struct measured_kind *k)
 {
 	size_t size;
 	unsigned char *bytes = measured_file_make(k, &size);
@@ -58,7 +58,7 @@ static void make(struct made *m, const struct measured_kind *k)
 	free(bytes);
 }
 
-static vec3 around(double theta, double phi)
+static vec3 spherical(double theta, double phi)
 {
 	return (vec3){sin(theta) * cos(phi), sin(theta) * sin(phi), cos(theta)};
 }
@@ -74,7 +74,7 @@ static double root_mean_square(const struct made *m, const struct measured_kind 
 		for (uint64_t j = 0; j < 400; j++) {
 			double u[4];
 			struct bsdf_sample s;
-			vec3 wo = around(measured_kind_theta(k, i), phi);
+			vec3 wo = spherical(measured_kind_theta(k, i), phi);
 			rng_uniform4(stats_seed(__func__), RNG_TEST, j, (uint64_t)i, 0, u);
 			if (!m->b.ops->sample(&m->b, &p, wo, u, &s) || !(s.wi.z > least))
 				continue;
@@ -103,7 +103,7 @@ static void test_agrees_with_its_formula(void **state)
 	struct made m;
 	double tint[SPECTRUM_LANES];
 	tints_of(&nm, tint);
-	make(&m, &fine);
+	make_or_fail(&m, &fine);
 	double off = root_mean_square(&m, &fine, 0.7, 0.2, &nm, tint);
 	print_message("isotropic: off by %.4f\n", off);
 	assert_true(off < 0.02);
@@ -129,7 +129,7 @@ static void test_anisotropic_symmetries(void **state)
 		k.elevations = 4;
 		k.fine = 64;
 		k.side = 16;
-		make(&m, &k);
+		make_or_fail(&m, &k);
 		assert_true(m.b.uses_tangents);
 		for (int q = -3; q <= 4; q++) {
 			double off = root_mean_square(&m, &k, q * PI / 4 + 1e-9, 0.3, &nm, tint);
@@ -145,11 +145,11 @@ static void test_isotropic_turns(void **state)
 {
 	(void)state;
 	struct made m;
-	make(&m, &fine);
+	make_or_fail(&m, &fine);
 	const struct bsdf_point p = {.w = &nm, .transport = TRANSPORT_RADIANCE};
-	spectrum a = m.b.ops->eval(&m.b, &p, around(0.8, 0.3), around(0.6, 3));
+	spectrum a = m.b.ops->eval(&m.b, &p, spherical(0.8, 0.3), spherical(0.6, 3));
 	for (int i = 1; i < 12; i++) {
-		spectrum b = m.b.ops->eval(&m.b, &p, around(0.8, 0.3 + i), around(0.6, 3 + i));
+		spectrum b = m.b.ops->eval(&m.b, &p, spherical(0.8, 0.3 + i), spherical(0.6, 3 + i));
 		assert_true(fabs(b.v[0] / a.v[0] - 1) < 1e-9);
 	}
 	assert_false(m.b.uses_tangents);
@@ -165,7 +165,7 @@ static void test_samples_follow_the_facets(void **state)
 	struct made m;
 	k.white = true;
 	k.alpha_u = k.alpha_v = 0.1;
-	make(&m, &k);
+	make_or_fail(&m, &k);
 	const struct bsdf_point p = {.w = &nm, .transport = TRANSPORT_RADIANCE};
 	double mean = 0, square = 0;
 	int count = 0;
@@ -173,7 +173,7 @@ static void test_samples_follow_the_facets(void **state)
 		double u[4];
 		struct bsdf_sample s;
 		rng_uniform4(stats_seed(__func__), RNG_TEST, j, 0, 0, u);
-		if (!m.b.ops->sample(&m.b, &p, around(0.5, 1), u, &s))
+		if (!m.b.ops->sample(&m.b, &p, spherical(0.5, 1), u, &s))
 			continue;
 		double weight = s.f.v[0] * s.wi.z / s.pdf;
 		mean += weight;
@@ -199,15 +199,15 @@ static void test_rgb(void **state)
 	struct measured_kind k = fine;
 	struct made spectral, three;
 	k.elevations = 3;
-	make(&spectral, &k);
+	make_or_fail(&spectral, &k);
 	k.rgb = true;
-	make(&three, &k);
+	make_or_fail(&three, &k);
 	const double tint[SPECTRUM_LANES] = {measured_tint(600), measured_tint(550), measured_tint(450),
 					     measured_tint(550)};
 	assert_true(root_mean_square(&three, &k, 0, 0.2, &rgb, tint) < 0.03);
 	/* Spectra as colours: what color_of_table makes of the formula's values. */
 	const struct bsdf_point p = {.w = &rgb}, q = {.w = &nm};
-	vec3 wo = around(measured_kind_theta(&k, 1), 0), wi = around(0.5, 3);
+	vec3 wo = spherical(measured_kind_theta(&k, 1), 0), wi = spherical(0.5, 3);
 	double at[SAMPLES], value[SAMPLES];
 	for (int i = 0; i < SAMPLES; i++) {
 		at[i] = 340 + 5 * i;
@@ -238,9 +238,9 @@ static void test_white_is_white(void **state)
 	struct made m;
 	k.elevations = 3;
 	k.white = k.absolute = true;
-	make(&m, &k);
+	make_or_fail(&m, &k);
 	const struct bsdf_point p = {.w = &rgb};
-	vec3 wo = around(measured_kind_theta(&k, 1), 0), wi = around(0.5, 3);
+	vec3 wo = spherical(measured_kind_theta(&k, 1), 0), wi = spherical(0.5, 3);
 	spectrum f = m.b.ops->eval(&m.b, &p, wo, wi);
 	double wanted = measured_kind_reflected(&k, 1, wo, wi) / wi.z;
 	for (int l = 0; l < 3; l++)
@@ -254,7 +254,7 @@ static void test_roughness(void **state)
 {
 	(void)state;
 	struct made m;
-	make(&m, &fine);
+	make_or_fail(&m, &fine);
 	assert_true(fabs(m.b.alpha / 0.3 - 1) < 0.02 && m.b.alpha_mean == m.b.alpha);
 	arena_fini(&m.arena);
 }

@@ -13,7 +13,7 @@ static const struct wavelengths wavelengths = {.nm = {400, 500, 600, 700}};
 static const struct bsdf_point point = {
 	.where = {.u = 0.3, .v = 0.7}, .w = &wavelengths, .transport = TRANSPORT_RADIANCE};
 
-static vec3 above(struct dice *d)
+static vec3 direction_above(struct dice *d)
 {
 	vec3 v = dice_direction(d);
 	v.z = fabs(v.z);
@@ -54,7 +54,7 @@ static void test_ward_is_its_formula(void **state)
 			 variants[k]);
 		bsdf_make(&a, text, &b);
 		for (int i = 0; i < 2000; i++) {
-			vec3 wo = above(&d), wi = above(&d);
+			vec3 wo = direction_above(&d), wi = direction_above(&d);
 			double want = 0.3 / PI + 0.4 * ward_formula(variants[k], 0.3, 0.5, wo, wi);
 			if (fabs(value(&b, wo, wi) / want - 1) > 1e-11)
 				fail_msg("%s: %.17g is not %.17g", text, value(&b, wo, wi), want);
@@ -106,7 +106,7 @@ static void test_a_mixture_is_a_sum(void **state)
 		struct dice d = dice_of(cases[k].text);
 		bsdf_make(&a, cases[k].text, &b);
 		for (int i = 0; i < 500; i++) {
-			vec3 wo = above(&d), wi = above(&d);
+			vec3 wo = direction_above(&d), wi = direction_above(&d);
 			double want = 0;
 			for (int j = 0; j < 3; j++)
 				want += cases[k].w[j] * value(&part[j], wo, wi);
@@ -159,7 +159,8 @@ static void test_two_sides_of_two_sides(void **state)
 	assert_int_equal(bsdf_create(&nested, outer, &build, &e), 0);
 	assert_int_equal(bsdf_create(&coat, over, &build, &e), 0);
 	for (int i = 0; i < 500; i++) {
-		vec3 wo = above(&d), wi = above(&d), back_o = {wo.x, wo.y, -wo.z}, back_i = {wi.x, wi.y, -wi.z};
+		vec3 wo = direction_above(&d), wi = direction_above(&d), back_o = {wo.x, wo.y, -wo.z},
+		     back_i = {wi.x, wi.y, -wi.z};
 		double want = value(&front, wo, wi), layered = value(&coated, wo, wi);
 		seen += want > 0.01;
 		assert_true(value(&nested, wo, wi) == want && value(&nested, back_o, back_i) == want);

@@ -41,7 +41,7 @@ static int try_bytes(struct made *m, const void *bytes, size_t size, const char 
 	return bsdf_create(&m->b, node_bsdf(&m->arena, text), &build, &m->e);
 }
 
-static void make(struct made *m, polarized_f *f, int phis, int thetas, const char *more)
+static void make_or_fail(struct made *m, polarized_f *f, int phis, int thetas, const char *more)
 {
 	size_t size;
 	unsigned char *bytes = polarized_file_make(f, phis, thetas, &size);
@@ -56,7 +56,7 @@ static spectrum value_of(const struct made *m, vec3 camera, vec3 light, const st
 	return m->b.ops->eval(&m->b, &p, camera, light);
 }
 
-static vec3 above(struct dice *d)
+static vec3 direction_above(struct dice *d)
 {
 	vec3 w = dice_direction(d);
 	w.z = fabs(w.z);
@@ -65,7 +65,7 @@ static vec3 above(struct dice *d)
 
 /* ---- values ---- */
 
-static double chalk(double phi_d, double theta_d, double theta_h, double at)
+static double chalk_value(double phi_d, double theta_d, double theta_h, double at)
 {
 	(void)phi_d, (void)theta_d, (void)theta_h, (void)at;
 	return 0.5 / M_PI;
@@ -79,9 +79,9 @@ static void test_lambert(void **state)
 	const struct bsdf_point p = {.w = &nm, .transport = TRANSPORT_RADIANCE};
 	size_t samples = dice_count(40000);
 	double sum = 0, square = 0;
-	make(&m, chalk, 3, 3, " alpha_sample=0.3");
+	make_or_fail(&m, chalk_value, 3, 3, " alpha_sample=0.3");
 	for (int i = 0; i < 1000; i++) {
-		vec3 a = above(&d), b = above(&d);
+		vec3 a = direction_above(&d), b = direction_above(&d);
 		spectrum f = value_of(&m, a, b, &nm), g = value_of(&m, a, b, &rgb);
 		for (int l = 0; l < SPECTRUM_LANES; l++)
 			assert_true(fabs(f.v[l] / (0.5 / M_PI) - 1) < 1e-6 && fabs(g.v[l] / (0.5 / M_PI) - 1) < 1e-6);
@@ -148,9 +148,9 @@ static void test_angles(void **state)
 	for (int k = 0; k < 3; k++) {
 		struct made m;
 		struct dice d = dice_of("angles of a table");
-		make(&m, tables[k], 13, 7, "");
+		make_or_fail(&m, tables[k], 13, 7, "");
 		for (int i = 0; i < 1000; i++) {
-			vec3 light = above(&d), camera = above(&d);
+			vec3 light = direction_above(&d), camera = direction_above(&d);
 			double angle[3];
 			rusinkiewicz(light, camera, angle);
 			double wanted = tables[k](angle[0], angle[1], angle[2], 0);
@@ -175,7 +175,7 @@ static void test_wavelengths(void **state)
 	struct made m;
 	vec3 a = {0.6, 0, 0.8}, b = {0, 0.28, 0.96};
 	const double wanted[SPECTRUM_LANES] = {450, 510, 575, 650};
-	make(&m, by_wavelength, 3, 3, "");
+	make_or_fail(&m, by_wavelength, 3, 3, "");
 	spectrum f = value_of(&m, a, b, &nm), colour = value_of(&m, a, b, &rgb);
 	for (int l = 0; l < SPECTRUM_LANES; l++)
 		assert_true(fabs(f.v[l] / wanted[l] - 1) < 1e-6);
@@ -187,7 +187,7 @@ static void test_wavelengths(void **state)
 		double value;
 	} single[] = {{" wavelength=520", 520}, {" wavelength=100", 450}, {" wavelength=5000", 650}};
 	for (size_t i = 0; i < sizeof single / sizeof *single; i++) {
-		make(&m, by_wavelength, 3, 3, single[i].more);
+		make_or_fail(&m, by_wavelength, 3, 3, single[i].more);
 		f = value_of(&m, a, b, &nm);
 		colour = value_of(&m, a, b, &rgb);
 		for (int l = 0; l < SPECTRUM_LANES; l++)
@@ -204,7 +204,7 @@ static double with_holes(double phi_d, double theta_d, double theta_h, double at
 	return theta_h > 1 ? NAN : at > 600 ? -1 : at > 550 ? 1 : 2;
 }
 
-static double green(double phi_d, double theta_d, double theta_h, double at)
+static double green_value(double phi_d, double theta_d, double theta_h, double at)
 {
 	(void)phi_d, (void)theta_d, (void)theta_h;
 	return at < 480 || at > 620 ? NAN : 1;
@@ -216,7 +216,7 @@ static void test_holes(void **state)
 	struct made m;
 	const struct wavelengths w = {.nm = {500, 600, 620, 640}};
 	vec3 up = {0, 0, 1}, low = {1, 0, 1e-3};
-	make(&m, with_holes, 3, 9, "");
+	make_or_fail(&m, with_holes, 3, 9, "");
 	spectrum f = value_of(&m, up, up, &w);
 	assert_true(fabs(f.v[0] - 2) < 1e-6 && fabs(f.v[1] - 1) < 1e-6 && fabs(f.v[2] - 0.2) < 1e-6 && f.v[3] == 0);
 	low = vec3_normalize(low);
@@ -224,7 +224,7 @@ static void test_holes(void **state)
 	/* Between a number and none. */
 	assert_true(spectrum_is_zero(value_of(&m, (vec3){sin(1), 0, cos(1)}, (vec3){sin(1), 0, cos(1)}, &w)));
 	arena_fini(&m.arena);
-	make(&m, green, 3, 3, "");
+	make_or_fail(&m, green_value, 3, 3, "");
 	f = value_of(&m, up, up, &(struct wavelengths){.nm = {480, 510, 590, 610}});
 	assert_true(f.v[0] == 0 && f.v[1] == 1 && f.v[2] == 1 && f.v[3] == 0);
 	arena_fini(&m.arena);
@@ -236,7 +236,7 @@ static void test_truncated_and_mangled(void **state)
 {
 	(void)state;
 	size_t size;
-	unsigned char *bytes = polarized_file_make(chalk, 3, 2, &size), *copy = malloc(size);
+	unsigned char *bytes = polarized_file_make(chalk_value, 3, 2, &size), *copy = malloc(size);
 	for (size_t end = 0; end < size; end += end < 400 ? 1 : 37) {
 		struct made m;
 		unsigned char *part = malloc(end ? end : 1); /* so that a sanitizer sees its end */
@@ -280,7 +280,7 @@ static void test_sizes(void **state)
 		{"theta_d", 11, 0, "theta_d has a side of 0"},
 	};
 	size_t size;
-	unsigned char *bytes = polarized_file_make(chalk, 3, 2, &size), *copy = malloc(size);
+	unsigned char *bytes = polarized_file_make(chalk_value, 3, 2, &size), *copy = malloc(size);
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		struct made m;
 		memcpy(copy, bytes, size);

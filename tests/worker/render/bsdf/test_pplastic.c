@@ -14,7 +14,7 @@ static vec3 direction(double z, double phi)
 	return (vec3){s * cos(phi), s * sin(phi), z};
 }
 
-static void same(const char *a, const char *b, double factor)
+static void expect_equal(const char *a, const char *b, double factor)
 {
 	struct arena arena = {0};
 	struct bsdf x, y;
@@ -37,8 +37,8 @@ static void same(const char *a, const char *b, double factor)
 static void test_facets(void **state)
 {
 	(void)state;
-	same("pplastic alpha=0.3 int_ior=1.7 diffuse_reflectance=0 specular_reflectance=0.8",
-	     "roughplastic alpha=0.3 int_ior=1.7 diffuse_reflectance=0 specular_reflectance=0.8", 1);
+	expect_equal("pplastic alpha=0.3 int_ior=1.7 diffuse_reflectance=0 specular_reflectance=0.8",
+		     "roughplastic alpha=0.3 int_ior=1.7 diffuse_reflectance=0 specular_reflectance=0.8", 1);
 }
 
 /* Of a dark base, `plastic` has the light that meets it once: of that eta^2 less, for it knows what total reflection
@@ -46,11 +46,11 @@ static void test_facets(void **state)
 static void test_base(void **state)
 {
 	(void)state;
-	same("pplastic int_ior=1.6 ext_ior=1 diffuse_reflectance=1e-12 specular_reflectance=0",
-	     "plastic int_ior=1.6 ext_ior=1 diffuse_reflectance=1e-12 specular_reflectance=0 nonlinear=true",
-	     1.6 * 1.6);
-	same("pplastic diffuse_reflectance=0.6 specular_reflectance=0",
-	     "pplastic diffuse_reflectance=0.3 specular_reflectance=0", 2);
+	expect_equal("pplastic int_ior=1.6 ext_ior=1 diffuse_reflectance=1e-12 specular_reflectance=0",
+		     "plastic int_ior=1.6 ext_ior=1 diffuse_reflectance=1e-12 specular_reflectance=0 nonlinear=true",
+		     1.6 * 1.6);
+	expect_equal("pplastic diffuse_reflectance=0.6 specular_reflectance=0",
+		     "pplastic diffuse_reflectance=0.3 specular_reflectance=0", 2);
 }
 
 int main(void)

@@ -17,7 +17,7 @@ static vec3 direction(double z, double phi)
 	return (vec3){s * cos(phi), s * sin(phi), z};
 }
 
-static void same(const char *a, const char *b, double below, double factor)
+static void expect_equal(const char *a, const char *b, double below, double factor)
 {
 	struct arena arena = {0};
 	struct bsdf x, y;
@@ -45,8 +45,8 @@ static void same(const char *a, const char *b, double below, double factor)
 static void test_glass_is_roughdielectric(void **state)
 {
 	(void)state;
-	same("principled base_color=1 roughness=0.5 spec_trans=1 eta=1.6",
-	     "roughdielectric alpha=0.25 distribution=ggx int_ior=1.6 ext_ior=1", 1, 1);
+	expect_equal("principled base_color=1 roughness=0.5 spec_trans=1 eta=1.6",
+		     "roughdielectric alpha=0.25 distribution=ggx int_ior=1.6 ext_ior=1", 1, 1);
 }
 
 /* With index 1 the boundary is gone but for the least that there is; a black metal has only Schlick's rim left. */
@@ -93,7 +93,7 @@ static void check_diffuse(const char *parameters, double (*expected)(vec3 wo, ve
 }
 
 /* At roughness r = 0.7, F_D90 = 0.5 + 2 r cos^2. */
-static double burleys(vec3 wo, vec3 wi)
+static double burley_factor(vec3 wo, vec3 wi)
 {
 	double cos2 = (1 + vec3_dot(wo, wi)) / 2, f90 = 0.5 + 2 * 0.7 * cos2;
 	return (1 + (f90 - 1) * pow(1 - wo.z, 5)) * (1 + (f90 - 1) * pow(1 - wi.z, 5));
@@ -101,7 +101,7 @@ static double burleys(vec3 wo, vec3 wi)
 
 /* As glTF says it (B.3.5): what is not reflected at the half vector is scattered evenly. Fresnel's formulas, eta 1.5.
  */
-static double lamberts(vec3 wo, vec3 wi)
+static double lambert_factor(vec3 wo, vec3 wi)
 {
 	double c = sqrt((1 + vec3_dot(wo, wi)) / 2), t = sqrt(1 - (1 - c * c) / (1.5 * 1.5));
 	double s = (c - 1.5 * t) / (c + 1.5 * t), p = (t - 1.5 * c) / (t + 1.5 * c);
@@ -118,8 +118,8 @@ static double lamberts_below_colour(vec3 wo, vec3 wi)
 static void test_diffuse(void **state)
 {
 	(void)state;
-	check_diffuse("roughness=0.7", burleys);
-	check_diffuse("roughness=0.7 eta=1.5 lambertian=true", lamberts);
+	check_diffuse("roughness=0.7", burley_factor);
+	check_diffuse("roughness=0.7 eta=1.5 lambertian=true", lambert_factor);
 	check_diffuse("roughness=0.7 eta=3 lambertian=true specular_color=0.5", lamberts_below_colour);
 }
 
@@ -204,29 +204,30 @@ static void test_specular_is_an_index(void **state)
 {
 	(void)state;
 	/* 0.08 x 0.5 at normal incidence is an index of 1.5. */
-	same("principled base_color=0 specular=0.5", "principled base_color=0 eta=1.5", 0, 1);
+	expect_equal("principled base_color=0 specular=0.5", "principled base_color=0 eta=1.5", 0, 1);
 	/* Exporters write a little more than 1, and Mitsuba takes any. */
-	same("principled base_color=0 specular=2", "principled base_color=0 eta=2.3333333333333335", 0, 1);
+	expect_equal("principled base_color=0 specular=2", "principled base_color=0 eta=2.3333333333333335", 0, 1);
 }
 
 /* A colour of the reflection scales Schlick's factor at normal incidence, as that of a metal. */
 static void test_specular_color(void **state)
 {
 	(void)state;
-	same("principled base_color=0 roughness=0.4 eta=1.5 specular_color=0.5",
-	     "principled base_color=0.02 roughness=0.4 metallic=1", 0, 1);
-	same("principled base_color=0.7 roughness=0.4 spec_tint=1 sheen=0.4 sheen_tint=0.5",
-	     "principled base_color=0.7 roughness=0.4 specular_color=1 sheen=0.4 sheen_tint=0.5", 0, 1);
-	same("principled base_color=0.7 roughness=0.4 | @specular_color checkerboard color0=0.3 color1=0.3",
-	     "principled base_color=0.7 roughness=0.4 specular_color=0.3", 0, 1);
+	expect_equal("principled base_color=0 roughness=0.4 eta=1.5 specular_color=0.5",
+		     "principled base_color=0.02 roughness=0.4 metallic=1", 0, 1);
+	expect_equal("principled base_color=0.7 roughness=0.4 spec_tint=1 sheen=0.4 sheen_tint=0.5",
+		     "principled base_color=0.7 roughness=0.4 specular_color=1 sheen=0.4 sheen_tint=0.5", 0, 1);
+	expect_equal("principled base_color=0.7 roughness=0.4 | @specular_color checkerboard color0=0.3 color1=0.3",
+		     "principled base_color=0.7 roughness=0.4 specular_color=0.3", 0, 1);
 }
 
 /* A texture that has one value is the number, and one that varies is it at each point. */
 static void test_metallic_texture(void **state)
 {
 	(void)state;
-	same("principled base_color=rgb(0.8,0.3,0.1) roughness=0.4 | @metallic checkerboard color0=0.7 color1=0.7",
-	     "principled base_color=rgb(0.8,0.3,0.1) roughness=0.4 metallic=0.7", 0, 1);
+	expect_equal(
+		"principled base_color=rgb(0.8,0.3,0.1) roughness=0.4 | @metallic checkerboard color0=0.7 color1=0.7",
+		"principled base_color=rgb(0.8,0.3,0.1) roughness=0.4 metallic=0.7", 0, 1);
 	/* each of the shares, and the roughness of facets that goes with them */
 	static const char *const shares[] = {"spec_trans", "spec_tint",	    "sheen",	       "sheen_tint",
 					     "flatness",   "clearcoat",	    "clearcoat_gloss", "anisotropic",
@@ -241,12 +242,13 @@ static void test_metallic_texture(void **state)
 		snprintf(map, sizeof map, "principled %s %s | @%s checkerboard color0=0.25 color1=1", base, with,
 			 shares[i]);
 		snprintf(number, sizeof number, "principled %s %s %s=0.25", base, with, shares[i]);
-		same(map, number, i == 0, 1);
+		expect_equal(map, number, i == 0, 1);
 	}
-	same("principled spec_trans=0.5 specular=0", "principled spec_trans=0.5 specular=0.001", 1, 1);
+	expect_equal("principled spec_trans=0.5 specular=0", "principled spec_trans=0.5 specular=0.001", 1, 1);
 	/* (0.3, 0.7) lies on a square of color0 where the colours are numbers */
-	same("principled base_color=rgb(0.8,0.3,0.1) spec_trans=0.5 | @metallic checkerboard color0=0.25 color1=1",
-	     "principled base_color=rgb(0.8,0.3,0.1) spec_trans=0.5 metallic=0.25", 1, 1);
+	expect_equal(
+		"principled base_color=rgb(0.8,0.3,0.1) spec_trans=0.5 | @metallic checkerboard color0=0.25 color1=1",
+		"principled base_color=rgb(0.8,0.3,0.1) spec_trans=0.5 metallic=0.25", 1, 1);
 }
 
 static double value(const char *text, vec3 wo, vec3 wi)
@@ -292,12 +294,13 @@ static void test_a_thin_sheet(void **state)
 static void test_a_sheet_of_textures(void **state)
 {
 	(void)state;
-	same("principledthin roughness=0.6 base_color=rgb(0.8,0.3,0.1) | @spec_trans checkerboard color0=0.3 color1=0.3 | "
-	     "@diff_trans checkerboard color0=0.9 color1=0.9",
-	     "principledthin roughness=0.6 base_color=rgb(0.8,0.3,0.1) spec_trans=0.3 diff_trans=0.9", 1, 1);
+	expect_equal(
+		"principledthin roughness=0.6 base_color=rgb(0.8,0.3,0.1) | @spec_trans checkerboard color0=0.3 color1=0.3 | "
+		"@diff_trans checkerboard color0=0.9 color1=0.9",
+		"principledthin roughness=0.6 base_color=rgb(0.8,0.3,0.1) spec_trans=0.3 diff_trans=0.9", 1, 1);
 	/* As the number, up to 2. */
-	same("principledthin base_color=rgb(0.8,0.3,0.1) | @diff_trans checkerboard color0=1.7 color1=1.7",
-	     "principledthin base_color=rgb(0.8,0.3,0.1) diff_trans=1.7", 1, 1);
+	expect_equal("principledthin base_color=rgb(0.8,0.3,0.1) | @diff_trans checkerboard color0=1.7 color1=1.7",
+		     "principledthin base_color=rgb(0.8,0.3,0.1) diff_trans=1.7", 1, 1);
 	struct arena a = {0};
 	struct bsdf b;
 	struct error e;
@@ -311,12 +314,12 @@ struct recipe {
 	double eta, metallic, spec_tint, anisotropic, clearcoat, gloss, sheen, spec_trans, flatness, diff_trans;
 };
 
-static double schlicks(double c)
+static double schlick_factor(double c)
 {
 	return pow(fmin(fmax(1 - c, 0), 1), 5);
 }
 
-static double fresnels(double c, double eta)
+static double fresnel_factor(double c, double eta)
 {
 	double t = sqrt(1 - (1 - c * c) / (eta * eta)), s = (c - eta * t) / (c + eta * t),
 	       p = (t - eta * c) / (t + eta * c);
@@ -336,22 +339,23 @@ static double written_out(const struct recipe *r, vec3 wo, vec3 wi)
 	vec3 h = vec3_normalize(vec3_add(wo, wi));
 	double c = vec3_dot(wo, h), cd = vec3_dot(wi, h), root = (r->eta - 1) / (r->eta + 1), f0 = root * root;
 	double x = h.x / ax, y = h.y / ay, d = 1 / (PI * ax * ay * pow(x * x + y * y + h.z * h.z, 2));
-	double fresnel = (1 - r->metallic) * ((1 - r->spec_tint) * fresnels(c, r->eta) +
-					      r->spec_tint * (f0 + (1 - f0) * schlicks(c))) +
-			 r->metallic * (0.5 + 0.5 * schlicks(c));
+	double fresnel = (1 - r->metallic) * ((1 - r->spec_tint) * fresnel_factor(c, r->eta) +
+					      r->spec_tint * (f0 + (1 - f0) * schlick_factor(c))) +
+			 r->metallic * (0.5 + 0.5 * schlick_factor(c));
 	double facets = fresnel * d * ggx_g1(wo, ax, ay) * ggx_g1(wi, ax, ay) / (4 * wo.z);
-	double fo = schlicks(wi.z), fi = schlicks(wo.z), rr = cd * cd, retro = rr * (fo + fi + fo * fi * (rr - 1));
+	double fo = schlick_factor(wi.z), fi = schlick_factor(wo.z), rr = cd * cd,
+	       retro = rr * (fo + fi + fo * fi * (rr - 1));
 	double fss = (1 + (0.5 * rr - 1) * fo) * (1 + (0.5 * rr - 1) * fi),
 	       flat = 1.25 * (fss * (1 / (wo.z + wi.z) - 0.5) + 0.5), round = (1 - 0.5 * fi) * (1 - 0.5 * fo) + retro;
 	double diffuse = wi.z * 0.5 / PI * (round + r->flatness * (flat - round)),
-	       sheen = r->sheen * schlicks(cd) * wi.z;
+	       sheen = r->sheen * schlick_factor(cd) * wi.z;
 	if (r->thin)
 		return r->spec_trans * facets + (1 - r->spec_trans) * (1 - 0.5 * r->diff_trans) * (diffuse + sheen);
 	double a = 0.1 + (0.001 - 0.1) * r->gloss,
 	       gtr1 = (a * a - 1) / (PI * log(a * a) * (1 + (a * a - 1) * h.z * h.z));
 	double far = 0.25 * sqrt(1 - wi.z * wi.z), near = 0.25 * sqrt(fmax(1 - wo.z * wo.z, 0));
-	double coat = 0.25 * r->clearcoat * (0.04 + 0.96 * schlicks(c)) * gtr1 * ggx_g1((vec3){near, 0, wo.z}, 1, 1) *
-		      ggx_g1((vec3){far, 0, wi.z}, 1, 1) * wi.z;
+	double coat = 0.25 * r->clearcoat * (0.04 + 0.96 * schlick_factor(c)) * gtr1 *
+		      ggx_g1((vec3){near, 0, wo.z}, 1, 1) * ggx_g1((vec3){far, 0, wi.z}, 1, 1) * wi.z;
 	return facets + coat + (1 - r->metallic) * ((1 - r->spec_trans) * diffuse + sheen);
 }
 

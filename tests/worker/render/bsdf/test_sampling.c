@@ -96,7 +96,8 @@ static double gauss9(const struct integrand *f, double r0, double r1, double p0,
 	return sum * (r1 - r0) * (p1 - p0);
 }
 
-static double adaptive(const struct integrand *f, double r0, double r1, double p0, double p1, double whole, int depth)
+static double integrate_adaptively(const struct integrand *f, double r0, double r1, double p0, double p1, double whole,
+				   int depth)
 {
 	double r = (r0 + r1) / 2, p = (p0 + p1) / 2;
 	double q[4] = {gauss9(f, r0, r, p0, p), gauss9(f, r, r1, p0, p), gauss9(f, r0, r, p, p1),
@@ -104,8 +105,10 @@ static double adaptive(const struct integrand *f, double r0, double r1, double p
 	double sum = q[0] + q[1] + q[2] + q[3];
 	if (depth == 0 || fabs(sum - whole) < 1e-6)
 		return sum;
-	return adaptive(f, r0, r, p0, p, q[0], depth - 1) + adaptive(f, r, r1, p0, p, q[1], depth - 1) +
-	       adaptive(f, r0, r, p, p1, q[2], depth - 1) + adaptive(f, r, r1, p, p1, q[3], depth - 1);
+	return integrate_adaptively(f, r0, r, p0, p, q[0], depth - 1) +
+	       integrate_adaptively(f, r, r1, p0, p, q[1], depth - 1) +
+	       integrate_adaptively(f, r0, r, p, p1, q[2], depth - 1) +
+	       integrate_adaptively(f, r, r1, p, p1, q[3], depth - 1);
 }
 
 /* The integral of the density over each cell; returns the sum. */
@@ -117,7 +120,7 @@ static double integrate(const struct bsdf *b, const struct chart *c, vec3 wo, do
 		struct integrand f = {b, c, wo, cell / (AZIMUTH * POLAR)};
 		double r0 = (double)polar / POLAR, r1 = (polar + 1.0) / POLAR;
 		double p0 = 2 * PI * ((double)azimuth / AZIMUTH - 0.5), p1 = p0 + 2 * PI / AZIMUTH;
-		cells[cell] = adaptive(&f, r0, r1, p0, p1, gauss9(&f, r0, r1, p0, p1), 8);
+		cells[cell] = integrate_adaptively(&f, r0, r1, p0, p1, gauss9(&f, r0, r1, p0, p1), 8);
 		total += cells[cell];
 	}
 	return total;

@@ -20,7 +20,7 @@ static const struct warp_axes axes = {{PHI, THETA}, {phi, theta}};
 static struct warp_table table;
 static struct arena arena;
 
-static int make(void **state)
+static int make_table(void **state)
 {
 	(void)state;
 	static double value[SLICES * NODES];
@@ -32,7 +32,7 @@ static int make(void **state)
 	return warp_table_make(&table, SLICES, WIDTH, HEIGHT, value, &arena);
 }
 
-static int unmake(void **state)
+static int free_table(void **state)
 {
 	(void)state;
 	arena_fini(&arena);
@@ -146,5 +146,5 @@ int main(void)
 		cmocka_unit_test(test_integral), cmocka_unit_test(test_corners),
 		cmocka_unit_test(test_refused),
 	};
-	return cmocka_run_group_tests_name("warp_table", tests, make, unmake);
+	return cmocka_run_group_tests_name("warp_table", tests, make_table, free_table);
 }

@@ -41,7 +41,7 @@ static struct camera camera_of(const struct scene_settings *s)
 	return c;
 }
 
-static vec3 seen(const struct camera *c, double x, double y)
+static vec3 direction_seen(const struct camera *c, double x, double y)
 {
 	return camera_direction(c, c->position, x, y);
 }
@@ -53,35 +53,36 @@ static void check_map(const struct camera *c, const char *name)
 	for (int i = 0; i < 5000; i++) {
 		double x = dice_between(&d, 0.01, WIDTH - 0.01), y = dice_between(&d, 0.01, HEIGHT - 0.01), px, py,
 		       h = 1e-5;
-		vec3 w = seen(c, x, y);
+		vec3 w = direction_seen(c, x, y);
 		assert_true(camera_has(c, x, y) && camera_looks(c, w) && fabs(vec3_length(w) - 1) < 1e-15);
 		assert_true(camera_project(c, c->position, w, 1, &px, &py));
 		double slack = 1e-14 * (1 + camera_jac_film_from_solid(c, w));
 		if (!(fabs(px - x) < slack && fabs(py - y) < slack))
 			fail_msg("%s: (%.17g, %.17g) becomes (%.17g, %.17g)", name, x, y, px, py);
-		vec3 dx = vec3_sub(seen(c, x + h, y), seen(c, x - h, y)),
-		     dy = vec3_sub(seen(c, x, y + h), seen(c, x, y - h));
+		vec3 dx = vec3_sub(direction_seen(c, x + h, y), direction_seen(c, x - h, y)),
+		     dy = vec3_sub(direction_seen(c, x, y + h), direction_seen(c, x, y - h));
 		double solid = vec3_length(vec3_cross(dx, dy)) / (4 * h * h);
 		assert_true(fabs(camera_jac_film_from_solid(c, w) * solid - 1) < 1e-5);
 	}
 }
 
 /* The sum over the film of solid angles of pixels. */
-static double whole(const struct camera *c)
+static double film_solid_angle(const struct camera *c)
 {
 	enum { FINE = 20 };
 	double sum = 0;
 	for (int i = 0; i < WIDTH * FINE * HEIGHT * FINE; i++)
 		sum += 1 / (FINE * FINE *
-			    camera_jac_film_from_solid(
-				    c, seen(c, (i % (WIDTH * FINE) + 0.5) / FINE, (i / (WIDTH * FINE) + 0.5) / FINE)));
+			    camera_jac_film_from_solid(c, direction_seen(c, (i % (WIDTH * FINE) + 0.5) / FINE,
+									 (i / (WIDTH * FINE) + 0.5) / FINE)));
 	return sum;
 }
 
 static void assert_direction(const struct camera *c, double x, double y, vec3 d)
 {
-	if (!(vec3_length(vec3_sub(seen(c, x, y), d)) < 1e-14))
-		fail_msg("(%g, %g) looks along %g %g %g", x, y, seen(c, x, y).x, seen(c, x, y).y, seen(c, x, y).z);
+	if (!(vec3_length(vec3_sub(direction_seen(c, x, y), d)) < 1e-14))
+		fail_msg("(%g, %g) looks along %g %g %g", x, y, direction_seen(c, x, y).x, direction_seen(c, x, y).y,
+			 direction_seen(c, x, y).z);
 }
 
 /* +z is in the middle, +x (left) a quarter from the left, +y (up) on top. */
@@ -100,7 +101,7 @@ static void test_panorama(void **state)
 	assert_direction(&turned, 0.75 * WIDTH, 0.5 * HEIGHT, (vec3){0, -1, 0});
 	check_map(&c, "panorama");
 	check_map(&turned, "panorama, turned");
-	assert_true(fabs(whole(&c) / (4 * M_PI) - 1) < 1e-5);
+	assert_true(fabs(film_solid_angle(&c) / (4 * M_PI) - 1) < 1e-5);
 	assert_false(camera_has(&c, -0.1, 3) || camera_has(&c, WIDTH, 3) || camera_has(&c, 3, -0.1) ||
 		     camera_has(&c, 3, HEIGHT));
 	/* Nothing is too near or too far. */
@@ -120,10 +121,10 @@ static void test_pixels(void **state)
 	for (int i = 0; i < 4000; i++) {
 		const struct camera *c = &cameras[i % 2];
 		double x = dice_between(&d, 1, WIDTH - 1), y = dice_between(&d, 1, HEIGHT - 1), h = 1e-4, length[2];
-		vec3 w = seen(c, x, y), axis[2];
+		vec3 w = direction_seen(c, x, y), axis[2];
 		camera_pixel(c, w, 3, axis, length);
-		const vec3 is[2] = {vec3_sub(seen(c, x + h, y), seen(c, x - h, y)),
-				    vec3_sub(seen(c, x, y + h), seen(c, x, y - h))};
+		const vec3 is[2] = {vec3_sub(direction_seen(c, x + h, y), direction_seen(c, x - h, y)),
+				    vec3_sub(direction_seen(c, x, y + h), direction_seen(c, x, y - h))};
 		for (int k = 0; k < 2; k++) {
 			vec3 want = vec3_scale(3 / (2 * h), is[k]),
 			     across = vec3_scale(length[k], vec3_madd(axis[k], -vec3_dot(axis[k], w), w));

@@ -114,7 +114,7 @@ static double bad_number(struct dice *dice)
 	return bad[dice_below(dice, sizeof bad / sizeof *bad)];
 }
 
-static void change(struct chain_state *s, struct dice *dice, int i)
+static void damage_state(struct chain_state *s, struct dice *dice, int i)
 {
 	uint32_t head = CHAIN_STATE_HEAD, left = s->size - head;
 	if (i % 7 == 0)
@@ -138,7 +138,7 @@ static size_t check_changed(struct chain *c, struct chain *d, struct dice *dice)
 	for (int i = 0; i < 200; i++) {
 		struct chain_state changed = {mem_alloc(s.size, 1), s.size};
 		memcpy(changed.bytes, s.bytes, s.size);
-		change(&changed, dice, i);
+		damage_state(&changed, dice, i);
 		d->step = c->step;
 		if (!chain_path.resume(d, &changed)) {
 			refused++;

@@ -223,7 +223,7 @@ static double seen_at(const struct emitter *em, double angle, double azimuth, co
 	return em->ops->radiance(em, &x, vec3_neg(d), w).v[0];
 }
 
-static double seen(const struct emitter *em, double angle, double azimuth)
+static double radiance_seen(const struct emitter *em, double angle, double azimuth)
 {
 	return seen_at(em, angle, azimuth, &(struct wavelengths){.grey = true});
 }
@@ -240,10 +240,10 @@ static void test_ground(void **state)
 	assert_int_equal(make_emitter(&a, "sky albedo=0", false, &dark, &e), 0);
 	assert_int_equal(make_emitter(&a, "sky albedo=0.2", false, &grey[0], &e), 0);
 	assert_int_equal(make_emitter(&a, "sky albedo=0.3", true, &grey[1], &e), 0);
-	double by[2] = {seen(&old, 1, 2) / seen(&dark, 1, 2), recent.power / dark.power};
+	double by[2] = {radiance_seen(&old, 1, 2) / radiance_seen(&dark, 1, 2), recent.power / dark.power};
 	print_message("brighter by %.3f and %.3f\n", by[0], by[1]);
 	assert_true(by[0] > 1.02 && by[1] > 1.5 * by[0] - 0.5 && by[1] < 1.3);
-	assert_true(seen(&old, 1, 2) == seen(&grey[0], 1, 2) && recent.power == grey[1].power);
+	assert_true(radiance_seen(&old, 1, 2) == radiance_seen(&grey[0], 1, 2) && recent.power == grey[1].power);
 	const struct wavelengths w[2] = {{.nm = {540, 540, 540, 540}}, {.nm = {440, 440, 440, 440}}};
 	assert_int_equal(make_emitter(&a, "sky albedo=rgb(0,0.9,0)", false, &green, &e), 0);
 	for (int i = 0; i < 2; i++)
@@ -267,17 +267,17 @@ static void test_below_the_horizon(void **state)
 	assert_int_equal(make_emitter(&a, "sky extend=true", false, &extended, &e), 0);
 	for (double azimuth = 0; azimuth < 6; azimuth += 0.7) {
 		/* The map's first row below the horizon, whose light the model gives only above it. */
-		double horizon = seen(&extended, 0.5 * PI + 0.5 * PI / 256, azimuth);
-		assert_true(fabs(horizon / seen(&plain, 0.5 * PI - 0.5 * PI / 256, azimuth) - 1) < 0.2);
+		double horizon = radiance_seen(&extended, 0.5 * PI + 0.5 * PI / 256, azimuth);
+		assert_true(fabs(horizon / radiance_seen(&plain, 0.5 * PI - 0.5 * PI / 256, azimuth) - 1) < 0.2);
 		for (double angle = 0.05; angle < 3.1; angle += 0.1) {
-			double l = seen(&plain, angle, azimuth), s = seen(&stretched, angle, azimuth);
-			double above = seen(&plain, angle / 1.5, azimuth), fade = 2 - 2 * angle / PI;
-			assert_true(seen(&defaults, angle, azimuth) == l);
+			double l = radiance_seen(&plain, angle, azimuth), s = radiance_seen(&stretched, angle, azimuth);
+			double above = radiance_seen(&plain, angle / 1.5, azimuth), fade = 2 - 2 * angle / PI;
+			assert_true(radiance_seen(&defaults, angle, azimuth) == l);
 			assert_true((l > 0) == (angle < 0.5 * PI));
 			if (fabs(angle - 0.75 * PI) > 0.05) /* its edge */
 				assert_true(fabs(s - above) <= 0.02 * above);
 			double below = horizon * fade * fade * (3 - 2 * fade);
-			double x = seen(&extended, angle, azimuth), due = angle < 0.5 * PI ? l : below;
+			double x = radiance_seen(&extended, angle, azimuth), due = angle < 0.5 * PI ? l : below;
 			assert_true(fabs(x - due) <= 0.02 * due + 1e-4 * horizon);
 		}
 	}
@@ -379,8 +379,8 @@ static void test_on_the_horizon(void **state)
 		assert_non_null(strstr(e.text, "below the horizon (-0.1 degrees)"));
 		if (make_under(&a, types[i], (vec3){1, 0, 0}, &em, &e))
 			fail_msg("%s", e.text);
-		light[i][0] = seen(&em, 0.5 * PI - 1e-3, 0.5 * PI);
-		light[i][1] = seen(&em, 0.3 * PI, 2);
+		light[i][0] = radiance_seen(&em, 0.5 * PI - 1e-3, 0.5 * PI);
+		light[i][1] = radiance_seen(&em, 0.3 * PI, 2);
 		arena_fini(&a);
 	}
 	assert_true(light[0][0] > 2 * light[1][0] && light[1][0] > 0);

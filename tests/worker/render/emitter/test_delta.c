@@ -204,7 +204,7 @@ static void test_even_texture(void **state)
 	}
 }
 
-static bool has(const struct world *w, const char *effect)
+static bool has_effect(const struct world *w, const char *effect)
 {
 	struct render_summary s;
 	world_summary(w, &s);
@@ -219,10 +219,11 @@ static void test_world(void **state)
 		"<emitter type='directional'/><emitter type='constant'/><emitter type='point'/><emitter type='directional'/>");
 	assert_int_equal(w->emitter_count, 4);
 	assert_int_equal(w->environment, 1);
-	assert_true(has(w, "delta-light") && has(w, "environment") && !has(w, "area-light") && !w->effects.colour);
+	assert_true(has_effect(w, "delta-light") && has_effect(w, "environment") && !has_effect(w, "area-light") &&
+		    !w->effects.colour);
 	world_free(w);
 	w = world_of("3.0.0", "<emitter type='constant'/>");
-	assert_false(has(w, "delta-light"));
+	assert_false(has_effect(w, "delta-light"));
 	world_free(w);
 }
 

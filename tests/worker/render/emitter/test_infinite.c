@@ -78,7 +78,8 @@ static int teardown(void **state)
 	return 0;
 }
 
-static int try(struct fixture *f, const char *text, const mat4 *to_world, struct emitter *em, struct error *e)
+static int try_emitter_text(struct fixture *f, const char *text, const mat4 *to_world, struct emitter *em,
+			    struct error *e)
 {
 	struct scene_node *n = node_make(&f->arena, PLUGIN_EMITTER, text);
 	const struct emitter_build build = {.assets = &f->source, .arena = &f->arena, .dialect_3 = dialect_3};
@@ -91,7 +92,7 @@ static struct emitter make_emitter(struct fixture *f, const char *text, const ma
 {
 	struct emitter em;
 	struct error e;
-	if (try(f, text, to_world, &em, &e))
+	if (try_emitter_text(f, text, to_world, &em, &e))
 		fail_msg("%s: %s", text, e.text);
 	return em;
 }
@@ -339,11 +340,12 @@ static void test_black_and_refusals(void **state)
 	assert_true(pdf_at(&em, (vec3){0, 0, 1}) == 0);
 
 	const mat4 flat = {{{1, 0.5, 0, 0}, {0, 0, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}};
-	assert_true(try(*state, "envmap filename=p0", &flat, &em, &e) < 0 && strstr(e.text, "flat"));
-	assert_true(try(*state, "sky", &stretches[0], &em, &e) < 0 && strstr(e.text, "a sky can only rotate"));
-	assert_true(try(*state, "envmap", NULL, &em, &e) < 0 && strstr(e.text, "filename"));
-	assert_true(try(*state, "moon", NULL, &em, &e) < 0 && strstr(e.text, "moon"));
-	assert_true(try(*state, "area", NULL, &em, &e) < 0 && strstr(e.text, "shape"));
+	assert_true(try_emitter_text(*state, "envmap filename=p0", &flat, &em, &e) < 0 && strstr(e.text, "flat"));
+	assert_true(try_emitter_text(*state, "sky", &stretches[0], &em, &e) < 0 &&
+		    strstr(e.text, "a sky can only rotate"));
+	assert_true(try_emitter_text(*state, "envmap", NULL, &em, &e) < 0 && strstr(e.text, "filename"));
+	assert_true(try_emitter_text(*state, "moon", NULL, &em, &e) < 0 && strstr(e.text, "moon"));
+	assert_true(try_emitter_text(*state, "area", NULL, &em, &e) < 0 && strstr(e.text, "shape"));
 }
 
 static int setup_3(void **state)

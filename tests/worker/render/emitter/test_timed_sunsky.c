@@ -65,7 +65,7 @@ static void add_light(struct light *l, const struct emitter *em, double share)
 	}
 }
 
-static void timed(struct light *l, const char *text, double open, double close)
+static void make_light(struct light *l, const char *text, double open, double close)
 {
 	struct arena a = {0};
 	struct emitter em;
@@ -126,8 +126,8 @@ static void test_sky_of_a_day(void **state)
 {
 	(void)state;
 	static struct light found, wanted;
-	timed(&found, "timed_sunsky sun_scale=0 window_start_time=3 window_end_time=20 turbidity=4" PLACE JULY_10, 0,
-	      1);
+	make_light(&found, "timed_sunsky sun_scale=0 window_start_time=3 window_end_time=20 turbidity=4" PLACE JULY_10,
+		   0, 1);
 	by_steps(&wanted, "sky turbidity=4", 31 + 28 + 31 + 30 + 31 + 30 + 9, 1, 3, 20, 64);
 	compare("sky of a day", &found, &wanted, 0.01, 0.01);
 }
@@ -136,7 +136,7 @@ static void test_sun_of_a_day(void **state)
 {
 	(void)state;
 	static struct light found, wanted;
-	timed(&found, "timed_sunsky sky_scale=0 window_start_time=6 window_end_time=18" PLACE JULY_10, 0, 1);
+	make_light(&found, "timed_sunsky sky_scale=0 window_start_time=6 window_end_time=18" PLACE JULY_10, 0, 1);
 	by_steps(&wanted, "sun", 31 + 28 + 31 + 30 + 31 + 30 + 9, 1, 6, 18, 48);
 	compare("sun of a day", &found, &wanted, INFINITY, 0.01);
 }
@@ -145,7 +145,7 @@ static void test_year(void **state)
 {
 	(void)state;
 	static struct light found, wanted;
-	timed(&found, "timed_sunsky sun_scale=0" PLACE, 0, 1);
+	make_light(&found, "timed_sunsky sun_scale=0" PLACE, 0, 1);
 	by_steps(&wanted, "sky", 0, 365, 7, 19, 157);
 	compare("sky of a year", &found, &wanted, 0.03, 0.02);
 }
@@ -157,19 +157,20 @@ static void test_shutter(void **state)
 {
 	(void)state;
 	static struct light found, wanted;
-	timed(&found, "timed_sunsky sun_scale=0 window_start_time=8 window_end_time=16" PLACE JULY_10, 0, 0.5);
+	make_light(&found, "timed_sunsky sun_scale=0 window_start_time=8 window_end_time=16" PLACE JULY_10, 0, 0.5);
 	by_steps(&wanted, "sky", 190, 1, 8, 12, 32);
 	compare("sky of half a day", &found, &wanted, 0.01, 0.01);
-	timed(&found,
-	      "timed_sunsky sun_scale=0 window_start_time=8 window_end_time=16 shutter_open=1 shutter_close=3" PLACE
-		      JULY_10,
-	      2, 3);
+	make_light(
+		&found,
+		"timed_sunsky sun_scale=0 window_start_time=8 window_end_time=16 shutter_open=1 shutter_close=3" PLACE
+			JULY_10,
+		2, 3);
 	by_steps(&wanted, "sky", 190, 1, 12, 16, 32);
 	compare("sky of the other half", &found, &wanted, 0.01, 0.01);
-	timed(&found, "timed_sunsky window_start_time=8 window_end_time=16" PLACE JULY_10, 0, 0);
+	make_light(&found, "timed_sunsky window_start_time=8 window_end_time=16" PLACE JULY_10, 0, 0);
 	by_steps(&wanted, "sunsky", 190, 1, 8, 8, 1);
 	compare("sky and sun at once", &found, &wanted, 0.01, 0.03);
-	timed(&found, "timed_sunsky window_start_time=0 window_end_time=3" PLACE JULY_10, 0, 1);
+	make_light(&found, "timed_sunsky window_start_time=0 window_end_time=3" PLACE JULY_10, 0, 1);
 	assert_true(found.irradiance[0][1] == 0);
 }
 

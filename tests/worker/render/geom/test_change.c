@@ -58,7 +58,7 @@ static struct geom_shape with_tangents(struct geom_shape s, struct dice *d)
 }
 
 /* An instance of it: turned, of uneven scale, and mirrored every other time. */
-static struct geom_shape placed(struct geom_shape s, struct dice *d)
+static struct geom_shape random_placement(struct geom_shape s, struct dice *d)
 {
 	static struct placement place;
 	static uint32_t turned[1][3] = {{0, 2, 1}};
@@ -100,7 +100,7 @@ static const struct relief reliefs[RELIEFS] = {{RELIEF_HEIGHT, wave_height, wave
 					       {RELIEF_NORMAL, wave_normal, wave, false, false},
 					       {RELIEF_NORMAL, wave_normal, wave, true, false}};
 
-static struct geom_shape bent(struct geom_shape s, struct dice *d, int kind)
+static struct geom_shape bent_shape(struct geom_shape s, struct dice *d, int kind)
 {
 	wave[0] = dice_between(d, 0.02, 0.2);
 	wave[1] = dice_between(d, -3, 3);
@@ -143,7 +143,7 @@ static bool curve_point(const struct geom_shape *s, struct dice *d, struct surfa
 }
 
 /* The point that lies h further along t, as the surface itself makes it. */
-static struct surface_point moved(const struct geom_shape *s, const struct surface_point *x, vec3 t, double h)
+static struct surface_point moved_by(const struct geom_shape *s, const struct surface_point *x, vec3 t, double h)
 {
 	struct surface_point y;
 	vec3 p = vec3_madd(x->p, h, t);
@@ -164,7 +164,7 @@ static struct surface_point moved(const struct geom_shape *s, const struct surfa
 	return y;
 }
 
-static double off(vec3 a, vec3 b, double scale)
+static double distance_relative(vec3 a, vec3 b, double scale)
 {
 	return vec3_length(vec3_sub(a, b)) / fmax(scale, 1);
 }
@@ -177,7 +177,7 @@ static double compare(const struct geom_shape *s, const struct surface_point *x)
 	assert_true(fabs(vec3_dot(c.du, c.dv)) < 16 * DBL_EPSILON && fabs(vec3_dot(c.du, x->ng)) < 16 * DBL_EPSILON);
 	vec3 level = vec3_madd(x->axis, -vec3_dot(x->axis, x->ng), x->ng);
 	assert_true(vec3_dot(c.du, level) > 0.999999 * vec3_length(level));
-	assert_true(off(c.axis, vec3_normalize(x->axis), 1) < 1e-7);
+	assert_true(distance_relative(c.axis, vec3_normalize(x->axis), 1) < 1e-7);
 	assert_true(vec3_dot(vec3_cross(c.du, c.dv), x->ng) > 0.999999);
 	double worst = 0, scale = fmax(fmax(vec3_length(c.dn[0]), vec3_length(c.dn[1])), vec3_length(c.daxis[0]));
 	for (int i = 0; i < 2; i++) {
@@ -186,13 +186,14 @@ static double compare(const struct geom_shape *s, const struct surface_point *x)
 		assert_true(fabs(vec3_dot(c.dn[i], x->sh.n)) < 1e-12 * fmax(scale, 1));
 		for (int half = 0; half < 2; half++) {
 			double h = (half ? 1e-5 : 2e-5) / fmax(scale, 1);
-			struct surface_point up = moved(s, x, t, h), down = moved(s, x, t, -h);
+			struct surface_point up = moved_by(s, x, t, h), down = moved_by(s, x, t, -h);
 			dn[half] = vec3_scale(0.5 / h, vec3_sub(up.sh.n, down.sh.n));
 			daxis[half] = vec3_scale(0.5 / h, vec3_sub(vec3_normalize(up.axis), vec3_normalize(down.axis)));
 		}
 		vec3 n = vec3_madd(vec3_scale(4.0 / 3, dn[1]), -1.0 / 3, dn[0]),
 		     a = vec3_madd(vec3_scale(4.0 / 3, daxis[1]), -1.0 / 3, daxis[0]);
-		worst = fmax(worst, fmax(off(n, c.dn[i], scale), off(a, c.daxis[i], scale)));
+		worst = fmax(worst,
+			     fmax(distance_relative(n, c.dn[i], scale), distance_relative(a, c.daxis[i], scale)));
 	}
 	return worst;
 }
@@ -215,9 +216,9 @@ static void test_differences(void **state)
 		if (kind == TANGENTS)
 			s = with_tangents(s, &d);
 		if (kind < SPHERE && i / (KINDS * (1 + RELIEFS)) % 2)
-			s = placed(s, &d);
+			s = random_placement(s, &d);
 		if (relief)
-			s = bent(s, &d, relief - 1);
+			s = bent_shape(s, &d, relief - 1);
 		struct surface_point x;
 		if (curved && !curve_point(&s, &d, &x))
 			continue;
@@ -261,7 +262,7 @@ static void test_bent_normal_is_that_of_the_surface(void **state)
 	double worst[2] = {0};
 	for (size_t i = 0; i < dice_count(2000); i++) {
 		bool round = i & 1;
-		struct geom_shape s = bent(round ? sphere(&d) : triangle(&d, false, true), &d, 0);
+		struct geom_shape s = bent_shape(round ? sphere(&d) : triangle(&d, false, true), &d, 0);
 		struct surface_point x;
 		if (round) {
 			wave[0] *= 1e-5;
@@ -279,7 +280,7 @@ static void test_bent_normal_is_that_of_the_surface(void **state)
 		for (int k = 0; k < 2; k++) {
 			for (int side = 0; side < 2; side++) {
 				double h = side ? 1e-5 : -1e-5;
-				struct surface_point y = moved(&flat, &x, k ? dv : du, h);
+				struct surface_point y = moved_by(&flat, &x, k ? dv : du, h);
 				point[k][side] =
 					vec3_madd(y.p, s.unit * wave[0] * sin(wave[1] * y.u + wave[2] * y.v), y.ng);
 			}
@@ -357,7 +358,7 @@ static void test_degenerate(void **state)
 		struct geom_shape s = sphere(&d);
 		s.sphere_axes = frame_around((vec3){0, 0, i & 1 ? 1 : -1});
 		if (i % 3)
-			s = bent(s, &d, i % 3 - 1);
+			s = bent_shape(s, &d, i % 3 - 1);
 		double off_axis = i < 4 ? 0 : exp(dice_between(&d, -740, 0));
 		surface_on_sphere(&s, (struct prim_ref){0, 0, 0}, vec3_normalize((vec3){off_axis, 0, i & 2 ? 1 : -1}),
 				  &x);
@@ -375,7 +376,7 @@ static void test_degenerate(void **state)
 		if (i % 11 == 0)
 			memset(normal, 0, sizeof normal);
 		if (i % 2)
-			s = bent(s, &d, i / 2 % 2);
+			s = bent_shape(s, &d, i / 2 % 2);
 		surface_on_triangle(&s, (struct prim_ref){0, 0, 0}, 0.3, 0.3, &x);
 		if (!vec3_is_finite(x.ng))
 			continue; /* no area: no such triangle is kept */

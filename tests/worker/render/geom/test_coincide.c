@@ -69,7 +69,7 @@ static void throw_corners(struct dice *d, double c[3][2])
 }
 
 /* The widest gap (above 0) or, where there is none, the least overlap (below 0) along the normals of all edges. */
-static double gap(const double a[3][2], const double b[3][2])
+static double widest_gap(const double a[3][2], const double b[3][2])
 {
 	double widest = -INFINITY;
 	for (int side = 0; side < 6; side++) {
@@ -95,7 +95,7 @@ static void put(struct soup *s, const struct frame *f, vec3 at, double size, con
 	add(s, v[0], v[1], v[2]);
 }
 
-static bool meet(const struct triangle *a, const struct triangle *b)
+static bool do_coincide(const struct triangle *a, const struct triangle *b)
 {
 	bool unused, one = coincide_triangles(a, b, 0, &unused), other = coincide_triangles(b, a, 0, &unused);
 	if (one != other)
@@ -115,7 +115,7 @@ static void test_two(void **state)
 		vec3 at = vec3_scale(dice_throw(&d) < 0.5 ? 0.5 : 0, dice_direction(&d));
 		throw_corners(&d, a);
 		throw_corners(&d, b);
-		double g = gap(a, b);
+		double g = widest_gap(a, b);
 		if (fabs(g) < 0x1p-6)
 			continue;
 		s.count = 0;
@@ -128,12 +128,12 @@ static void test_two(void **state)
 		put(&s, &tilted, at, fmax(size, 0x1p-10), b);
 		const struct triangle t[4] = {triangle_at(&s, 0), triangle_at(&s, 1), triangle_at(&s, 2),
 					      triangle_at(&s, 3)};
-		if (meet(&t[0], &t[1]) != (g < 0))
+		if (do_coincide(&t[0], &t[1]) != (g < 0))
 			fail_msg("a gap of %g, in triangles of %g: %s", g, size,
 				 g < 0 ? "not seen to overlap" : "seen to overlap");
-		if (meet(&t[0], &t[2]))
+		if (do_coincide(&t[0], &t[2]))
 			fail_msg("triangles of %g apart by 2^-20 or more are taken for one", size);
-		if (size >= 0x1p-10 && meet(&t[0], &t[3]))
+		if (size >= 0x1p-10 && do_coincide(&t[0], &t[3]))
 			fail_msg("triangles of %g at an angle of 0.02 are taken for one", size);
 		seen[g < 0]++;
 	}
@@ -154,7 +154,7 @@ static void test_neighbours(void **state)
 					triangle_from((const float(*)[3])g[k].position, g[k].index[i]);
 				const struct triangle b =
 					triangle_from((const float(*)[3])g[k].position, g[k].index[j]);
-				assert_false(meet(&a, &b));
+				assert_false(do_coincide(&a, &b));
 			}
 		body_free(&g[k]);
 	}
@@ -164,7 +164,7 @@ static void test_neighbours(void **state)
 
 /* What is there by the rule, of all primitives: the first as they rank that overlaps this one, or is hidden by what
  * does. */
-static struct prim_ref rule(const struct accel_shape *s, uint32_t count, struct prim_ref at, vec3 p)
+static struct prim_ref first_by_rule(const struct accel_shape *s, uint32_t count, struct prim_ref at, vec3 p)
 {
 	const struct triangle t = triangle_from(s[at.shape].position, s[at.shape].index[at.prim]);
 	for (unsigned rank = 0; rank <= s[at.shape].rank; rank++)
@@ -228,7 +228,7 @@ static void test_search(void **state)
 	for (size_t n = dice_count(20000); n > 0; n--) {
 		struct prim_ref at = {dice_below(&d, 5), dice_below(&d, 150), 0};
 		vec3 p = point_on(&shape[at.shape], at.prim, &d);
-		struct prim_ref there = coincide_there(c, shape, at, p), right = rule(shape, 5, at, p);
+		struct prim_ref there = coincide_there(c, shape, at, p), right = first_by_rule(shape, 5, at, p);
 		if (there.shape != right.shape || there.prim != right.prim)
 			fail_msg("on %u.%u it is %u.%u that is there, not %u.%u", at.shape, at.prim, right.shape,
 				 right.prim, there.shape, there.prim);

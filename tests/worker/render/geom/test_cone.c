@@ -38,7 +38,7 @@ static struct cone cone_of(const struct kind *k, vec3 *p0, vec3 *p1, struct dice
 }
 
 /* By searching, of the unrounded cone. */
-static double searched(vec3 p0, double r0, vec3 p1, double r1, vec3 p)
+static double distance_by_search(vec3 p0, double r0, vec3 p1, double r1, vec3 p)
 {
 	double low = 0, high = 1;
 	vec3 way = vec3_sub(p1, p0);
@@ -63,7 +63,7 @@ static void test_distance(void **state)
 		vec3 p0, p1;
 		struct cone c = cone_of(k, &p0, &p1, &d);
 		vec3 p = vec3_madd(p0, dice_between(&d, 0, 2) * (k->r0 + k->r1 + k->length), dice_direction(&d));
-		double want = searched(p0, k->r0, p1, k->r1, p), have = cone_distance(&c, p, false, false);
+		double want = distance_by_search(p0, k->r0, p1, k->r1, p), have = cone_distance(&c, p, false, false);
 		if (!(fabs(have - want) <= 1e-12))
 			fail_msg("%s: a distance of %.17g, not %.17g", k->name, have, want);
 	}

@@ -54,7 +54,7 @@ struct scene {
 	struct accel *accel;
 };
 
-static mat4 times(mat4 a, mat4 b)
+static mat4 product(mat4 a, mat4 b)
 {
 	return mat4_mul(a, b);
 }
@@ -64,20 +64,20 @@ static mat4 transform(int k)
 	const vec3 axis = {1, 2, -1};
 	switch (k) {
 	case 0:
-		return times(mat4_translate((vec3){-0.5, 0.1, 0}), mat4_scale((vec3){0.2, 0.2, 0.2}));
+		return product(mat4_translate((vec3){-0.5, 0.1, 0}), mat4_scale((vec3){0.2, 0.2, 0.2}));
 	case 1:
-		return times(mat4_translate((vec3){0.1, 0.3, 0.4}),
-			     times(mat4_rotate(axis, 70), mat4_scale((vec3){0.3, 0.05, 0.15})));
+		return product(mat4_translate((vec3){0.1, 0.3, 0.4}),
+			       product(mat4_rotate(axis, 70), mat4_scale((vec3){0.3, 0.05, 0.15})));
 	case 2: /* mirrored */
-		return times(mat4_translate((vec3){0.5, 0.2, -0.2}),
-			     times(mat4_rotate(axis, -20), mat4_scale((vec3){-0.2, 0.1, 0.2})));
+		return product(mat4_translate((vec3){0.5, 0.2, -0.2}),
+			       product(mat4_rotate(axis, -20), mat4_scale((vec3){-0.2, 0.1, 0.2})));
 	case 3: /* around the plain one */
-		return times(mat4_translate((vec3){-0.5, 0.1, 0}), mat4_scale((vec3){-0.28, -0.28, -0.28}));
+		return product(mat4_translate((vec3){-0.5, 0.1, 0}), mat4_scale((vec3){-0.28, -0.28, -0.28}));
 	case 4: /* of floats as rough as a thousandth of it */
-		return times(mat4_translate((vec3){0.9, -0.1, 0.3}), mat4_scale((vec3){0.0005, 0.0006, 0.0004}));
+		return product(mat4_translate((vec3){0.9, -0.1, 0.3}), mat4_scale((vec3){0.0005, 0.0006, 0.0004}));
 	default:
-		return times(mat4_translate((vec3){-0.2, -0.4, -0.6}),
-			     times(mat4_rotate(axis, 160), mat4_scale((vec3){0.1, 0.1, -0.3})));
+		return product(mat4_translate((vec3){-0.2, -0.4, -0.6}),
+			       product(mat4_rotate(axis, 160), mat4_scale((vec3){0.1, 0.1, -0.3})));
 	}
 }
 
@@ -92,7 +92,7 @@ static wide move(const mat4 *m, const float p[3])
 	return (wide){out[0], out[1], out[2]};
 }
 
-static void turn(struct scene *s)
+static void turn_scene(struct scene *s)
 {
 	const struct geom_shape *g = &s->ball;
 	s->turned = mem_alloc(g->triangle_count, sizeof *s->turned);
@@ -110,7 +110,7 @@ static struct scene *scene_of(int first)
 	assert_non_null(s);
 	body_ball(&s->ball, 6, 0.8, 0.1);
 	body_plane(&s->shape[INSTANCES], 2, 0.25, -0.125);
-	turn(s);
+	turn_scene(s);
 	for (int k = 0; k < SHAPES; k++) {
 		mat4 m = k < INSTANCES ? transform((k + first) % INSTANCES) : mat4_identity();
 		struct geom_shape *g = &s->shape[k];
@@ -182,7 +182,7 @@ static struct surface_point point_of(const struct scene *s, struct dice *d)
 }
 
 /* Along the surface nearly as often as not. */
-static vec3 leaving(const struct surface_point *x, struct dice *d)
+static vec3 direction_leaving(const struct surface_point *x, struct dice *d)
 {
 	vec3 w = dice_direction(d);
 	double low = dice_throw(d) < 0.3 ? exp(dice_between(d, -20, 0)) : 1;
@@ -199,7 +199,7 @@ static struct ray_end start_of(const struct scene *s, struct dice *d, vec3 *w)
 		return from;
 	}
 	const struct surface_point x = point_of(s, d);
-	*w = leaving(&x, d);
+	*w = direction_leaving(&x, d);
 	return body_end(&x);
 }
 
@@ -247,7 +247,7 @@ static void check_segments(struct scene *s, struct dice *d, size_t n, size_t *bl
 		*blocked += want && !plane;
 		*wrong += !plane && accel_occluded(s->accel, &from, &to) != want;
 		*wrong += !plane && accel_occluded(s->accel, &to, &from) != want;
-		vec3 w = leaving(&a, d);
+		vec3 w = direction_leaving(&a, d);
 		const struct prim_ref own[2] = {a.prim, PRIM_NONE};
 		want = search(s, widen(a.p), widen(w), own, INFINITY).prim.shape != UINT32_MAX;
 		*wrong += accel_occluded_to_infinity(s->accel, &from, w) != want;
@@ -285,7 +285,7 @@ static void test_closed(void **state)
 		uint32_t k = dice_below(&d, INSTANCES);
 		const struct surface_point x = body_point(&s->shape[k], k, &d);
 		const struct ray_end from = body_end(&x);
-		vec3 w = leaving(&x, &d);
+		vec3 w = direction_leaving(&x, &d);
 		struct ray_hit hit;
 		if (vec3_dot(w, x.ng) > 0)
 			w = vec3_neg(w);
@@ -321,9 +321,9 @@ static void test_coincident(void **state)
 	for (uint32_t i = 0; i < top.vertex_count; i++)
 		top.position[i][2] = -0.3f;
 	const mat4 m[4] = {mat4_translate((vec3){0, 0, 0.3}),
-			   times(mat4_scale((vec3){-0.5, 0.7, 1}), mat4_translate((vec3){0, 0, 0.3})),
+			   product(mat4_scale((vec3){-0.5, 0.7, 1}), mat4_translate((vec3){0, 0, 0.3})),
 			   mat4_translate((vec3){0, 0, 0.3 + 1e-5}),
-			   times(mat4_rotate((vec3){1, 0, 0}, 1e-3), mat4_translate((vec3){0, 0, 0.3}))};
+			   product(mat4_rotate((vec3){1, 0, 0}, 1e-3), mat4_translate((vec3){0, 0, 0.3}))};
 	for (int k = 0; k < 5; k++) {
 		const struct geom_shape *g = k < 4 ? &top : &floor;
 		a[k] = (struct accel_shape){.vertex_count = g->vertex_count,
@@ -365,7 +365,7 @@ static void check_sheets(struct dice *d, const mat4 *m, double gap)
 	float position[5][3] = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
 	uint32_t index[2][3] = {{0, 1, 2}, {0, 2, 3}};
 	struct placement place[2];
-	mat4 above = times(*m, mat4_translate((vec3){0, 0, gap}));
+	mat4 above = product(*m, mat4_translate((vec3){0, 0, gap}));
 	assert_true(placement_make(&place[0], m, (vec3){-1, -1, 0}, (vec3){1, 1, 0}));
 	assert_true(placement_make(&place[1], &above, (vec3){-1, -1, 0}, (vec3){1, 1, 0}));
 	struct geom_shape s[2] = {{.vertex_count = 4, .triangle_count = 2, .position = position, .index = index}};
@@ -391,13 +391,13 @@ static void test_sheets(void **state)
 {
 	(void)state;
 	struct dice d = dice_of("instances of a sheet");
-	const mat4 turned = times(mat4_translate((vec3){0.2, -0.1, 0.3}), mat4_rotate((vec3){1, 2, -1}, 50));
+	const mat4 turned = product(mat4_translate((vec3){0.2, -0.1, 0.3}), mat4_rotate((vec3){1, 2, -1}, 50));
 	const vec3 sizes[] = {{1, 1, 1}, {0.5, 0.25, 0.4}, {0.3, 0.3, -0.6}, {0.25, 0.25, 0.03}};
 	for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++)
 		for (double gap = 0x1p-22; gap < 0x1p-15; gap *= 2) {
 			mat4 m = mat4_scale(sizes[i]);
 			check_sheets(&d, &m, gap);
-			m = times(turned, m);
+			m = product(turned, m);
 			check_sheets(&d, &m, gap);
 		}
 }

@@ -13,7 +13,7 @@
 
 #define SAME (1e-14 / cosine)
 
-static double off(const struct surface_point *a, const struct surface_point *b)
+static double distance_of(const struct surface_point *a, const struct surface_point *b)
 {
 	return vec3_length(vec3_sub(a->p, b->p));
 }
@@ -33,7 +33,7 @@ static void test_triangles(void **state)
 			continue;
 		w = vec3_scale(1 / t, w);
 		assert_true(surface_reproject(&s, x.prim, PRIM_NONE, o, w, t, &y));
-		assert_true(off(&x, &y) < SAME && y.prim.shape == x.prim.shape && y.prim.prim == x.prim.prim);
+		assert_true(distance_of(&x, &y) < SAME && y.prim.shape == x.prim.shape && y.prim.prim == x.prim.prim);
 		assert_true(y.b1 >= 0 && y.b2 >= 0 && y.b1 + y.b2 <= 1 + 0x1p-52);
 		assert_false(surface_reproject(&s, x.prim, PRIM_NONE, o, vec3_neg(w), t, &y));
 		assert_false(surface_reproject(&s, x.prim, x.prim, o, w, t, &y));
@@ -64,7 +64,7 @@ static void test_spheres(void **state)
 			continue;
 		w = vec3_scale(1 / t, w);
 		assert_true(surface_reproject(&s, x.prim, PRIM_NONE, o, w, t, &y));
-		assert_true(off(&x, &y) < SAME);
+		assert_true(distance_of(&x, &y) < SAME);
 		assert_true(fabs(vec3_length(vec3_sub(y.p, s.center)) - s.radius) < 1e-15);
 		/* From the sphere itself: the other end of the chord, or nothing when it leads outwards. */
 		bool inwards = vec3_dot(w, x.ng) < 0;
@@ -76,13 +76,13 @@ static void test_spheres(void **state)
 		/* From outside both crossings lie ahead: the one asked for. */
 		vec3 outside = vec3_madd(x.p, -3, w);
 		assert_true(surface_reproject(&s, x.prim, PRIM_NONE, outside, w, 3 + 0.4 * chord, &y) &&
-			    off(&x, &y) < SAME);
+			    distance_of(&x, &y) < SAME);
 		assert_true(surface_reproject(&s, x.prim, PRIM_NONE, outside, w, 3 + 0.6 * chord, &y) &&
-			    off(&z, &y) < SAME);
+			    distance_of(&z, &y) < SAME);
 		assert_false(surface_reproject(&s, x.prim, PRIM_NONE, outside, vec3_neg(w), 3, &y));
 		/* From the middle one of them does. */
 		vec3 middle = vec3_madd(x.p, 0.5 * chord, w);
-		assert_true(surface_reproject(&s, x.prim, PRIM_NONE, middle, w, 0, &y) && off(&z, &y) < SAME);
+		assert_true(surface_reproject(&s, x.prim, PRIM_NONE, middle, w, 0, &y) && distance_of(&z, &y) < SAME);
 		/* Past it. */
 		vec3 aside = vec3_normalize(vec3_cross(w, x.ng)),
 		     passing = vec3_madd(vec3_madd(s.center, 0.401, aside), -2, w);

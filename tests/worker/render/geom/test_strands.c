@@ -23,7 +23,7 @@ static const struct kind {
 };
 enum { KINDS = sizeof kinds / sizeof *kinds };
 
-static void make(struct strand *s, const struct kind *k, struct dice *d)
+static void make_strand(struct strand *s, const struct kind *k, struct dice *d)
 {
 	strand_random(s, k->count, k->turn, k->length, k->radius, d);
 }
@@ -59,7 +59,7 @@ static void test_crossings(void **state)
 	for (size_t i = 0; i < dice_count(28000); i++) {
 		const struct kind *k = &kinds[i % KINDS];
 		struct strand s;
-		make(&s, k, &d);
+		make_strand(&s, k, &d);
 		vec3 w = dice_direction(&d), o = vec3_madd(aimed_at(&s, &d), -20, w);
 		struct curve_ray r = {.o = o, .d = w, .t_max = INFINITY};
 		int depth = 0, met = 0;
@@ -100,7 +100,7 @@ static void test_culled(void **state)
 	for (size_t i = 0; i < dice_count(14000); i++) {
 		const struct kind *k = &kinds[i % KINDS];
 		struct strand s;
-		make(&s, k, &d);
+		make_strand(&s, k, &d);
 		vec3 w = dice_direction(&d);
 		struct curve_ray r = {.o = vec3_madd(aimed_at(&s, &d), -20, w), .d = w, .t_max = INFINITY}, culled = r;
 		culled.culled = true;
@@ -138,7 +138,7 @@ static void test_segments(void **state)
 	size_t inner = 0;
 	for (size_t i = 0; i < dice_count(20000); i++) {
 		struct strand s;
-		make(&s, &kinds[i % 2], &d); /* straight and bent */
+		make_strand(&s, &kinds[i % 2], &d); /* straight and bent */
 		vec3 w = dice_direction(&d);
 		struct curve_ray r = {.o = vec3_madd(aimed_at(&s, &d), -20, w), .d = w, .t_max = INFINITY};
 		uint32_t first, second, between;
@@ -233,7 +233,7 @@ static void test_places(void **state)
 	struct dice d = dice_of("places on strands");
 	for (size_t i = 0; i < dice_count(20000); i++) {
 		struct strand s;
-		make(&s, &kinds[1], &d);
+		make_strand(&s, &kinds[1], &d);
 		uint32_t prim = dice_below(&d, s.c.count);
 		struct curve_site at = {dice_between(&d, 0, 1), dice_between(&d, -M_PI, M_PI)};
 		struct curve_place p, q;

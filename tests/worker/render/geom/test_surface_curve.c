@@ -17,7 +17,7 @@
 enum { STRANDS = 3 };
 
 /* Several strands around each other, all within the unit sphere; of ordinary thickness, or thin as hair. */
-static void make(struct strand *s, struct geom_shape *g, double radius, struct dice *d)
+static void make_strand(struct strand *s, struct geom_shape *g, double radius, struct dice *d)
 {
 	for (int i = 0; i < STRANDS; i++) {
 		strand_random(&s[i], 12, 0.8, (const double[]){0.05, 0.1}, (const double[]){radius, 1.5 * radius}, d);
@@ -46,7 +46,7 @@ static bool search(const struct strand *s, const struct ray_end *from, vec3 w, d
 	return any;
 }
 
-static vec3 aim(const struct strand *s, struct dice *d)
+static vec3 direction_to_strand(const struct strand *s, struct dice *d)
 {
 	const struct strand *k = &s[dice_below(d, STRANDS)];
 	const float *p = k->point[dice_below(d, k->c.point_count)], *q = p == k->point[0] ? p : p - 4;
@@ -56,11 +56,11 @@ static vec3 aim(const struct strand *s, struct dice *d)
 }
 
 /* A ray from somewhere, and on from each point that it meets. */
-static void follow(const struct strand *s, const struct geom_shape *g, const struct accel *a, struct dice *d,
-		   double away, size_t *met)
+static void follow_ray(const struct strand *s, const struct geom_shape *g, const struct accel *a, struct dice *d,
+		       double away, size_t *met)
 {
 	vec3 w = dice_direction(d);
-	struct ray_end from = {vec3_madd(aim(s, d), -away, w), {0, 0, 0}, PRIM_NONE};
+	struct ray_end from = {vec3_madd(direction_to_strand(s, d), -away, w), {0, 0, 0}, PRIM_NONE};
 	for (int i = 0; i < 20; i++) {
 		struct ray_hit hit;
 		struct prim_ref prim;
@@ -98,11 +98,11 @@ static void test_rays(void **state)
 	for (size_t i = 0; i < dice_count(300); i++) {
 		struct strand s[STRANDS];
 		struct geom_shape g[STRANDS];
-		make(s, g, radii[i % 3], &d);
+		make_strand(s, g, radii[i % 3], &d);
 		struct accel *a = body_accel(g, STRANDS);
 		size_t met = 0;
 		for (int k = 0; k < 100; k++)
-			follow(s, g, a, &d, k % 3 == 0 ? 0 : k % 3 == 1 ? 2 : 1000, &met);
+			follow_ray(s, g, a, &d, k % 3 == 0 ? 0 : k % 3 == 1 ? 2 : 1000, &met);
 		assert_true(met > 30);
 		accel_free(a);
 	}

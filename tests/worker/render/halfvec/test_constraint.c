@@ -216,7 +216,7 @@ static double difference(const quad *expected, const double *actual, unsigned n)
 	return (double)(error / largest);
 }
 
-static double spread(const quad *a, const quad *b, unsigned n)
+static double relative_difference(const quad *a, const quad *b, unsigned n)
 {
 	quad largest = 0, error = 0;
 	for (unsigned i = 0; i < n; i++) {
@@ -262,8 +262,8 @@ static void compare(const struct hand *h, struct dice *d, struct worst *w)
 		quad sh[2], sm[3][4];
 		quad_derivatives(&shaken, step, sh, sm);
 		for (int v = 0; v < 3; v++)
-			condition[v] = fmax(condition[v], spread(m[v], sm[v], 4));
-		condition[3] = fmax(condition[3], spread(hv, sh, 2));
+			condition[v] = fmax(condition[v], relative_difference(m[v], sm[v], 4));
+		condition[3] = fmax(condition[3], relative_difference(hv, sh, 2));
 	}
 	const double *actual[4] = {&k[1].a.xx, &k[1].b.xx, &k[1].c.xx, &k[1].h.x};
 	const quad *expected[4] = {m[0], m[1], m[2], hv};

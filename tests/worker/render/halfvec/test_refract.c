@@ -45,7 +45,7 @@ static bool snell(vec3 d, vec3 n, double eta, vec3 *out)
 }
 
 /* From z along d through `count` surfaces: the ray behind the last. */
-static bool shoot(const struct path_vertex *z, vec3 d, unsigned count, vec3 *p, vec3 *out)
+static bool trace_through(const struct path_vertex *z, vec3 d, unsigned count, vec3 *p, vec3 *out)
 {
 	struct path_vertex v[2];
 	const struct path_vertex *from = z;
@@ -65,11 +65,11 @@ static bool shoot(const struct path_vertex *z, vec3 d, unsigned count, vec3 *p, 
 
 /* Where the ray meets the plane through y across its own direction `axis`, or, if y is at infinity, where it points:
  * two coordinates. */
-static bool arrive(const struct path_vertex *z, vec3 d, unsigned count, const struct path_vertex *y,
-		   const struct frame *f, double at[2])
+static bool arrival_of(const struct path_vertex *z, vec3 d, unsigned count, const struct path_vertex *y,
+		       const struct frame *f, double at[2])
 {
 	vec3 p, w;
-	if (!shoot(z, d, count, &p, &w))
+	if (!trace_through(z, d, count, &p, &w))
 		return false;
 	vec3 off = y->kind == VERTEX_INFINITE
 			   ? vec3_sub(w, y->x.p)
@@ -94,15 +94,15 @@ static void check_one(const struct path_vertex *z, const struct path_vertex *y, 
 	bool has_normal = vec3_dot(y->x.ng, y->x.ng) > 0 && y->kind != VERTEX_INFINITE;
 	struct frame here = frame_around(d), there = frame_around(has_normal ? y->x.ng : last);
 	mat2 m;
-	assert_true(arrive(z, d, r->count, y, &there, at));
+	assert_true(arrival_of(z, d, r->count, y, &there, at));
 	t->miss = fmax(t->miss, fmax(fabs(at[0]), fabs(at[1])));
-	if (!arrive(z, vec3_normalize(vec3_madd(d, step, here.s)), r->count, y, &there, high) ||
-	    !arrive(z, vec3_normalize(vec3_madd(d, -step, here.s)), r->count, y, &there, low))
+	if (!arrival_of(z, vec3_normalize(vec3_madd(d, step, here.s)), r->count, y, &there, high) ||
+	    !arrival_of(z, vec3_normalize(vec3_madd(d, -step, here.s)), r->count, y, &there, low))
 		return;
 	m.xx = (high[0] - low[0]) / (2 * step);
 	m.yx = (high[1] - low[1]) / (2 * step);
-	if (!arrive(z, vec3_normalize(vec3_madd(d, step, here.t)), r->count, y, &there, high) ||
-	    !arrive(z, vec3_normalize(vec3_madd(d, -step, here.t)), r->count, y, &there, low))
+	if (!arrival_of(z, vec3_normalize(vec3_madd(d, step, here.t)), r->count, y, &there, high) ||
+	    !arrival_of(z, vec3_normalize(vec3_madd(d, -step, here.t)), r->count, y, &there, low))
 		return;
 	m.xy = (high[0] - low[0]) / (2 * step);
 	m.yy = (high[1] - low[1]) / (2 * step);

@@ -413,7 +413,7 @@ static void solve_chain(const struct quad_vertex *v, const struct quad_problem *
 }
 
 /* Change of x_{b-1} (b the camera's end) as coordinate i of the end x_0 (what 0) or of h_what moves. */
-static vec2 resolved(const struct hand *h, unsigned what, int i)
+static vec2 change_by_quad(const struct hand *h, unsigned what, int i)
 {
 	unsigned edges = h->x.edges;
 	struct quad_vertex v[FULL_PATH_MAX_VERTICES];
@@ -464,11 +464,11 @@ static void test_solved_again(void **state)
 			continue;
 		made++;
 		pivoted += system_.pivoted;
-		mat2 t = mat2_of_columns(resolved(&h, 0, 0), resolved(&h, 0, 1));
+		mat2 t = mat2_of_columns(change_by_quad(&h, 0, 0), change_by_quad(&h, 0, 1));
 		worst_transfer = fmax(worst_transfer, fabs(log(fabs(mat2_det(t))) - system_.log_transfer));
 		assert_int_equal(constraint_double.differentials(k, edges, 0, dj), CONSTRAINT_OK);
 		for (unsigned j = 1; j < edges; j++) {
-			mat2 e = mat2_of_columns(resolved(&h, j, 0), resolved(&h, j, 1));
+			mat2 e = mat2_of_columns(change_by_quad(&h, j, 0), change_by_quad(&h, j, 1));
 			worst_differential =
 				fmax(worst_differential, mat2_largest(mat2_sub(e, dj[j])) / mat2_largest(e));
 		}

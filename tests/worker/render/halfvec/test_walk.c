@@ -276,7 +276,7 @@ static void walk_back(struct path_context *c, const struct full_path *x, struct 
 }
 
 /* Largest distance between the inner vertices. */
-static double apart(const struct full_path *x, const struct full_path *y, unsigned b, unsigned end)
+static double largest_distance(const struct full_path *x, const struct full_path *y, unsigned b, unsigned end)
 {
 	double most = 0;
 	for (unsigned j = end + 1; j < b; j++)
@@ -297,7 +297,7 @@ static void walk_nowhere(struct path_context *c, const struct full_path *x, unsi
 	if (halfvec_walk(c, &y, b, end, target, false, &limits, WALK_STALE, &s) != WALK_OK || s.iterations != 1)
 		t->left++;
 	else
-		t->worst_stay = fmax(t->worst_stay, apart(x, &y, b, end));
+		t->worst_stay = fmax(t->worst_stay, largest_distance(x, &y, b, end));
 }
 
 /* From the same start with half the tolerance: to the same place y, as far as the whole tolerance says where that is.
@@ -311,7 +311,7 @@ static void walk_again(struct path_context *c, const struct full_path *start, co
 	limits.scale = 0.5;
 	t->again++;
 	if (halfvec_walk(c, &z, b, end, target, false, &limits, WALK_STALE, &s) != WALK_OK ||
-	    apart(&z, y, b, end) > 0.01 * apart(start, y, b, end))
+	    largest_distance(&z, y, b, end) > 0.01 * largest_distance(start, y, b, end))
 		t->elsewhere++;
 	else
 		check_residuals(c->w, &z, b, end, target, limits.scale, t);

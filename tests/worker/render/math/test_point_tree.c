@@ -21,7 +21,7 @@ static void count(void *user, uint32_t id)
 
 enum cloud { EVERYWHERE, ON_A_PLANE, ON_A_GRID, IN_ONE_PLACE, CLOUDS };
 
-static vec3 point(enum cloud cloud, uint64_t i)
+static vec3 point_of_cloud(enum cloud cloud, uint64_t i)
 {
 	double u[4];
 	rng_uniform4(1, RNG_TEST, i, cloud, 0, u);
@@ -47,13 +47,14 @@ static void test_against_all(void **state)
 		for (size_t n = 0; n <= MOST; n = n < 9 ? n + 1 : n * 7) {
 			struct point_tree t = {nodes, n};
 			for (size_t i = 0; i < n; i++) {
-				at[i] = point((enum cloud)cloud, i);
+				at[i] = point_of_cloud((enum cloud)cloud, i);
 				nodes[i] = (struct point_tree_node){at[i], (uint32_t)i};
 			}
 			point_tree_build(&t);
 			for (unsigned k = 0; k < 40; k++) {
 				double r = radii[k % 4];
-				vec3 q = k % 8 < 4 ? point(EVERYWHERE, MOST + k) : point((enum cloud)cloud, k);
+				vec3 q = k % 8 < 4 ? point_of_cloud(EVERYWHERE, MOST + k)
+						   : point_of_cloud((enum cloud)cloud, k);
 				memset(found, 0, sizeof found);
 				point_tree_within(&t, q, r, count, NULL);
 				for (size_t i = 0; i < n; i++) {

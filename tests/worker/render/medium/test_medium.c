@@ -26,7 +26,7 @@ static spectrum let_through(const struct medium *m, double distance, const struc
 	return spectrum_attenuation(medium_depth(&lanes, &(struct grid_ray){nowhere, along_z, 0, distance}));
 }
 
-static double through(double sigma, double per_length, double distance)
+static double transmittance_through(double sigma, double per_length, double distance)
 {
 	const struct medium m = {.first.color = color_constant(sigma),
 				 .second.color = color_constant(0),
@@ -49,7 +49,7 @@ static void test_layers(void **state)
 		double left = 1;
 		for (int i = 0; i < LAYERS; i++)
 			left *= 1 - depth / LAYERS;
-		double found = through(0.25, 2, 2 * depth), bound = depth * depth / LAYERS + 1e-9;
+		double found = transmittance_through(0.25, 2, 2 * depth), bound = depth * depth / LAYERS + 1e-9;
 		assert_true(fabs(left / found - 1) < bound);
 	}
 }
@@ -57,12 +57,12 @@ static void test_layers(void **state)
 static void test_ends(void **state)
 {
 	(void)state;
-	assert_true(through(0, 1, INFINITY) == 1);
-	assert_true(through(1, 0, INFINITY) == 1);
-	assert_true(through(1e-200, 1e-200, INFINITY) == 1); /* their product is 0 */
-	assert_true(through(1e-200, 1, INFINITY) == 0);
-	assert_true(through(1, 1, 0) == 1);
-	assert_true(through(1e30, 1e30, 1e30) == 0);
+	assert_true(transmittance_through(0, 1, INFINITY) == 1);
+	assert_true(transmittance_through(1, 0, INFINITY) == 1);
+	assert_true(transmittance_through(1e-200, 1e-200, INFINITY) == 1); /* their product is 0 */
+	assert_true(transmittance_through(1e-200, 1, INFINITY) == 0);
+	assert_true(transmittance_through(1, 1, 0) == 1);
+	assert_true(transmittance_through(1e30, 1e30, 1e30) == 0);
 }
 
 /* Coefficients that differ by wavelength, some of them 0, given in both ways. */
@@ -71,7 +71,7 @@ static const double nm[] = {450, 500, 550, 600};
 static const double sigma_a[] = {0.5, 0, 1, 0}, sigma_s[] = {1.5, 0.25, 3, 0};
 static const double sigma_t[] = {2, 0.25, 4, 0}, albedo[] = {0.75, 1, 0.75, 0.5};
 
-static struct medium coloured(bool by_albedo)
+static struct medium coloured_medium(bool by_albedo)
 {
 	return (struct medium){.first.color = color_of_table(4, nm, by_albedo ? sigma_t : sigma_a, false, false),
 			       .second.color = color_of_table(4, nm, by_albedo ? albedo : sigma_s, false, false),
@@ -86,7 +86,7 @@ static void test_coefficients(void **state)
 {
 	(void)state;
 	for (int by_albedo = 0; by_albedo <= 1; by_albedo++) {
-		struct medium m = coloured(by_albedo);
+		struct medium m = coloured_medium(by_albedo);
 		spectrum s = medium_scattering(&m, nowhere, along_z, &four), left = let_through(&m, 0.3, &four);
 		for (int i = 0; i < SPECTRUM_LANES; i++) {
 			assert_true(fabs(s.v[i] - 2 * sigma_s[i]) < 1e-12);

@@ -103,7 +103,7 @@ static void check(const struct phase *p, double mean, unsigned parts)
 
 /* ---- the list ---- */
 
-static void make(struct phase *p, const struct scene_node *n)
+static void make_phase(struct phase *p, const struct scene_node *n)
 {
 	static struct arena arena;
 	const struct volume_build build = {.arena = &arena, .dialect_3 = true, .scale = 1};
@@ -135,12 +135,12 @@ static void test_simple(void **state)
 {
 	(void)state;
 	struct phase p;
-	make(&p, &NODE("isotropic"));
+	make_phase(&p, &NODE("isotropic"));
 	check(&p, 0, 0);
-	make(&p, &NODE("rayleigh"));
+	make_phase(&p, &NODE("rayleigh"));
 	check(&p, 0, 0);
 	for (int k = 0; k < GS; k++) {
-		make(&p, &NODE("hg", NUMBER("g", gs[k])));
+		make_phase(&p, &NODE("hg", NUMBER("g", gs[k])));
 		check(&p, gs[k], 0);
 	}
 }
@@ -172,11 +172,11 @@ static void test_tables(void **state)
 		      {"1e30,0,0,0,1e30", {1, 0, 0, 0, 1}, 5}};
 	struct phase p;
 	for (size_t i = 0; i < sizeof tables / sizeof *tables; i++) {
-		make(&p, &NODE("tabphase", TEXT("values", tables[i].text)));
+		make_phase(&p, &NODE("tabphase", TEXT("values", tables[i].text)));
 		check(&p, mean_of_table(tables[i].value, tables[i].count), 0);
 	}
 	/* Where they are: 1 is forwards. */
-	make(&p, &NODE("tabphase", TEXT("values", "1,2,5")));
+	make_phase(&p, &NODE("tabphase", TEXT("values", "1,2,5")));
 	assert_true(fabs(phase_eval(&p, nowhere, (vec3){0, 0, -1}, (vec3){0, 0, 1}) * 2 * M_PI - 1) < 1e-15);
 	assert_true(fabs(phase_eval(&p, nowhere, (vec3){0, 0, 1}, (vec3){0, 0, 1}) * 2 * M_PI - 0.2) < 1e-15);
 	assert_true(fabs(p.ops->eval(&p, nowhere, -0.5) * 2 * M_PI - 0.3) < 1e-15);
@@ -190,11 +190,11 @@ static void test_fine_table(void **state)
 	static char text[VALUES * 26];
 	size_t length = 0;
 	struct phase hg, table;
-	make(&hg, &NODE("hg", NUMBER("g", 0.6)));
+	make_phase(&hg, &NODE("hg", NUMBER("g", 0.6)));
 	for (int i = 0; i < VALUES; i++)
 		length += (size_t)snprintf(text + length, sizeof text - length, "%.17g ",
 					   hg.ops->eval(&hg, nowhere, -1 + i * (2.0 / (VALUES - 1))));
-	make(&table, &NODE("tabphase", TEXT("values", text)));
+	make_phase(&table, &NODE("tabphase", TEXT("values", text)));
 	for (int i = 0; i < 1000; i++) {
 		double u = (i + 0.5) / 1000, cosine = 2 * u - 1;
 		double wanted = hg.ops->eval(&hg, nowhere, cosine), drawn = hg.ops->sample(&hg, nowhere, u);
@@ -211,12 +211,12 @@ static void test_parts(void **state)
 	const struct scene_node forwards = NODE("hg", NUMBER("g", 0.8)), backwards = NODE("hg", NUMBER("g", -0.5)),
 				table = NODE("tabphase", TEXT("values", "0,1,0")), even = NODE("isotropic");
 	for (int k = 0; k <= 4; k++) {
-		make(&p, &NODE("blendphase", NUMBER("weight", k / 4.0), INSIDE(2, &forwards, &backwards)));
+		make_phase(&p, &NODE("blendphase", NUMBER("weight", k / 4.0), INSIDE(2, &forwards, &backwards)));
 		check(&p, 0.8 * (1 - k / 4.0) - 0.5 * k / 4.0, 2);
 		assert_true(p.absorbed == 0);
 	}
 	const struct scene_node blend = NODE("blendphase", INSIDE(2, &forwards, &table));
-	make(&p, &blend);
+	make_phase(&p, &blend);
 	check(&p, 0.4, 2);
 	static const struct {
 		const char *weights;
@@ -226,8 +226,8 @@ static void test_parts(void **state)
 			{".25,.25 0", -0.25, 0.5},
 			{"1,1,2", 0.5 * 0.4 - 0.25 * 0.5, 0}};
 	for (size_t i = 0; i < sizeof mixtures / sizeof *mixtures; i++) {
-		make(&p,
-		     &NODE("mixturephase", TEXT("weights", mixtures[i].weights), INSIDE(3, &backwards, &even, &blend)));
+		make_phase(&p, &NODE("mixturephase", TEXT("weights", mixtures[i].weights),
+				     INSIDE(3, &backwards, &even, &blend)));
 		check(&p, mixtures[i].mean, 4);
 		assert_true(fabs(p.absorbed - mixtures[i].absorbed) < 1e-15);
 	}
@@ -238,12 +238,12 @@ static void test_defaults(void **state)
 {
 	(void)state;
 	struct phase p;
-	make(&p, NULL);
+	make_phase(&p, NULL);
 	assert_string_equal(p.ops->decl.type, "isotropic");
-	make(&p, &NODE("hg"));
+	make_phase(&p, &NODE("hg"));
 	assert_string_equal(p.ops->decl.type, "hg");
 	assert_true(p.g == 0.8);
-	make(&p, &NODE("rayleigh"));
+	make_phase(&p, &NODE("rayleigh"));
 	assert_true(fabs(p.ops->eval(&p, nowhere, 1) / p.ops->eval(&p, nowhere, 0) - 2) < 1e-15);
 }
 

@@ -37,7 +37,7 @@ static bool is_default(const struct world *w, const struct mutation_ops *ops)
 	return ops->useful && ops->useful(&summary) > 0;
 }
 
-static unsigned repeats(const struct world *w, const struct mutation_ops *ops)
+static unsigned repeats_of(const struct world *w, const struct mutation_ops *ops)
 {
 	if (!is_default(w, ops))
 		return REPEAT;
@@ -74,7 +74,7 @@ static void pool_rare(const struct world *w, const struct room *room, const stru
 }
 
 /* Each b and c in three rooms; in all with FULL=1, and where a room is asked for. */
-static bool forces(const char *room)
+static bool is_forced_here(const char *room)
 {
 	return test_full() || getenv("ROOM") || strcmp(room, "rough glass") == 0 || strcmp(room, "bent normals") == 0 ||
 	       strcmp(room, "prism") == 0;
@@ -85,8 +85,8 @@ static size_t all_trials(const struct world *w, const char *room, struct balance
 	size_t n = 0;
 	for (size_t i = 0; mutation_registry[i]; i++)
 		t[n++] = (struct balance_trial){
-			.ops = mutation_registry[i], .how = {-1, -1}, .repeat = repeats(w, mutation_registry[i])};
-	if (!forces(room))
+			.ops = mutation_registry[i], .how = {-1, -1}, .repeat = repeats_of(w, mutation_registry[i])};
+	if (!is_forced_here(room))
 		return n;
 	const struct mutation_ops *hslt = mutation_find("hslt", 4);
 	t[n++] = (struct balance_trial){.ops = hslt, .how = {0, 0}, .repeat = 1};

@@ -73,9 +73,9 @@ static double denser_above(struct mutation_ctx *m, struct full_path *into, const
 	return log_weight(m, into, move, direction) - (into->wavelength > 0.5 ? log(1.1) : 0);
 }
 
-static enum proposal_end drift(const struct mutation_ops *self, struct mutation_ctx *m,
-			       const struct mutation_setting *how, struct full_path *x, struct full_path *y,
-			       struct move *move)
+static enum proposal_end propose_with_drift(const struct mutation_ops *self, struct mutation_ctx *m,
+					    const struct mutation_setting *how, struct full_path *x,
+					    struct full_path *y, struct move *move)
 {
 	const double mean = 0.1; /* pixels; the deviation is 0.64 */
 	x->film[0] += mean;
@@ -183,7 +183,7 @@ static const struct fault faults[] = {
 	{"no P(b) P(c)", "gold", "hslt", {-1, -1}, BALANCE_ANY, 64, 2, propose, no_selection},
 	{"3 % one way", "gold", "wavelength", {-1, -1}, BALANCE_ANY, 64, 64, propose, denser_upwards},
 	{"10 % in half of the states", "gold", "wavelength", {-1, -1}, BALANCE_ANY, 256, 8, propose, denser_above},
-	{"film step with a mean", "mirror", "multichain", {-1, -1}, BALANCE_ANY, 64, 2, drift, log_weight},
+	{"film step with a mean", "mirror", "multichain", {-1, -1}, BALANCE_ANY, 64, 2, propose_with_drift, log_weight},
 	{"fixed part not evaluated again", "gold", "hslt", {-1, -1}, BALANCE_ANY, 256, 8, propose, stale_fixed},
 	{"f_c not evaluated again", "bent normals", "hslt", {-1, -1}, BALANCE_ANY, 128, 8, propose, stale_c},
 	{"f_b not evaluated again", "bent normals", "hslt", {-1, -1}, BALANCE_ANY, 64, 2, propose, stale_b},

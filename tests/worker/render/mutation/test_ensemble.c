@@ -37,13 +37,13 @@ static void begin(const struct world *w)
 }
 
 /* A sub-path may have n > 5 vertices or more with probability (5/n)^2. */
-static double chance(unsigned vertices)
+static double chance_of(unsigned vertices)
 {
 	return vertices > 5 ? 25.0 / (vertices * vertices) : 1;
 }
 
 /* The path of candidate k of the pair at hand is in x. false: it lies just outside the film. */
-static bool choose(unsigned k)
+static bool choose_candidate(unsigned k)
 {
 	double before = 0;
 	for (unsigned j = 0; j < k; j++)
@@ -59,13 +59,14 @@ static void draw(uint64_t seed, uint64_t i, const struct ensemble_lengths *n, st
 }
 
 /* Where x is refracted at x_1, its joint by technique 1 has vertices. */
-static bool has(const struct ensemble *e, unsigned edges, double intensity, bool whole)
+static bool has_candidate(const struct ensemble *e, unsigned edges, double intensity, bool whole)
 {
 	for (unsigned i = 0; i < e->count; i++) {
 		const struct candidate *a = &e->of[i];
 		if (!whole && a->s == 1 && a->passed == 0 && path_is_refracted(&x.v[1]))
 			continue;
-		double want = whole ? intensity : intensity / (chance(edges + 1 - a->s - a->passed) * chance(a->s));
+		double want =
+			whole ? intensity : intensity / (chance_of(edges + 1 - a->s - a->passed) * chance_of(a->s));
 		if (a->edges == edges && fabs(a->intensity / want - 1) < 1e-6)
 			return true;
 	}
@@ -88,7 +89,7 @@ static unsigned check_candidates(const char *name)
 		for (unsigned i = 0; i <= y.edges; i++)
 			assert_true(y.v[i].x.prim.time == full_path_time(&x));
 		full_path_log_techniques(&c, &y, log_pdf);
-		double chances = chance(y.edges + 1 - a->s - a->passed) * chance(a->s),
+		double chances = chance_of(y.edges + 1 - a->s - a->passed) * chance_of(a->s),
 		       want = exp(full_path_log_f(&c, &y) - log_sum_exp(log_pdf, y.edges + 1)) / chances;
 		if (!(fabs(a->intensity / want - 1) < 1e-6))
 			fail_msg("%s: %u edges by technique %u: %.9g, not %.9g", name, y.edges, a->s, a->intensity,
@@ -116,12 +117,12 @@ static void check_own_candidate(const char *name)
 		const double u[3] = {(double)i / TRIALS, 0.5, 0.5};
 		struct sampler_random s;
 		/* Far out in a lobe's tail its two evaluations share no digits. */
-		if (own.intensity < 1e-6 * drawn.total || !choose(k))
+		if (own.intensity < 1e-6 * drawn.total || !choose_candidate(k))
 			continue;
 		sampler_random_init(&s, seed, RNG_TEST, i, 1);
 		c.time = (double)i / TRIALS; /* of whatever was drawn last */
 		ensemble_around(&c, &s.base, &x, u, &around);
-		if (!has(&around, own.edges, own.intensity, false))
+		if (!has_candidate(&around, own.edges, own.intensity, false))
 			fail_msg("%s: pair %llu: a path of %u edges found by technique %u with %.9g is not there", name,
 				 (unsigned long long)i, own.edges, own.s, own.intensity);
 		checked++;
@@ -164,8 +165,9 @@ static void test_drawn_lengths(void **state)
 			const struct candidate *a = &capped.of[k];
 			unsigned t = a->edges + 1 - a->s;
 			assert_true(t <= some.camera && a->s <= some.light);
-			assert_true(has(&drawn, a->edges, a->intensity * chance(t) * chance(a->s), true));
-			checked += chance(t) * chance(a->s) < 1;
+			assert_true(
+				has_candidate(&drawn, a->edges, a->intensity * chance_of(t) * chance_of(a->s), true));
+			checked += chance_of(t) * chance_of(a->s) < 1;
 		}
 	}
 	assert_true(checked > 100);
@@ -217,7 +219,7 @@ static void test_streams_of_a_proposal(void **state)
 				  .limits = walk_limits_of(&accuracy_settings_default)};
 	for (uint64_t i = 0; i < TRIALS / 4; i++) {
 		draw(seed, i, &all, &drawn);
-		if (drawn.count == 0 || !choose(0))
+		if (drawn.count == 0 || !choose_candidate(0))
 			continue;
 		struct move move = {0};
 		m.step = i;

@@ -166,7 +166,7 @@ static double radius_of(const struct sampling *s)
 
 /* A start from which proposals fill the ellipsoid as a normal distribution does, each part of it: not one whose cloud
  * is bent, as at a sphere's limb. Asked of places alone, not of densities. */
-static bool fills(const struct sampling *s, const double z[][MOST], unsigned n)
+static bool fills_ellipsoid(const struct sampling *s, const double z[][MOST], unsigned n)
 {
 	unsigned d = 2 * s->count, bins = d < BITS ? 1u << d : BINS, in[BINS] = {0}, all = 0;
 	double radius = radius_of(s), tail = 0, term = 1;
@@ -189,7 +189,7 @@ static bool fills(const struct sampling *s, const double z[][MOST], unsigned n)
 }
 
 /* Mean and covariance; false: some fail or leave their surface, or they lie otherwise than the ellipsoid says. */
-static bool pilot(struct sampling *s)
+static bool run_pilot(struct sampling *s)
 {
 	static double z[PILOT][MOST];
 	unsigned n = 0, d = 2 * s->count, failed = 0;
@@ -221,7 +221,7 @@ static bool pilot(struct sampling *s)
 				return false;
 			s->factor[a][b] = a == b ? sqrt(sum) : sum / s->factor[b][b];
 		}
-	return fills(s, (const double(*)[MOST])z, n);
+	return fills_ellipsoid(s, (const double(*)[MOST])z, n);
 }
 
 static bool all_smooth(const struct full_path *x)
@@ -311,7 +311,7 @@ static void test_example(void **state)
 		if (!starts_path(&starts, e->edges, ((i * 377) % STARTS + 0.5) / STARTS, &x) || !all_smooth(&x))
 			continue;
 		full_path_copy(&y, &x, 0, e->edges);
-		found = pilot(&s);
+		found = run_pilot(&s);
 	}
 	if (!found)
 		fail_msg("%s: no start from which all proposals arrive", name);

@@ -97,7 +97,7 @@ static void run_group(const struct room *room, int group, struct tally t[STRATEG
 	starts_fini(&s);
 }
 
-static void judge(const struct room *room, const char *name, const struct tally *t)
+static void judge_bias(const struct room *room, const char *name, const struct tally *t)
 {
 	char test[64];
 	snprintf(test, sizeof test, "tolerance %s %s", room->name, name);
@@ -139,7 +139,7 @@ static void check(const struct room *room)
 		run_group(room, g, t);
 	world_free(w);
 	for (int m = 0; m < STRATEGIES; m++)
-		judge(room, names[m], &t[m]);
+		judge_bias(room, names[m], &t[m]);
 }
 
 static void test_tolerances(void **state)

@@ -32,7 +32,7 @@ struct effort {
 
 /* Where every sample is the same the groups are, too, but for the rounding of tiles to float and what a hair of
  * roughness loses: no statistics of that. */
-static void forgive(struct agree_image *image, double expected, double tolerance)
+static void remove_rounding(struct agree_image *image, double expected, double tolerance)
 {
 	for (uint32_t g = 0; g < image->groups; g++)
 		for (int c = 0; c <= AGREE_CELLS; c++)
@@ -56,7 +56,7 @@ static void check_depths(const char *name, struct world *w, uint32_t least, doub
 		snprintf(test, sizeof test, "%s, %s", name, runs[i].integrator);
 		struct agree_side side = {runs[i].integrator, runs[i].spp, 32, least, 0};
 		agree_render(w, test, runs[i].integrator, &side, &image);
-		forgive(&image, radiance * sum3(w->grey_xyz), 1e-5);
+		remove_rounding(&image, radiance * sum3(w->grey_xyz), 1e-5);
 		agree_expect(test, &image, radiance * sum3(w->grey_xyz));
 	}
 	world_free(w);
@@ -387,7 +387,7 @@ struct lamp {
 };
 
 /* Unpolarised light that comes at this angle through one face of the pane. */
-static double transmitted(double cosine, double inner)
+static double transmitted_share(double cosine, double inner)
 {
 	double s = (cosine - 1.5 * inner) / (cosine + 1.5 * inner), p = (1.5 * cosine - inner) / (1.5 * cosine + inner);
 	return 1 - 0.5 * (s * s + p * p);
@@ -401,7 +401,7 @@ static double irradiance_behind_glass(const struct lamp *l, double rho)
 	for (;;) {
 		double t = 0.5 * (low + high), c = cos(t), inner = sqrt(1 - pow(sin(t) / 1.5, 2));
 		if (t <= low || t >= high) {
-			double through = transmitted(c, inner), bent = l->glass * c / (1.5 * inner);
+			double through = transmitted_share(c, inner), bent = l->glass * c / (1.5 * inner);
 			return M_PI * l->r * l->r * through * through * (c / (air + bent)) /
 			       (air / (c * c) + bent / (inner * inner));
 		}
@@ -575,7 +575,7 @@ static void check_small_lamp(const char *name, const char *lamp, double share)
 		for (uint32_t g = 0; g < image.groups; g++)
 			for (int c = 0; c <= AGREE_CELLS; c++)
 				image.mean[g][c] = image.mean[g][AGREE_CELLS] / (share * sum3(w->grey_xyz));
-		forgive(&image, 1, 1e-4); /* what samples of the film would add, if one met the lamp */
+		remove_rounding(&image, 1, 1e-4); /* what samples of the film would add, if one met the lamp */
 		agree_expect(test, &image, 1);
 	}
 	world_free(w);

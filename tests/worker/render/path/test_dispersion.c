@@ -56,7 +56,7 @@ static void render(struct world *w, const char *test, const char *side, const ch
 	agree_render(w, test, side, &how, out);
 }
 
-static const struct effect_line *effect(const struct world *w, const char *name)
+static const struct effect_line *effect_named(const struct world *w, const char *name)
 {
 	for (size_t i = 0; i < w->effects.line_count; i++)
 		if (strcmp(w->effects.lines[i].name, name) == 0)
@@ -69,8 +69,8 @@ static void check_both_ways(const char *name, const char *bsdf, uint64_t spp)
 {
 	static struct agree_image path, bdpt;
 	struct world *w = sky_over(bsdf);
-	assert_true(w->effects.dispersion && w->effects.colour && effect(w, "dispersion")->on);
-	assert_non_null(strstr(effect(w, "dispersion")->why, "varies with wavelength"));
+	assert_true(w->effects.dispersion && w->effects.colour && effect_named(w, "dispersion")->on);
+	assert_non_null(strstr(effect_named(w, "dispersion")->why, "varies with wavelength"));
 	render(w, name, "path", "path", spp, &path);
 	render(w, name, "bdpt", "bdpt", spp, &bdpt);
 	agree_check(name, &bdpt, &path);
@@ -97,7 +97,7 @@ static void check_one_against_four(const char *name, const char *hardly, const c
 	render(w, name, "one", "path", spp, &one);
 	world_free(w);
 	w = sky_over(plain);
-	assert_true(!w->effects.dispersion && !effect(w, "dispersion")->on);
+	assert_true(!w->effects.dispersion && !effect_named(w, "dispersion")->on);
 	render(w, name, "four", "path", spp, &four);
 	world_free(w);
 	agree_check(name, &one, &four);

@@ -102,7 +102,7 @@ static void test_hard(void **state)
 }
 
 /* No light at all: leases give black, the bootstrap no seeds, chains without a seed stay black. */
-static void black(const char *text)
+static void expect_black(const char *text)
 {
 	struct world *w = world_of_text(16, 16, "%s%s", SENSOR("0,2,4", "0,0,0"), text);
 	for (size_t i = 0; render_integrator_at(i); i++) {
@@ -141,10 +141,11 @@ static void black(const char *text)
 static void test_black(void **state)
 {
 	(void)state;
-	black(FLOOR);
-	black("");
-	black(FLOOR "<shape type='sphere'><emitter type='area'><float name='radiance' value='0'/></emitter></shape>");
-	black("<emitter type='constant'><float name='radiance' value='0'/></emitter>");
+	expect_black(FLOOR);
+	expect_black("");
+	expect_black(FLOOR
+		     "<shape type='sphere'><emitter type='area'><float name='radiance' value='0'/></emitter></shape>");
+	expect_black("<emitter type='constant'><float name='radiance' value='0'/></emitter>");
 }
 
 int main(void)

@@ -68,7 +68,7 @@ static double by_chance(struct path_context *c, uint64_t index, double place)
 	return out.count > 0 ? s->xyz[0] + s->xyz[1] + s->xyz[2] : 0;
 }
 
-static struct world *room(void)
+static struct world *make_room(void)
 {
 	return world_of_text(
 		16, 16,
@@ -97,7 +97,7 @@ static void test_mean(void **state)
 {
 	(void)state;
 	static uint64_t counters[BATCH_COUNTERS];
-	struct world *w = room();
+	struct world *w = make_room();
 	struct path_context c = context_of(w, counters);
 	c.roulette = PATH_ROULETTE;
 	double all = 0, mean = 0;
@@ -132,7 +132,7 @@ static void test_without_roulette(void **state)
 {
 	(void)state;
 	static uint64_t counters[BATCH_COUNTERS];
-	struct world *w = room();
+	struct world *w = make_room();
 	struct path_context c = context_of(w, counters);
 	for (uint64_t i = 0; i < SAMPLES; i++) {
 		double expected = by_every_connection(&c, i);

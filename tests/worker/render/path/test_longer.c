@@ -27,7 +27,7 @@ static struct path_context context_of(struct world *w, uint64_t *counters, uint3
 				     .counters = counters};
 }
 
-static struct world *room(const char *bsdf)
+static struct world *make_room(const char *bsdf)
 {
 	return world_of_text(
 		SIZE, SIZE,
@@ -38,7 +38,7 @@ static struct world *room(const char *bsdf)
 }
 
 /* The mean of what is found of paths of more than `after` edges. */
-static double found(struct world *w, uint32_t after, uint32_t longest, double *error)
+static double mean_of_longer(struct world *w, uint32_t after, uint32_t longest, double *error)
 {
 	static struct path_context c;
 	static struct path_sample sample;
@@ -56,13 +56,13 @@ static double found(struct world *w, uint32_t after, uint32_t longest, double *e
 }
 
 /* The mean where radiance 1 is all that the camera sees. */
-static double one(void)
+static double mean_of_unit_light(void)
 {
 	static struct path_context c;
 	static struct path_sample sample;
 	uint64_t counters[BATCH_COUNTERS] = {0};
 	double sum = 0;
-	struct world *w = room("<bsdf type='diffuse'/>");
+	struct world *w = make_room("<bsdf type='diffuse'/>");
 	c = context_of(w, counters, 1);
 	for (uint64_t i = 0; i < SAMPLES; i++) {
 		struct sampler_random s;
@@ -76,7 +76,7 @@ static double one(void)
 
 static void expect(struct world *w, uint32_t after, uint32_t longest, double wanted, double most_error)
 {
-	double error, unit = one(), mean = found(w, after, longest, &error) / unit;
+	double error, unit = mean_of_unit_light(), mean = mean_of_longer(w, after, longest, &error) / unit;
 	error /= unit;
 	printf("%u to %u edges: %.5g +- %.2g, wanted %.5g\n", after + 1, longest, mean, error, wanted);
 	if (!(fabs(mean - wanted) <= 4 * error) || error > most_error * wanted)
@@ -84,7 +84,7 @@ static void expect(struct world *w, uint32_t after, uint32_t longest, double wan
 }
 
 /* r^after + ... + r^(longest - 1) */
-static double series(double r, uint32_t after, uint32_t longest)
+static double geometric_series(double r, uint32_t after, uint32_t longest)
 {
 	return (pow(r, after) - (longest == LONGER_EDGES ? 0 : pow(r, longest))) / (1 - r);
 }
@@ -92,13 +92,13 @@ static double series(double r, uint32_t after, uint32_t longest)
 static void test_a_shining_sphere(void **state)
 {
 	(void)state;
-	struct world *w = room("<bsdf type='diffuse'><spectrum name='reflectance' value='0.99'/></bsdf>");
-	expect(w, 32, 64, series(0.99, 32, 64), 0.02);
-	expect(w, 126, 131, series(0.99, 126, 131), 0.03); /* where one stretch ends and the next begins */
-	expect(w, 128, LONGER_EDGES, series(0.99, 128, LONGER_EDGES), 0.05);
+	struct world *w = make_room("<bsdf type='diffuse'><spectrum name='reflectance' value='0.99'/></bsdf>");
+	expect(w, 32, 64, geometric_series(0.99, 32, 64), 0.02);
+	expect(w, 126, 131, geometric_series(0.99, 126, 131), 0.03); /* where one stretch ends and the next begins */
+	expect(w, 128, LONGER_EDGES, geometric_series(0.99, 128, LONGER_EDGES), 0.05);
 	world_free(w);
-	w = room("<bsdf type='diffuse'><spectrum name='reflectance' value='0.5'/></bsdf>");
-	expect(w, 4, LONGER_EDGES, series(0.5, 4, LONGER_EDGES), 0.05);
+	w = make_room("<bsdf type='diffuse'><spectrum name='reflectance' value='0.5'/></bsdf>");
+	expect(w, 4, LONGER_EDGES, geometric_series(0.5, 4, LONGER_EDGES), 0.05);
 	world_free(w);
 }
 
@@ -106,14 +106,14 @@ static void test_a_shining_sphere(void **state)
 static void test_a_mirror(void **state)
 {
 	(void)state;
-	struct world *w = room("<bsdf type='conductor'><string name='material' value='none'/>"
-			       "<spectrum name='specular_reflectance' value='0.99'/></bsdf>");
-	expect(w, 126, 131, series(0.99, 126, 131), 0.03);
+	struct world *w = make_room("<bsdf type='conductor'><string name='material' value='none'/>"
+				    "<spectrum name='specular_reflectance' value='0.99'/></bsdf>");
+	expect(w, 126, 131, geometric_series(0.99, 126, 131), 0.03);
 	world_free(w);
 }
 
 /* Light goes on by the diagonal between two plates, meeting each a step further on, to a lamp behind 300 of them. */
-static struct world *corridor(const char *bsdf)
+static struct world *make_corridor(const char *bsdf)
 {
 	return world_of_text(
 		SIZE, SIZE,
@@ -133,8 +133,9 @@ static struct world *corridor(const char *bsdf)
 static void test_a_corridor(void **state)
 {
 	(void)state;
-	struct world *w = corridor("<bsdf type='twosided'><bsdf type='conductor'><string name='material' value='none'/>"
-				   "<spectrum name='specular_reflectance' value='0.995'/></bsdf></bsdf>");
+	struct world *w =
+		make_corridor("<bsdf type='twosided'><bsdf type='conductor'><string name='material' value='none'/>"
+			      "<spectrum name='specular_reflectance' value='0.995'/></bsdf></bsdf>");
 	expect(w, 128, 300, 0, 0);
 	expect(w, 128, 301, pow(0.995, 300), 0.05);
 	world_free(w);
@@ -145,8 +146,8 @@ static void test_a_corridor(void **state)
 static void test_a_slab(void **state)
 {
 	(void)state;
-	struct world *w = corridor("<bsdf type='dielectric'><float name='int_ior' value='1.5'/>"
-				   "<float name='int_cauchy_b' value='0.01'/></bsdf>");
+	struct world *w = make_corridor("<bsdf type='dielectric'><float name='int_ior' value='1.5'/>"
+					"<float name='int_cauchy_b' value='0.01'/></bsdf>");
 	assert_true(w->effects.dispersion);
 	expect(w, 128, 301, 1, 0.05);
 	world_free(w);

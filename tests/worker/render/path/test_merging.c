@@ -66,7 +66,7 @@ static double f_over(const double *log_pdf, unsigned last, double log_f)
 
 /* The camera's sub-path of t vertices goes on to the light's vertex s, as if it had been drawn there. false: it cannot.
  */
-static bool meet(struct path_context *c, unsigned s, unsigned t)
+static bool continue_to_light(struct path_context *c, unsigned s, unsigned t)
 {
 	const struct path_vertex *y = &c->light[s];
 	struct path_vertex *at = &c->camera[t - 1], *z = &c->camera[t];
@@ -119,7 +119,7 @@ static unsigned long check_densities(const char *name, struct world *w, unsigned
 			for (unsigned s = 2; s < light && s + t <= EDGES; s++) {
 				struct merged found;
 				/* s + 1 vertices of light and t of the camera are joined */
-				if (!full_path_from_subpaths(&c, s + 1, 0, s + t, &x) || !meet(&c, s, t))
+				if (!full_path_from_subpaths(&c, s + 1, 0, s + t, &x) || !continue_to_light(&c, s, t))
 					continue;
 				struct photon p = photon_of(&c, s);
 				if (!merged_of(&c, &p, t, &found))

@@ -16,7 +16,7 @@
 
 #include <cmocka.h>
 
-static struct world *caustic(const char *effects)
+static struct world *caustic_world(const char *effects)
 {
 	worlds_effects = effects;
 	/* clang-format off */
@@ -78,7 +78,7 @@ static void check_both(const char *name, struct world *(*build)(const char *effe
 static void test_caustic(void **state)
 {
 	(void)state;
-	check_both("caustic", caustic, 2048);
+	check_both("caustic", caustic_world, 2048);
 }
 
 static void test_image_of_lamp(void **state)

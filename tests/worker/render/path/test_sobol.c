@@ -117,7 +117,7 @@ static unsigned shared_bits(uint32_t a, uint32_t b)
 	return a == b ? 32 : (unsigned)__builtin_clz(a ^ b);
 }
 
-static uint32_t plain(const uint32_t v[32], uint32_t i)
+static uint32_t unscrambled(const uint32_t v[32], uint32_t i)
 {
 	uint32_t x = 0;
 	for (unsigned b = 0; b < 32; b++)
@@ -153,11 +153,11 @@ static void test_directions(void **state)
 	for (uint32_t i = 0; i < N; i++)
 		for (uint32_t j = 0; j < i; j++) {
 			unsigned here = shared_bits(u[i][0], u[j][0]),
-				 there = shared_bits(plain(v[0], i), plain(v[0], j));
+				 there = shared_bits(unscrambled(v[0], i), unscrambled(v[0], j));
 			assert_true(here < 13 && there < 13);
 			for (int d = 1; d < 4; d++) {
 				seen[d][here][shared_bits(u[i][d], u[j][d])]++;
-				expected[d][there][shared_bits(plain(v[d], i), plain(v[d], j))]++;
+				expected[d][there][shared_bits(unscrambled(v[d], i), unscrambled(v[d], j))]++;
 			}
 		}
 	assert_memory_equal(seen, expected, sizeof seen);
@@ -175,7 +175,7 @@ static void check_uniform(const uint64_t *count, int cells, uint64_t total, cons
 		fail_msg("%s: p = %g", what, p);
 }
 
-static int cell(double u)
+static int cell_of(double u)
 {
 	return (int)(u * CELLS);
 }
@@ -191,9 +191,9 @@ static void test_marginals(void **state)
 		draw(seed, n / 16, n % 16, 5, SIDE_LIGHT, 3, u);
 		for (int d = 0; d < SAMPLER_BLOCK; d++) {
 			assert_true(u[d] >= 0 && u[d] < 1);
-			coarse[d][cell(u[d])]++;
-			fine[d][cell(ldexp(u[d], 16) - floor(ldexp(u[d], 16)))]++;
-			low[d][cell(ldexp(u[d], 40) - floor(ldexp(u[d], 40)))]++;
+			coarse[d][cell_of(u[d])]++;
+			fine[d][cell_of(ldexp(u[d], 16) - floor(ldexp(u[d], 16)))]++;
+			low[d][cell_of(ldexp(u[d], 40) - floor(ldexp(u[d], 40)))]++;
 		}
 	}
 	for (int d = 0; d < SAMPLER_BLOCK; d++) {
@@ -230,7 +230,7 @@ static void check_pairs(const char *what, const uint64_t a[2], const uint64_t b[
 		draw(seed + n, a[0], a[1], 3, SIDE_CAMERA, 1, u);
 		draw(seed + n, b[0], b[1], 3, side, vertex, v);
 		for (int d = 0; d < SAMPLER_BLOCK; d++)
-			count[d][cell(u[d]) * CELLS + cell(v[d])]++;
+			count[d][cell_of(u[d]) * CELLS + cell_of(v[d])]++;
 	}
 	for (int d = 0; d < SAMPLER_BLOCK; d++)
 		check_uniform(count[d], CELLS * CELLS, TRIALS, what);
@@ -249,7 +249,7 @@ static void test_independence(void **state)
 	for (uint64_t n = 0; n < TRIALS; n++) {
 		double u[SAMPLER_BLOCK];
 		draw(seed, n, 0, 3, SIDE_CAMERA, 1, u);
-		count[cell(u[1]) * CELLS + cell(u[5])]++;
+		count[cell_of(u[1]) * CELLS + cell_of(u[5])]++;
 	}
 	check_uniform(count, CELLS * CELLS, TRIALS, "halves");
 }

@@ -21,7 +21,7 @@ struct tally {
 	unsigned open, blocked, passed;
 };
 
-static void connect(struct path_context *c, unsigned t, const struct path_vertex *y, struct tally *sum)
+static void connect_to(struct path_context *c, unsigned t, const struct path_vertex *y, struct tally *sum)
 {
 	const struct path_vertex *z = &c->camera[t - 1];
 	double distance2;
@@ -74,9 +74,9 @@ static void test_far_end(void **state)
 			if (c.camera[t - 1].kind != VERTEX_SURFACE || !path_scatters_smoothly(&c.camera[t - 1]))
 				continue;
 			if (path_next_event(&c, &c.camera[t - 1], &y, &pdf))
-				connect(&c, t, &y, &sum);
+				connect_to(&c, t, &y, &sum);
 			for (unsigned k = 2; k <= light; k++)
-				connect(&c, t, &c.light[k - 1], &sum);
+				connect_to(&c, t, &c.light[k - 1], &sum);
 		}
 	}
 	print_message("%u connections are open, %u pass surfaces, %u are blocked\n", sum.open, sum.passed, sum.blocked);

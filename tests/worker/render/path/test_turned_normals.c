@@ -50,7 +50,7 @@ static struct path_vertex vertex_on(const struct world *w, uint64_t i)
 	return v;
 }
 
-static struct path_vertex beside(const struct path_vertex *v, vec3 d)
+static struct path_vertex vertex_beside(const struct path_vertex *v, vec3 d)
 {
 	struct path_vertex to = {.kind = VERTEX_SURFACE, .emitter = -1};
 	to.x.p = vec3_add(v->x.p, d);
@@ -68,12 +68,12 @@ struct seen {
 	double f, to_light, to_camera;
 };
 
-static struct seen see(const struct world *w, const struct path_vertex *v, vec3 o, vec3 i)
+static struct seen scattering_seen(const struct world *w, const struct path_vertex *v, vec3 o, vec3 i)
 {
 	static struct path_context c;
 	c.w = w;
 	c.wl = (struct wavelengths){.nm = {450, 500, 550, 600}};
-	const struct path_vertex camera = beside(v, o), light = beside(v, i);
+	const struct path_vertex camera = vertex_beside(v, o), light = vertex_beside(v, i);
 	return (struct seen){spectrum_mean(path_scatter(&c, v, o, i)),
 			     path_pdf(&c, &camera, v, &light, TRANSPORT_RADIANCE),
 			     path_pdf(&c, &light, v, &camera, TRANSPORT_IMPORTANCE)};
@@ -99,7 +99,8 @@ static void check(const char *shape, const char *inner, bool turns)
 		vec3 o = direction_of_square(u), i = direction_of_square(u + 2);
 		struct path_vertex v = vertex_on(w, k), p = vertex_on(plain, k), q = vertex_on(other, k);
 		bool away = !right_side(&p, o) && right_side(&q, o);
-		struct seen got = see(w, &v, o, i), as_it_is = see(plain, &p, o, i), turned = see(other, &q, o, i);
+		struct seen got = scattering_seen(w, &v, o, i), as_it_is = scattering_seen(plain, &p, o, i),
+			    turned = scattering_seen(other, &q, o, i);
 		struct surface_point room;
 		assert_true((path_facing(&v, o, &room) == &room) == (away && turns));
 		if (!(away && turns)) {

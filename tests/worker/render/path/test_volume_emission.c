@@ -396,7 +396,7 @@ static void test_colours(void **state)
 
 /* From the surface of a ball of radius 1 at height y straight down z, light of 1 per length, by a walk whose events
  * have all of the extinction, and whose weight is the albedo: what is emitted until the first event, and so on. */
-static double walk(struct dice *d, double y, double sigma, double albedo)
+static double random_walk(struct dice *d, double y, double sigma, double albedo)
 {
 	vec3 at = {0, y, sqrt(1 - y * y)}, w = {0, 0, -1};
 	double weight = 1, sum = 0;
@@ -429,7 +429,7 @@ static void test_ball(void **state)
 			     "<film type='hdrfilm'><rfilter type='box'/></film></sensor>" BALL(
 				     NULL_FACES FOG("3", "0.85") SHINES("1")));
 	for (int i = 0; i < WALKS; i++)
-		sums[i % GROUPS] += walk(&d, y, sigma, albedo);
+		sums[i % GROUPS] += random_walk(&d, y, sigma, albedo);
 	for (int g = 0; g < GROUPS; g++)
 		for (int c = 0; c <= AGREE_CELLS; c++)
 			walked.mean[g][c] = sums[g] / (WALKS / GROUPS) * sum3(w->grey_xyz);

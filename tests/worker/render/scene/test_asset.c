@@ -71,7 +71,7 @@ static int tear_down(void **state)
 	return system(command);
 }
 
-static void reads(const char *name, const char *text)
+static void expect_content(const char *name, const char *text)
 {
 	struct asset_source s = asset_folder(folder);
 	struct asset a;
@@ -98,12 +98,12 @@ static void refuses(const char *name, const char *text)
 static void test_files_below(void **state)
 {
 	(void)state;
-	reads("a.obj", "inside");
-	reads("./a.obj", "inside");
-	reads("sub/b.png", "deeper");
-	reads("sub//b.png", "deeper");
-	reads("empty", "");
-	reads("..dots", "dots");
+	expect_content("a.obj", "inside");
+	expect_content("./a.obj", "inside");
+	expect_content("sub/b.png", "deeper");
+	expect_content("sub//b.png", "deeper");
+	expect_content("empty", "");
+	expect_content("..dots", "dots");
 }
 
 static void test_files_elsewhere(void **state)
@@ -198,7 +198,7 @@ static void count_close(void *user, struct asset *a)
 	*a = (struct asset){0};
 }
 
-static void use(const struct asset_source *s, const char *name)
+static void open_and_close(const struct asset_source *s, const char *name)
 {
 	struct asset a;
 	struct error e;
@@ -275,7 +275,7 @@ static void test_outside_is_said(void **state)
 	snprintf(wanted, sizeof wanted,
 		 "../common/a.png: leads out of the scene's folder; to allow that, give --path %s", real);
 	refuses("%2e%2e/common/a.png", wanted);
-	reads("%2e%2e/scene/a.obj", "inside");
+	expect_content("%2e%2e/scene/a.obj", "inside");
 	refuses("%2e%2e/scene/none.obj", "../scene/none.obj: No such file");
 	/* what is nowhere, to someone who may say where else to search */
 	struct asset_folders f = asset_folders_of(folder, NULL, 0);
@@ -306,7 +306,7 @@ static void test_outside_is_said(void **state)
 	refuses(deep, "give --path /");
 }
 
-static void says(const char *name, const char *text)
+static void expect_not_found(const char *name, const char *text)
 {
 	const char *const others[] = {root};
 	struct asset_folders f = asset_folders_of(folder, others, 1);
@@ -326,18 +326,18 @@ static void test_names_that_are_near(void **state)
 	write_file("scene/mesh_1.obj", "");
 	write_file("scene/sub/Wood Floor.png", "");
 	write_file("scene/empty2", "");
-	says("A.OBJ", "; did you mean `a.obj`?");
-	says("Sub/wood floor.PNG", "; did you mean `sub/Wood Floor.png`?");
-	says("sub/wood_floor.png", "; did you mean `sub/Wood Floor.png`?");
-	says("Mesh_1.obj", "; did you mean `mesh_1.obj`?");
-	says("common/./B.png", "");
-	says("mesh_2.obj", ""); /* another one of a series */
-	says("mesh_11.obj", "");
-	says("fifoo", ""); /* no file */
-	says("subs", "");
-	says("outt", ""); /* leads out of the folder */
-	says("absolut", "");
-	says("scene/EMPTY", "; did you mean `scene/empty`?"); /* of the second folder */
+	expect_not_found("A.OBJ", "; did you mean `a.obj`?");
+	expect_not_found("Sub/wood floor.PNG", "; did you mean `sub/Wood Floor.png`?");
+	expect_not_found("sub/wood_floor.png", "; did you mean `sub/Wood Floor.png`?");
+	expect_not_found("Mesh_1.obj", "; did you mean `mesh_1.obj`?");
+	expect_not_found("common/./B.png", "");
+	expect_not_found("mesh_2.obj", ""); /* another one of a series */
+	expect_not_found("mesh_11.obj", "");
+	expect_not_found("fifoo", ""); /* no file */
+	expect_not_found("subs", "");
+	expect_not_found("outt", ""); /* leads out of the folder */
+	expect_not_found("absolut", "");
+	expect_not_found("scene/EMPTY", "; did you mean `scene/empty`?"); /* of the second folder */
 }
 
 /* By its whole name, a file is found below the scene's folder and the others, whether these are called as they are or
@@ -349,7 +349,7 @@ static void test_absolute_names(void **state)
 	snprintf(link, sizeof link, "%s-link", root);
 	assert_int_equal(symlink(root, link), 0);
 	snprintf(name, sizeof name, "%%2f%s/scene/sub/b.png", root);
-	reads(name, "deeper");
+	expect_content(name, "deeper");
 	snprintf(name, sizeof name, "%%2f%s/scene/up/secret", root);
 	refuses(name, "up/secret: ");
 	snprintf(name, sizeof name, "%%2f%s/scene/none", root);
@@ -382,12 +382,12 @@ static void test_keeper(void **state)
 	struct asset first, second, other;
 	struct error e;
 	for (int i = 0; i < 5; i++)
-		use(&s, "a");
+		open_and_close(&s, "a");
 	assert_true(c.opened == 1 && c.closed == 0);
-	use(&s, "b");
+	open_and_close(&s, "b");
 	assert_true(c.opened == 2 && c.closed == 1);
 	assert_int_equal(s.open(s.user, "c", &first, &e), -ENOENT);
-	use(&s, "a");
+	open_and_close(&s, "a");
 	assert_true(c.opened == 3 && c.closed == 2);
 	/* used twice at once, and another beside it */
 	assert_int_equal(s.open(s.user, "a", &first, &e), 0);
@@ -412,8 +412,8 @@ static void test_keeper_ends(void **state)
 	struct asset_source s = asset_keeper_source(&keeper);
 	struct asset other;
 	struct error e;
-	use(&s, "a");
-	use(&s, "a");
+	open_and_close(&s, "a");
+	open_and_close(&s, "a");
 	assert_int_equal(s.open(s.user, "b", &other, &e), -E2BIG);
 	assert_non_null(strstr(e.text, "b: the scene asks for its files again and again; 256 GB"));
 	asset_keeper_fini(&keeper);

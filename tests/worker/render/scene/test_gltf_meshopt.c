@@ -52,7 +52,7 @@ static int build(const struct memory_file *files, bool lenient, struct built *b,
 	return rc;
 }
 
-static void fini(struct built *b)
+static void free_built(struct built *b)
 {
 	if (b->has_scene)
 		scene_fini(&b->scene);
@@ -108,9 +108,9 @@ static void test_twin(void **state)
 			gltf_files_pack(&changed, (enum gltf_form)form);
 			build_sound(changed.list, &packed);
 			assert_same_meshes(&plain, &packed);
-			fini(&packed);
+			free_built(&packed);
 		}
-	fini(&plain);
+	free_built(&plain);
 }
 
 /* ---- filters */
@@ -266,7 +266,7 @@ static void test_filters(void **state)
 				assert_direction(mesh->position[v], mat4_point(&m, p), 1e-8);
 			}
 		}
-		fini(&b);
+		free_built(&b);
 	}
 }
 
@@ -315,7 +315,7 @@ static void test_colours(void **state)
 			if (!(fabs(got - colours[k / 4][k % 4]) < (k % 4 < 3 ? 2 : 3) * step))
 				fail_msg("%d bits, number %d: %g", cases[i].bits, k, got);
 		}
-		fini(&b);
+		free_built(&b);
 	}
 }
 
@@ -326,7 +326,7 @@ static void refuses(const struct memory_file *files, const char *text)
 	struct built b;
 	struct error e = {"no error at all"};
 	int rc = build(files, false, &b, &e);
-	fini(&b);
+	free_built(&b);
 	if (rc >= 0 || !strstr(e.text, text))
 		fail_msg("gave %d: %s\n not: %s", rc, e.text, text);
 }
@@ -437,7 +437,7 @@ static void test_damaged(void **state)
 		int rc = build(changed.list, i % 3, &b, &e);
 		assert_true(rc == 0 || (rc < 0 && *e.text));
 		sound += rc == 0;
-		fini(&b);
+		free_built(&b);
 	}
 	assert_true(sound > 100 && sound < 1900);
 }

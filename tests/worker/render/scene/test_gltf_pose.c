@@ -44,7 +44,7 @@ static size_t add_bytes(int buffer, const void *bytes, size_t size)
 	return at;
 }
 
-static void finish(const char *json)
+static void finish_json(const char *json)
 {
 	size_t n = 0;
 	for (const char *p = json; *p; p++) {
@@ -130,7 +130,7 @@ static void of_each_type(void **state)
 			 "'normalized': %s, 'count': 3, 'type': 'VEC3'}], 'bufferViews': [{'buffer': 0, 'byteLength': "
 			 "%zu, 'byteStride': %d}], " ONE_BUFFER "}",
 			 cases[i].type, cases[i].normalized, cases[i].size, cases[i].stride);
-		finish(json);
+		finish_json(json);
 		struct world *w = world_of_files(4, 4, file.list);
 		vec3 far = corner(w, 0, 0, 1);
 		if (!(fabs(far.x - cases[i].side) <= 1e-6 * cases[i].side))
@@ -140,7 +140,7 @@ static void of_each_type(void **state)
 }
 
 /* Zeros, of which two vertices are replaced; and in another buffer than the indices. */
-static void sparse(void **state)
+static void sparse_accessors(void **state)
 {
 	(void)state;
 	static const uint8_t at[2] = {1, 2};
@@ -156,7 +156,7 @@ static void sparse(void **state)
 	add_bytes(0, at, sizeof at);
 	add_bytes(0, values, sizeof values);
 	add_bytes(1, indices, sizeof indices);
-	finish(json);
+	finish_json(json);
 	struct world *w = world_of_files(4, 4, file.list);
 	assert_triangle(w, 0, (vec3){0, 0, 0}, 1);
 	world_free(w);
@@ -164,7 +164,7 @@ static void sparse(void **state)
 	memcpy(type, "5122", 4);
 	refuses("accessors[1]: of a type that index cannot have");
 	file.bytes[0][1] = 3; /* there is no such vertex */
-	finish(json);
+	finish_json(json);
 	refuses("accessors[0]: its sparse indices exceed its count");
 }
 
@@ -175,10 +175,11 @@ static void in_several_buffers(void **state)
 	begin();
 	add_bytes(0, plain, sizeof plain);
 	add_bytes(1, normals, sizeof normals);
-	finish("{" NODES "}], 'meshes': [{'primitives': [{'attributes': {'POSITION': 0, 'NORMAL': 1}}]}], "
-	       "'accessors': [{'bufferView': 0, 'componentType': 5126, 'count': 3, 'type': 'VEC3'}, {'bufferView': 1, "
-	       "'componentType': 5126, 'count': 3, 'type': 'VEC3'}], 'bufferViews': [{'buffer': 0, 'byteLength': 36}, "
-	       "{'buffer': 1, 'byteLength': 36}], 'buffers': [$0, $1]}");
+	finish_json(
+		"{" NODES "}], 'meshes': [{'primitives': [{'attributes': {'POSITION': 0, 'NORMAL': 1}}]}], "
+		"'accessors': [{'bufferView': 0, 'componentType': 5126, 'count': 3, 'type': 'VEC3'}, {'bufferView': 1, "
+		"'componentType': 5126, 'count': 3, 'type': 'VEC3'}], 'bufferViews': [{'buffer': 0, 'byteLength': 36}, "
+		"{'buffer': 1, 'byteLength': 36}], 'buffers': [$0, $1]}");
 	struct world *w = world_of_files(4, 4, file.list);
 	assert_triangle(w, 0, (vec3){0, 0, 0}, 1);
 	world_free(w);
@@ -210,12 +211,12 @@ static void morph_targets(void **state)
 	add_bytes(0, up, sizeof up);
 	add_bytes(0, larger, sizeof larger);
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-		finish(cases[i].json);
+		finish_json(cases[i].json);
 		struct world *w = world_of_files(4, 4, file.list);
 		assert_triangle(w, 0, (vec3){0, 0, cases[i].z}, cases[i].side);
 		world_free(w);
 	}
-	finish(TARGETS("", ", 'weights': [1, 0]", "2"));
+	finish_json(TARGETS("", ", 'weights': [1, 0]", "2"));
 	refuses("accessors[1]: a morph target has another number of vertices than its primitive");
 }
 
@@ -232,7 +233,7 @@ static void morph_targets(void **state)
 	"'byteOffset': 36, 'byteLength': 12}, {'buffer': 0, 'byteOffset': 48, 'byteLength': 48}, {'buffer': 0, "                        \
 	"'byteOffset': 96, 'byteLength': 128}], " ONE_BUFFER "}"
 
-static void skins(void **state)
+static void skins_move_vertices(void **state)
 {
 	(void)state;
 	static const uint8_t joints[12] = {0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0};
@@ -244,19 +245,19 @@ static void skins(void **state)
 	add_bytes(0, joints, sizeof joints);
 	add_bytes(0, weights, sizeof weights);
 	add_bytes(0, inverse, sizeof inverse);
-	finish(SKIN("[1, 3]"));
+	finish_json(SKIN("[1, 3]"));
 	struct world *w = world_of_files(4, 4, file.list);
 	assert_at(w, 0, 0, (vec3){0, 0, 0});
 	assert_at(w, 0, 1, (vec3){3, 0, 4});
 	assert_at(w, 0, 2, (vec3){0.75, 1.75, 3});
 	world_free(w);
-	finish(SKIN("[1]"));
+	finish_json(SKIN("[1]"));
 	refuses("accessors[1]: vertex 1 has a joint that its skin does not have");
-	finish(SKIN("[1, 3, 2]"));
+	finish_json(SKIN("[1, 3, 2]"));
 	refuses("accessors[3]: fewer matrices than skins[0] has joints");
-	finish(SKIN("[]"));
+	finish_json(SKIN("[]"));
 	refuses("skins[0]: it has no joints");
-	finish(SKIN("[1, 30]"));
+	finish_json(SKIN("[1, 30]"));
 	refuses("there is no nodes[30]");
 }
 
@@ -279,12 +280,12 @@ static void of_a_list(void **state)
 	add_bytes(0, plain, sizeof plain);
 	add_bytes(0, places, sizeof places);
 	add_bytes(0, scales, sizeof scales);
-	finish(INSTANCES("2"));
+	finish_json(INSTANCES("2"));
 	struct world *w = world_of_files(4, 4, file.list);
 	assert_triangle(w, 0, (vec3){11, 2, 3}, 1);
 	assert_triangle(w, 1, (vec3){9, 0, 0}, 2);
 	world_free(w);
-	finish(INSTANCES("1"));
+	finish_json(INSTANCES("1"));
 	refuses("nodes[0]: attributes of instances with different numbers of entries");
 	memcpy(strstr(file.json, "\"count\": 2"), "\"count\": 0", 10); /* of TRANSLATION, which comes first */
 	refuses("nodes[0]: attributes of instances with different numbers of entries");
@@ -364,7 +365,7 @@ static void of_several_nodes(void **state)
 	CHANNEL("0", "translation") \
 	", " CHANNEL("1", "rotation") ", " CHANNEL("2", "scale") ", " CHANNEL("3", "weights")
 
-static void animation(void **state)
+static void animations_are_interpolated(void **state)
 {
 	(void)state;
 	static const float up[9] = {0, 0, 1, 0, 0, 1, 0, 0, 1}, larger[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
@@ -379,34 +380,34 @@ static void animation(void **state)
 	add_bytes(1, turn, sizeof turn);
 	add_bytes(1, sizes, sizeof sizes);
 	add_bytes(1, weights, sizeof weights);
-	finish(ANIMATED(ALL_CHANNELS, PLACE TURN_OF("") SIZE WEIGHTS_OF("4")));
+	finish_json(ANIMATED(ALL_CHANNELS, PLACE TURN_OF("") SIZE WEIGHTS_OF("4")));
 	struct world *w = world_of_files(4, 4, file.list);
 	assert_at(w, 0, 0, (vec3){1, 2, 3});
 	assert_at(w, 0, 1, (vec3){1, 5, 3});
 	assert_at(w, 0, 2, (vec3){-2, 2, 3});
 	world_free(w);
-	finish(ANIMATED(
+	finish_json(ANIMATED(
 		CHANNEL("0", "translation") ", {'sampler': 0, 'target': {'path': 'pointer'}}, " CHANNEL("3", "blur"),
 		PLACE TURN_OF("") SIZE WEIGHTS_OF("4")));
 	w = world_of_files(4, 4, file.list); /* what is not animated is the node's */
 	assert_triangle(w, 0, (vec3){1, 2, 4}, 2);
 	world_free(w);
-	finish(ANIMATED(
+	finish_json(ANIMATED(
 		CHANNEL("1", "rotation"),
 		PLACE TURN_OF(", 'sparse': {'count': 1, 'indices': {'bufferView': 0, 'componentType': 5121}, 'values': "
 			      "{'bufferView': 2}}") SIZE WEIGHTS_OF("4")));
 	w = world_of_files(4, 4, file.list);
 	assert_triangle(w, 0, (vec3){7, 7, 8}, 2);
 	world_free(w);
-	finish(ANIMATED(ALL_CHANNELS, PLACE TURN_OF("") SIZE WEIGHTS_OF("1")));
+	finish_json(ANIMATED(ALL_CHANNELS, PLACE TURN_OF("") SIZE WEIGHTS_OF("1")));
 	refuses("accessors[6]: fewer values than the animation needs");
-	finish(ANIMATED(CHANNEL("0", "rotation"), PLACE TURN_OF("") SIZE WEIGHTS_OF("4")));
+	finish_json(ANIMATED(CHANNEL("0", "rotation"), PLACE TURN_OF("") SIZE WEIGHTS_OF("4")));
 	refuses("accessors[3]: of a type that animation cannot have");
-	finish(ANIMATED(CHANNEL("9", "scale"), PLACE TURN_OF("") SIZE WEIGHTS_OF("4")));
+	finish_json(ANIMATED(CHANNEL("9", "scale"), PLACE TURN_OF("") SIZE WEIGHTS_OF("4")));
 	refuses("animations[0]: a channel without a sampler");
 	static const float infinite[1] = {INFINITY};
 	memcpy(file.bytes[1], infinite, sizeof infinite);
-	finish(ANIMATED(ALL_CHANNELS, PLACE TURN_OF("") SIZE WEIGHTS_OF("4")));
+	finish_json(ANIMATED(ALL_CHANNELS, PLACE TURN_OF("") SIZE WEIGHTS_OF("4")));
 	refuses("accessors[3]: a value that is not finite");
 }
 
@@ -453,7 +454,7 @@ static void make_by_turns(const char *buffers)
 		"[{'buffer': 0, 'byteLength': 12, 'byteStride': 4}, {'buffer': 1, 'byteLength': 12, 'byteStride': 4}], "
 		"'buffers': [%s]}",
 		roots, nodes, meshes, buffers);
-	finish(json);
+	finish_json(json);
 }
 
 /* Of those in the file itself each is decoded once. */
@@ -501,9 +502,15 @@ static void by_turns_for_ever(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(of_each_type),	     cmocka_unit_test(sparse),	  cmocka_unit_test(in_several_buffers),
-		cmocka_unit_test(morph_targets),     cmocka_unit_test(skins),	  cmocka_unit_test(of_a_list),
-		cmocka_unit_test(of_several_nodes),  cmocka_unit_test(animation), cmocka_unit_test(by_turns),
+		cmocka_unit_test(of_each_type),
+		cmocka_unit_test(sparse_accessors),
+		cmocka_unit_test(in_several_buffers),
+		cmocka_unit_test(morph_targets),
+		cmocka_unit_test(skins_move_vertices),
+		cmocka_unit_test(of_a_list),
+		cmocka_unit_test(of_several_nodes),
+		cmocka_unit_test(animations_are_interpolated),
+		cmocka_unit_test(by_turns),
 		cmocka_unit_test(by_turns_for_ever),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

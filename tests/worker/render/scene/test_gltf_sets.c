@@ -53,7 +53,7 @@ static const struct scene_node *shape_of(const struct scene *s)
 	return NULL;
 }
 
-static void takes(const char *json, const char *first_byte)
+static void expect_texcoord(const char *json, const char *first_byte)
 {
 	struct scene s = read_text(json);
 	const char *texcoord = node_string(shape_of(&s), "texcoord", "");
@@ -73,13 +73,14 @@ static void refuses(const char *json, const char *sentence)
 static void test_sets(void **state)
 {
 	(void)state;
-	takes(FILE_OF("\"2.0\"", FIRST, "", BOUNDS), "36");
-	takes(FILE_OF("\"2.0\"", SECOND, "", BOUNDS), "60");
-	takes(FILE_OF("\"2.0\"", SECOND "," BOTH("1"), NORMAL("1"), BOUNDS), "60");
-	takes(FILE_OF("\"2.0\"",
-		      "\"baseColorTexture\": {\"index\": 0, \"extensions\": {\"KHR_texture_transform\": {\"texCoord\": 1}}}",
-		      "", BOUNDS),
-	      "60");
+	expect_texcoord(FILE_OF("\"2.0\"", FIRST, "", BOUNDS), "36");
+	expect_texcoord(FILE_OF("\"2.0\"", SECOND, "", BOUNDS), "60");
+	expect_texcoord(FILE_OF("\"2.0\"", SECOND "," BOTH("1"), NORMAL("1"), BOUNDS), "60");
+	expect_texcoord(
+		FILE_OF("\"2.0\"",
+			"\"baseColorTexture\": {\"index\": 0, \"extensions\": {\"KHR_texture_transform\": {\"texCoord\": 1}}}",
+			"", BOUNDS),
+		"60");
 	refuses(FILE_OF("\"2.0\"", FIRST "," BOTH("1"), NORMAL("2"), BOUNDS),
 		"`texCoord` is not supported; --lenient leaves it out");
 }

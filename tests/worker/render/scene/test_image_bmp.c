@@ -127,7 +127,7 @@ static void test_all_kinds(void **state)
 	check(&b, 6, false, 3);
 }
 
-static void lie(uint32_t bits, size_t at, uint32_t value, int bytes, const char *text)
+static void refuses_changed(uint32_t bits, size_t at, uint32_t value, int bytes, const char *text)
 {
 	struct bitmap b = bitmap_of(bits, false, false, false, false);
 	put(b.bytes + at, value, bytes);
@@ -137,19 +137,19 @@ static void lie(uint32_t bits, size_t at, uint32_t value, int bytes, const char 
 static void test_lies(void **state)
 {
 	(void)state;
-	lie(24, 14, 13, 4, "a header of an unknown size");
-	lie(24, 14, 0xffffffff, 4, "a header of an unknown size");
-	lie(24, 18, 0, 4, "pixels; at most");
-	lie(24, 18, 0xffffffff, 4, "pixels; at most");
-	lie(24, 22, 0x80000000, 4, "pixels; at most");
-	lie(24, 18, 4000, 4, "too short for");
-	lie(24, 10, 0xffffffff, 4, "ends too early");
-	lie(24, 28, 16, 2, "16 bits per pixel");
-	lie(8, 30, 1, 4, "compressed");
-	lie(32, 30, 3, 4, "unusual masks");
-	lie(8, 46, 257, 4, "overlaps the pixels");
-	lie(8, 10, 14 + 40 + 255 * 4, 4, "overlaps the pixels");
-	lie(8, 46, 2, 4, "beyond the palette");
+	refuses_changed(24, 14, 13, 4, "a header of an unknown size");
+	refuses_changed(24, 14, 0xffffffff, 4, "a header of an unknown size");
+	refuses_changed(24, 18, 0, 4, "pixels; at most");
+	refuses_changed(24, 18, 0xffffffff, 4, "pixels; at most");
+	refuses_changed(24, 22, 0x80000000, 4, "pixels; at most");
+	refuses_changed(24, 18, 4000, 4, "too short for");
+	refuses_changed(24, 10, 0xffffffff, 4, "ends too early");
+	refuses_changed(24, 28, 16, 2, "16 bits per pixel");
+	refuses_changed(8, 30, 1, 4, "compressed");
+	refuses_changed(32, 30, 3, 4, "unusual masks");
+	refuses_changed(8, 46, 257, 4, "overlaps the pixels");
+	refuses_changed(8, 10, 14 + 40 + 255 * 4, 4, "overlaps the pixels");
+	refuses_changed(8, 46, 2, 4, "beyond the palette");
 	struct bitmap b = bitmap_of(8, false, false, false, false);
 	refuses(b.bytes, 14 + 40 + 4 * 256 - 1, "overlaps the pixels");
 }

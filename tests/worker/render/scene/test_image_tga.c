@@ -26,7 +26,7 @@ struct form {
 };
 
 /* Runs in some rows, across the ends of others, and none. */
-static unsigned level(unsigned x, unsigned y, unsigned k)
+static unsigned level_at(unsigned x, unsigned y, unsigned k)
 {
 	unsigned run = y == 1 ? 0 : y == 2 ? x / 3 : x;
 	return k == 3 ? 100 + 20 * y : 10 + 20 * run + 3 * k;
@@ -54,7 +54,7 @@ static unsigned pixel_of(const struct form *o, unsigned n, unsigned char out[4])
 	if (o->kind == MAPPED)
 		out[0] = (unsigned char)(FIRST + index_at(x, y));
 	for (unsigned k = 0; k < o->bits / 8 && o->kind != MAPPED; k++)
-		out[k] = (unsigned char)level(x, y, k == 3 || o->kind == GREY ? k : 2 - k);
+		out[k] = (unsigned char)level_at(x, y, k == 3 || o->kind == GREY ? k : 2 - k);
 	return o->kind == MAPPED ? 1 : o->bits / 8;
 }
 
@@ -126,9 +126,9 @@ static void refuses(const struct file *f, size_t size, const char *text)
 	arena_fini(&a);
 }
 
-static unsigned stored(const struct form *o, unsigned x, unsigned y, unsigned k)
+static unsigned stored_level(const struct form *o, unsigned x, unsigned y, unsigned k)
 {
-	return o->kind == MAPPED ? map_level(index_at(x, y), k) : level(x, y, k);
+	return o->kind == MAPPED ? map_level(index_at(x, y), k) : level_at(x, y, k);
 }
 
 static void check(const struct form *o, enum image_channel channel)
@@ -145,8 +145,8 @@ static void check(const struct form *o, enum image_channel channel)
 	for (unsigned y = 0; y < HEIGHT; y++)
 		for (unsigned x = 0; x < WIDTH; x++)
 			for (unsigned k = 0; k < channels; k++) {
-				double due = alpha ? o->bits == 32 ? stored(o, x, y, 3) / 255.0 : 1
-						   : srgb_to_linear(stored(o, x, y, k) / 255.0);
+				double due = alpha ? o->bits == 32 ? stored_level(o, x, y, 3) / 255.0 : 1
+						   : srgb_to_linear(stored_level(o, x, y, k) / 255.0);
 				double found = (double)img.pixels[(y * WIDTH + x) * channels + k];
 				if (!(fabs(found - due) < 1e-6))
 					fail_msg("kind %u, %u bits, (%u, %u, %u): %g, not %g", o->kind, o->bits, x, y,
@@ -187,7 +187,7 @@ static void test_signature(void **state)
 	arena_fini(&a);
 }
 
-static void lie(unsigned kind, unsigned bits, size_t at, unsigned value, const char *text)
+static void refuses_changed(unsigned kind, unsigned bits, size_t at, unsigned value, const char *text)
 {
 	const struct form o = {kind, bits, false, false, false};
 	struct file f = file_of(&o);
@@ -198,20 +198,20 @@ static void lie(unsigned kind, unsigned bits, size_t at, unsigned value, const c
 static void test_lies(void **state)
 {
 	(void)state;
-	lie(COLOUR, 24, 2, 4, "pixels of kind 4 with 24 bits");
-	lie(COLOUR, 24, 2, 0, "pixels of kind 0");
-	lie(COLOUR, 24, 16, 16, "with 16 bits");
-	lie(GREY, 8, 16, 24, "pixels of kind 3 with 24 bits");
-	lie(COLOUR, 24, 17, 0x40, "interleaved");
-	lie(COLOUR, 24, 12, 0, "pixels; at most");
-	lie(COLOUR, 24, 13, 100, "too short for");
-	lie(COLOUR, 24, 0, 255, "the header ends too early");
-	lie(COLOUR, 24, 1, 2, "a palette that is not there");
-	lie(MAPPED, 24, 1, 0, "a palette that is not there");
-	lie(MAPPED, 24, 6, 255, "the palette ends too early");
-	lie(MAPPED, 24, 7, 16, "a palette of 16 bits");
-	lie(MAPPED, 24, 3, FIRST + 1, "beyond the palette");
-	lie(MAPPED, 24, 3, FIRST - 1, "beyond the palette");
+	refuses_changed(COLOUR, 24, 2, 4, "pixels of kind 4 with 24 bits");
+	refuses_changed(COLOUR, 24, 2, 0, "pixels of kind 0");
+	refuses_changed(COLOUR, 24, 16, 16, "with 16 bits");
+	refuses_changed(GREY, 8, 16, 24, "pixels of kind 3 with 24 bits");
+	refuses_changed(COLOUR, 24, 17, 0x40, "interleaved");
+	refuses_changed(COLOUR, 24, 12, 0, "pixels; at most");
+	refuses_changed(COLOUR, 24, 13, 100, "too short for");
+	refuses_changed(COLOUR, 24, 0, 255, "the header ends too early");
+	refuses_changed(COLOUR, 24, 1, 2, "a palette that is not there");
+	refuses_changed(MAPPED, 24, 1, 0, "a palette that is not there");
+	refuses_changed(MAPPED, 24, 6, 255, "the palette ends too early");
+	refuses_changed(MAPPED, 24, 7, 16, "a palette of 16 bits");
+	refuses_changed(MAPPED, 24, 3, FIRST + 1, "beyond the palette");
+	refuses_changed(MAPPED, 24, 3, FIRST - 1, "beyond the palette");
 	const struct form o = {COLOUR, 24, true, false, false};
 	struct file f = file_of(&o);
 	f.bytes[13] = 8; /* the best compression could not hold so many */

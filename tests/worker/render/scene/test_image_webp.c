@@ -18,7 +18,7 @@
 
 enum { WIDTH = 13, HEIGHT = 7 };
 
-static uint8_t level(int x, int y, int k)
+static uint8_t level_at(int x, int y, int k)
 {
 	return (uint8_t)(k == 3 ? 255 - 30 * y : 20 * x + 9 * y + 5 * k);
 }
@@ -27,7 +27,7 @@ static void draw(uint8_t *rgba)
 {
 	for (int i = 0; i < WIDTH * HEIGHT; i++)
 		for (int k = 0; k < 4; k++)
-			rgba[4 * i + k] = level(i % WIDTH, i / WIDTH, k);
+			rgba[4 * i + k] = level_at(i % WIDTH, i / WIDTH, k);
 }
 
 static int decode(const void *bytes, size_t size, bool raw, enum image_channel channel, struct arena *a,

@@ -19,7 +19,7 @@
 
 enum { VARIANTS = 3000, SIZE_MAX_BYTES = 8192 };
 
-static size_t below(double u, size_t n)
+static size_t index_below(double u, size_t n)
 {
 	return (size_t)(u * (double)n);
 }
@@ -30,16 +30,16 @@ static size_t damage(unsigned char *out, const unsigned char *in, size_t size, u
 	memcpy(out, in, size);
 	double u[4];
 	rng_uniform4(0x6d757461, RNG_TEST, index, 0, 0, u);
-	uint64_t steps = 1 + below(u[0], 4);
+	uint64_t steps = 1 + index_below(u[0], 4);
 	for (uint64_t s = 0; s < steps && size > 0; s++) {
 		rng_uniform4(0x6d757461, RNG_TEST, index, 1 + s, 0, u);
-		size_t at = below(u[1], size), n = 1 + below(u[2] * u[2], size - at);
-		switch (below(u[0], 5)) {
+		size_t at = index_below(u[1], size), n = 1 + index_below(u[2] * u[2], size - at);
+		switch (index_below(u[0], 5)) {
 		case 0:
-			out[at] ^= (unsigned char)(1 << below(u[3], 8));
+			out[at] ^= (unsigned char)(1 << index_below(u[3], 8));
 			break;
 		case 1:
-			out[at] = (unsigned char)below(u[3], 256);
+			out[at] = (unsigned char)index_below(u[3], 256);
 			break;
 		case 2:
 			memmove(out + at, out + at + n, size - at - n);

@@ -44,7 +44,8 @@ static void expect(const char *sentence)
 
 /* Objects m0, m1, ... m<rungs>, a line each from line 2 on: the first is `leaf`, each other holds the one before
  * `times` times. The end of the scene is left to the caller. */
-static void ladder(const char *element, const char *type, const char *leaf, int rungs, int times, const char *more)
+static void nest_elements(const char *element, const char *type, const char *leaf, int rungs, int times,
+			  const char *more)
 {
 	used = 0;
 	put("<scene version='3.0.0'>\n<%s type='%s' id='m0'/>\n", element, leaf);
@@ -74,11 +75,11 @@ static void test_ladders(void **state)
 		 "s.xml:27: <shape type=\"merge\">: the scene has more than 67108864"},
 	};
 	for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
-		ladder(all[i].element, all[i].type, all[i].leaf, all[i].allowed, 2, all[i].more);
+		nest_elements(all[i].element, all[i].type, all[i].leaf, all[i].allowed, 2, all[i].more);
 		put("</scene>");
 		expect(NULL);
 		for (int rungs = all[i].allowed + 1; rungs <= 200; rungs += 92) {
-			ladder(all[i].element, all[i].type, all[i].leaf, rungs, 2, all[i].more);
+			nest_elements(all[i].element, all[i].type, all[i].leaf, rungs, 2, all[i].more);
 			put("</scene>");
 			expect(all[i].sentence);
 		}
@@ -89,7 +90,7 @@ static void test_ladders(void **state)
 static void test_instances(void **state)
 {
 	(void)state;
-	ladder("shape", "merge", "merge", 16, 2, "");
+	nest_elements("shape", "merge", "merge", 16, 2, "");
 	put("<shape type='shapegroup' id='g'><ref id='m16'/></shape>\n");
 	for (int i = 0; i < 1000; i++)
 		put("<shape type='instance'><ref id='g'/></shape>\n");
@@ -101,13 +102,13 @@ static void test_instances(void **state)
 static void test_shared_materials(void **state)
 {
 	(void)state;
-	ladder("bsdf", "blendbsdf", "diffuse", 14, 2, "");
+	nest_elements("bsdf", "blendbsdf", "diffuse", 14, 2, "");
 	for (int i = 0; i < 5000; i++)
 		put("<shape type='cube'><ref id='m14'/></shape>\n");
 	put("</scene>");
 	expect(NULL);
 	/* but each of these is another one: 2048 * 32768 and more */
-	ladder("bsdf", "blendbsdf", "diffuse", 14, 2, "");
+	nest_elements("bsdf", "blendbsdf", "diffuse", 14, 2, "");
 	for (int i = 0; i < 2048; i++)
 		put("<shape type='cube'><bsdf type='mask'><ref id='m14'/></bsdf></shape>\n");
 	put("</scene>");
@@ -127,13 +128,13 @@ static void test_chains(void **state)
 	for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
 		char sentence[128];
 		snprintf(sentence, sizeof sentence, "%s: objects are nested more than 8192 deep", all[i].place);
-		ladder(all[i].element, all[i].type, all[i].leaf, 8191, 1, "");
+		nest_elements(all[i].element, all[i].type, all[i].leaf, 8191, 1, "");
 		put("</scene>");
 		expect(NULL);
-		ladder(all[i].element, all[i].type, all[i].leaf, 8192, 1, "");
+		nest_elements(all[i].element, all[i].type, all[i].leaf, 8192, 1, "");
 		put("</scene>");
 		expect(sentence);
-		ladder(all[i].element, all[i].type, all[i].leaf, test_scaled() ? 10000 : 60000, 1, "");
+		nest_elements(all[i].element, all[i].type, all[i].leaf, test_scaled() ? 10000 : 60000, 1, "");
 		put("</scene>");
 		expect(sentence);
 	}
@@ -143,7 +144,7 @@ static void test_chains(void **state)
 static void test_the_deepest_is_built(void **state)
 {
 	(void)state;
-	ladder("bsdf", "coating", "diffuse", 8190, 1, "");
+	nest_elements("bsdf", "coating", "diffuse", 8190, 1, "");
 	put("<shape type='sphere'><ref id='m8190'/></shape><sensor type='perspective'><transform name='to_world'>"
 	    "<translate z='-9'/></transform></sensor><emitter type='constant'/></scene>");
 	const struct memory_file files[] = {{"s.xml", xml, used}, {0}};

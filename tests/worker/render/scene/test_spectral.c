@@ -34,7 +34,7 @@ static const struct value *eta_of(const char *version, const char *content)
 	return &node_find(scene.objects[0], "eta")->value;
 }
 
-static double at(const struct value *v, double nm)
+static double value_at(const struct value *v, double nm)
 {
 	assert_int_equal(v->type, VALUE_SPECTRUM);
 	for (uint32_t i = 0; i < v->as.spectrum.count; i++)
@@ -49,13 +49,13 @@ static void test_files(void **state)
 	(void)state;
 	const struct value *v = eta_of("3.0.0", "<spectrum name='eta' filename='a.spd'/>");
 	assert_int_equal(v->as.spectrum.count, 3);
-	assert_true(at(v, 400) == 0.5 && at(v, 500) == 0.25 && at(v, 600) == 0.1);
+	assert_true(value_at(v, 400) == 0.5 && value_at(v, 500) == 0.25 && value_at(v, 600) == 0.1);
 	assert_int_equal(scene.asset_count, 1);
 	assert_string_equal(scene.assets[0], "a.spd");
 	scene_fini(&scene);
 	/* Found in the second folder, and known by that name from then on. */
 	v = eta_of("0.6.0", "<spectrum name='eta' filename='b.spd'/>");
-	assert_true(at(v, 500) == 0.25);
+	assert_true(value_at(v, 500) == 0.25);
 	assert_string_equal(scene.assets[0], "spectra/b.spd");
 	scene_fini(&scene);
 }
@@ -78,11 +78,12 @@ static void test_types(void **state)
 	v = eta_of("3.0.0",
 		   "<spectrum name='eta' type='regular'><float name='wavelength_min' value='400'/>"
 		   "<float name='wavelength_max' value='600'/><string name='values' value='1, 2, 4'/></spectrum>");
-	assert_true(v->as.spectrum.count == 3 && at(v, 400) == 1 && at(v, 500) == 2 && at(v, 600) == 4);
+	assert_true(v->as.spectrum.count == 3 && value_at(v, 400) == 1 && value_at(v, 500) == 2 &&
+		    value_at(v, 600) == 4);
 	scene_fini(&scene);
 	v = eta_of("3.0.0", "<spectrum name='eta' type='irregular'><string name='wavelengths' value='400 450 600'/>"
 			    "<string name='values' value='1 2 4'/></spectrum>");
-	assert_true(v->as.spectrum.count == 3 && at(v, 450) == 2);
+	assert_true(v->as.spectrum.count == 3 && value_at(v, 450) == 2);
 	scene_fini(&scene);
 	v = eta_of("3.0.0", "<spectrum name='eta' type='srgb'><rgb name='color' value='0.5 0.25 1'/></spectrum>");
 	assert_true(v->type == VALUE_RGB && v->as.rgb[1] == 0.25);
@@ -90,7 +91,7 @@ static void test_types(void **state)
 	v = eta_of("3.0.0", "<spectrum name='eta' type='d65'><float name='scale' value='3'/></spectrum>");
 	double y = 0, one = 0; /* luminance 3, as an rgb colour of 3 has it */
 	for (int i = 0; i < CIE_COUNT; i++) {
-		y += at(v, CIE_FIRST_NM + i) * cie_observer[i][1];
+		y += value_at(v, CIE_FIRST_NM + i) * cie_observer[i][1];
 		one += cie_observer[i][1];
 	}
 	assert_true(fabs(y / one - 3) < 1e-12);
@@ -142,18 +143,18 @@ static void test_blackbody(void **state)
 {
 	(void)state;
 	const struct value *v = eta_of("0.6.0", "<blackbody name='eta' temperature='2855.5K'/>");
-	assert_true(fabs(100 * at(v, 400) / at(v, 560) / 14.708 - 1) < 2e-4);
-	assert_true(fabs(100 * at(v, 700) / at(v, 560) / 198.261 - 1) < 2e-4);
+	assert_true(fabs(100 * value_at(v, 400) / value_at(v, 560) / 14.708 - 1) < 2e-4);
+	assert_true(fabs(100 * value_at(v, 700) / value_at(v, 560) / 198.261 - 1) < 2e-4);
 	scene_fini(&scene);
 	v = eta_of("3.0.0",
 		   "<spectrum name='eta' type='blackbody'><float name='temperature' value='5000'/></spectrum>");
-	double full = at(v, 550);
+	double full = value_at(v, 550);
 	assert_true(fabs(full / 1.2703e4 - 1) < 2e-2);
-	assert_true(fabs((0.8 * at(v, 455) + 0.2 * at(v, 460)) / 10997.9 - 1) < 1e-4);
-	assert_true(fabs(at(v, 700) / 11812 - 1) < 1e-5);
+	assert_true(fabs((0.8 * value_at(v, 455) + 0.2 * value_at(v, 460)) / 10997.9 - 1) < 1e-4);
+	assert_true(fabs(value_at(v, 700) / 11812 - 1) < 1e-5);
 	scene_fini(&scene);
 	v = eta_of("0.6.0", "<blackbody name='eta' temperature='5000k' scale='0.5'/>");
-	assert_true(fabs(at(v, 550) / full - 0.5) < 1e-15);
+	assert_true(fabs(value_at(v, 550) / full - 0.5) < 1e-15);
 	scene_fini(&scene);
 }
 

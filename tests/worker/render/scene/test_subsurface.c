@@ -87,7 +87,7 @@ static struct scene read_leniently(const char *xml)
 }
 
 /* The colour of the BSDF of the i-th object. */
-static const double *base(const struct scene *s, unsigned i)
+static const double *base_colour(const struct scene *s, unsigned i)
 {
 	const struct property *p = node_find(node_child(s->objects[i], PLUGIN_BSDF, 0), "diffuse_reflectance");
 	assert_non_null(p);
@@ -127,13 +127,13 @@ static void test_scene(void **state)
 	(void)state;
 	struct scene s = read_leniently(scene_xml);
 	const double eta = 1.5046 / 1.000277;
-	is_base(base(&s, 1), 0, 0.70 / 0.7014, eta); /* skim milk: Jensen et al. 2001, figure 5 */
-	is_base(base(&s, 1), 2, 1.90 / 1.9142, eta);
+	is_base(base_colour(&s, 1), 0, 0.70 / 0.7014, eta); /* skim milk: Jensen et al. 2001, figure 5 */
+	is_base(base_colour(&s, 1), 2, 1.90 / 1.9142, eta);
 	assert_true(node_float(node_child(s.objects[1], PLUGIN_BSDF, 0), "alpha", 0) == 0.3);
 	for (int k = 0; k < 3; k++)
-		is_base(base(&s, 2), k, (const double[]){0.9, 0.75, 0.5}[k], 1.3);
-	is_base(base(&s, 3), 1, 4.5 / 5.5, eta);
-	is_base(base(&s, 4), 0, 0.74 / 0.772, eta); /* skin1 */
+		is_base(base_colour(&s, 2), k, (const double[]){0.9, 0.75, 0.5}[k], 1.3);
+	is_base(base_colour(&s, 3), 1, 4.5 / 5.5, eta);
+	is_base(base_colour(&s, 4), 0, 0.74 / 0.772, eta); /* skin1 */
 	/* Not understood, or nothing to put it below; others that refer to the BSDF have it as it is. */
 	assert_null(node_find(node_child(s.objects[5], PLUGIN_BSDF, 0), "diffuse_reflectance"));
 	assert_null(node_find(node_child(s.objects[8], PLUGIN_BSDF, 0), "diffuse_reflectance"));

@@ -14,7 +14,7 @@
 #define END "</scene>"
 
 /* Exactly these, which the problems begin with; NULL ends them. */
-static void lists(const struct memory_file *files, bool lenient, const char *const *said)
+static void expect_problems(const struct memory_file *files, bool lenient, const char *const *said)
 {
 	struct asset_source assets = memory_assets(files);
 	struct scene s;
@@ -31,7 +31,7 @@ static void lists(const struct memory_file *files, bool lenient, const char *con
 static void lists_of(const char *xml, const char *const *said)
 {
 	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {0}};
-	lists(files, false, said);
+	expect_problems(files, false, said);
 }
 
 /* What uses such a name is not looked at, everything else is. */
@@ -81,7 +81,7 @@ static void test_files_that_are_not_there(void **state)
 					   "there.xml:1: <shape type=\"spher\">: there is no shape",
 					   "there.xml:2: <shape type=\"cub\">: there is no shape",
 					   NULL};
-	lists(files, false, said);
+	expect_problems(files, false, said);
 }
 
 /* A file that cannot be read to its end says nevertheless what it lacked until then. */
@@ -109,7 +109,7 @@ static void test_includes_that_break_off(void **state)
 			  first[] = "<include filename='s.xml' version='3.0.0'><b\xff";
 	const struct memory_file files[] = {
 		{"s.xml", outer, sizeof outer - 1}, {"i.xml", first, sizeof first - 1}, {0}};
-	lists(files, false, inner);
+	expect_problems(files, false, inner);
 }
 
 /* Every duplicate and every alias; what an alias would name is not complained of. */
@@ -150,12 +150,12 @@ static void test_inside_unknown_types(void **state)
 					     "s.xml:6: <shape type=\"rock\">: there is no shape of this type",
 					     "s.xml:6: <bsdf type=\"dul\">: there is no bsdf of this type",
 					     NULL};
-	lists(files, false, strict);
+	expect_problems(files, false, strict);
 	/* What is left out may hold anything. */
 	static const char *const lenient[] = {"s.xml:1: <sensor type=\"distant\">: this sensor of Mitsuba's",
 					      "s.xml:1: <float>: `x` is not a (finite) number",
 					      "s.xml:3: <integer>: width=0 is outside", NULL};
-	lists(files, true, lenient);
+	expect_problems(files, true, lenient);
 }
 
 /* Each step, with the attributes of the <transform> itself, in animations and textures as well. */
@@ -242,7 +242,7 @@ static void test_included_files_that_break_off(void **state)
 					   "s.xml:2: <float>: `r` is not a (finite) number",
 					   "s.xml:5: <shape type=\"cub\">: there is no shape of this type",
 					   NULL};
-	lists(files, false, said);
+	expect_problems(files, false, said);
 }
 
 /* One wrong node, mesh, light or camera of a glTF file does not hide the others; each is said once. */
@@ -280,7 +280,7 @@ static void test_gltf(void **state)
 					   "s.gltf: there is no nodes[9]",
 					   "s.gltf:3: scenes[0]: its nodes are not indices",
 					   NULL};
-	lists(files, false, said);
+	expect_problems(files, false, said);
 }
 
 int main(void)

@@ -21,7 +21,7 @@ struct disk {
 	const char *scene, *there[4], *outside[4];
 };
 
-static bool has(const char *const *list, const char *name)
+static bool is_listed(const char *const *list, const char *name)
 {
 	for (int i = 0; i < 4 && list[i]; i++)
 		if (strcmp(list[i], name) == 0)
@@ -33,9 +33,9 @@ static int disk_open(void *user, const char *name, struct asset *out, struct err
 {
 	const struct disk *d = user;
 	bool scene = strcmp(name, "s.xml") == 0;
-	if (has(d->outside, name))
+	if (is_listed(d->outside, name))
 		return error_set(e, EINVAL, "%s: leads out", name);
-	if (!scene && !has(d->there, name))
+	if (!scene && !is_listed(d->there, name))
 		return error_set(e, ENOENT, "%s: not there", name);
 	const char *bytes = scene ? d->scene : name;
 	*out = (struct asset){.bytes = (const unsigned char *)bytes, .size = strlen(bytes)};
@@ -48,7 +48,7 @@ static void disk_close(void *user, struct asset *a)
 }
 
 /* The name under which a mesh called `written` is read, and how many notes there are. */
-static void finds(struct disk d, const char *paths, const char *written, const char *name, uint32_t notes)
+static void expect_name(struct disk d, const char *paths, const char *written, const char *name, uint32_t notes)
 {
 	char text[512];
 	snprintf(text, sizeof text,
@@ -72,10 +72,11 @@ static void finds(struct disk d, const char *paths, const char *written, const c
 static void test_paths_in_order(void **state)
 {
 	(void)state;
-	finds((struct disk){.there = {"m.ply"}}, PATHS, "m.ply", "m.ply", 0);
-	finds((struct disk){.there = {"m.ply", "a/m.ply"}}, PATHS, "m.ply", "a/m.ply", 0);
-	finds((struct disk){.there = {"m.ply", "a/m.ply", "%2e%2e/b/m.ply"}}, PATHS, "m.ply", "%2e%2e/b/m.ply", 0);
-	finds((struct disk){.there = {"m.ply"}}, PATHS, "none.ply", "none.ply", 0);
+	expect_name((struct disk){.there = {"m.ply"}}, PATHS, "m.ply", "m.ply", 0);
+	expect_name((struct disk){.there = {"m.ply", "a/m.ply"}}, PATHS, "m.ply", "a/m.ply", 0);
+	expect_name((struct disk){.there = {"m.ply", "a/m.ply", "%2e%2e/b/m.ply"}}, PATHS, "m.ply", "%2e%2e/b/m.ply",
+		    0);
+	expect_name((struct disk){.there = {"m.ply"}}, PATHS, "none.ply", "none.ply", 0);
 }
 
 /* One that may not be read is named if no other has the file, so that its opener can say what would allow it. */
@@ -83,22 +84,22 @@ static void test_path_outside(void **state)
 {
 	(void)state;
 	static const char outside[] = "%2e%2e/b/m.ply";
-	finds((struct disk){.outside = {outside}}, PATHS, "m.ply", outside, 0);
-	finds((struct disk){.there = {"m.ply"}, .outside = {outside}}, PATHS, "m.ply", "m.ply", 0);
-	finds((struct disk){.there = {"a/m.ply"}, .outside = {outside}}, PATHS, "m.ply", "a/m.ply", 0);
+	expect_name((struct disk){.outside = {outside}}, PATHS, "m.ply", outside, 0);
+	expect_name((struct disk){.there = {"m.ply"}, .outside = {outside}}, PATHS, "m.ply", "m.ply", 0);
+	expect_name((struct disk){.there = {"a/m.ply"}, .outside = {outside}}, PATHS, "m.ply", "a/m.ply", 0);
 }
 
 /* The longest end that is there; not if the whole path is, or is but may not be read. */
 static void test_ends_of_paths(void **state)
 {
 	(void)state;
-	finds((struct disk){.there = {"x/m.ply", "m.ply"}}, "", "/home/me/x/m.ply", "x/m.ply", 1);
-	finds((struct disk){.there = {"m.ply"}}, "", "/home/me/x/m.ply", "m.ply", 1);
-	finds((struct disk){.there = {"m.ply"}}, "", "C:\\me\\x\\m.ply", "m.ply", 1);
-	finds((struct disk){.there = {"%2f/x/m.ply", "m.ply"}}, "", "/x/m.ply", "%2f/x/m.ply", 0);
-	finds((struct disk){.there = {"m.ply"}, .outside = {"%2f/x/m.ply"}}, "", "/x/m.ply", "%2f/x/m.ply", 0);
-	finds((struct disk){.there = {"m.ply"}}, "", "/x/none.ply", "%2f/x/none.ply", 0);
-	finds((struct disk){.there = {"m.ply"}}, "", "x/m.ply", "x/m.ply", 0);
+	expect_name((struct disk){.there = {"x/m.ply", "m.ply"}}, "", "/home/me/x/m.ply", "x/m.ply", 1);
+	expect_name((struct disk){.there = {"m.ply"}}, "", "/home/me/x/m.ply", "m.ply", 1);
+	expect_name((struct disk){.there = {"m.ply"}}, "", "C:\\me\\x\\m.ply", "m.ply", 1);
+	expect_name((struct disk){.there = {"%2f/x/m.ply", "m.ply"}}, "", "/x/m.ply", "%2f/x/m.ply", 0);
+	expect_name((struct disk){.there = {"m.ply"}, .outside = {"%2f/x/m.ply"}}, "", "/x/m.ply", "%2f/x/m.ply", 0);
+	expect_name((struct disk){.there = {"m.ply"}}, "", "/x/none.ply", "%2f/x/none.ply", 0);
+	expect_name((struct disk){.there = {"m.ply"}}, "", "x/m.ply", "x/m.ply", 0);
 }
 
 int main(void)

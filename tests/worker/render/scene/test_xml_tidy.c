@@ -12,7 +12,7 @@
 
 #include <cmocka.h>
 
-static void becomes(const char *text, const char *wanted)
+static void expect_tidied(const char *text, const char *wanted)
 {
 	size_t size = strlen(text);
 	char *got = xml_tidy(text, &size);
@@ -22,39 +22,39 @@ static void becomes(const char *text, const char *wanted)
 	mem_free(got);
 }
 
-static void stays(const char *text)
+static void expect_unchanged(const char *text)
 {
-	becomes(text, text);
+	expect_tidied(text, text);
 }
 
 static void test_comments(void **state)
 {
 	(void)state;
-	becomes("<a><!-- b -- c\n--- d --></a>", "<a>           \n         </a>");
-	becomes("<!----- Camera -----><a/>", "                     <a/>");
-	becomes("<!--->--><a/><!-- -->", "         <a/>        ");
-	stays("<a/><!-- no end -- ");
-	stays("<a/><!-- no end <!-- either");
+	expect_tidied("<a><!-- b -- c\n--- d --></a>", "<a>           \n         </a>");
+	expect_tidied("<!----- Camera -----><a/>", "                     <a/>");
+	expect_tidied("<!--->--><a/><!-- -->", "         <a/>        ");
+	expect_unchanged("<a/><!-- no end -- ");
+	expect_unchanged("<a/><!-- no end <!-- either");
 }
 
 static void test_ampersands(void **state)
 {
 	(void)state;
-	becomes("<a b='c & d'/>", "<a b='c &amp; d'/>");
-	becomes("<a b='&c;&'/>", "<a b='&amp;c;&amp;'/>");
-	stays("<a b='&amp;&lt;&gt;&quot;&apos;&#65;&#x41;'/>");
-	stays("<a><![CDATA[ & <!-- -- -->]]></a><?pi & ?>");
+	expect_tidied("<a b='c & d'/>", "<a b='c &amp; d'/>");
+	expect_tidied("<a b='&c;&'/>", "<a b='&amp;c;&amp;'/>");
+	expect_unchanged("<a b='&amp;&lt;&gt;&quot;&apos;&#65;&#x41;'/>");
+	expect_unchanged("<a><![CDATA[ & <!-- -- -->]]></a><?pi & ?>");
 }
 
 static void test_declarations(void **state)
 {
 	(void)state;
-	stays("<?xml version='1.0' encoding='ISO-8859-1'?><a/>");
-	stays("\xef\xbb\xbf<?xml version='1.0'?><a/>");
-	becomes("\n <?xml version='1.0'?>\n<a/>", "\n                      \n<a/>");
-	becomes("<!-- x --><?xml version='1.0'?><a/>", "                               <a/>");
-	stays("<a/><?xml version='1.0'?>");
-	stays("\n<?xml version='1.0'");
+	expect_unchanged("<?xml version='1.0' encoding='ISO-8859-1'?><a/>");
+	expect_unchanged("\xef\xbb\xbf<?xml version='1.0'?><a/>");
+	expect_tidied("\n <?xml version='1.0'?>\n<a/>", "\n                      \n<a/>");
+	expect_tidied("<!-- x --><?xml version='1.0'?><a/>", "                               <a/>");
+	expect_unchanged("<a/><?xml version='1.0'?>");
+	expect_unchanged("\n<?xml version='1.0'");
 }
 
 static void test_sizes(void **state)

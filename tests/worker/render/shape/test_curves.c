@@ -20,7 +20,7 @@
 static const double pi = 3.14159265358979323846;
 #define SCALE (pi / TUBE_SIDES / sin(pi / TUBE_SIDES)) /* of radii, tube.h */
 
-static struct built_shape built(const char *type, const char *content, const void *bytes, size_t size)
+static struct built_shape build_curves(const char *type, const char *content, const void *bytes, size_t size)
 {
 	char xml[1024];
 	snprintf(xml, sizeof xml,
@@ -37,7 +37,7 @@ static struct built_shape built(const char *type, const char *content, const voi
 
 static struct built_shape built_ok(const char *type, const char *content, const char *text)
 {
-	struct built_shape b = built(type, content, text, strlen(text));
+	struct built_shape b = build_curves(type, content, text, strlen(text));
 	if (b.result)
 		fail_msg("%s: %s", type, b.error.text);
 	return b;
@@ -319,7 +319,8 @@ static void test_hair(void **state)
 	unsigned char bytes[256];
 	static const char text[] = "0 0 0\n1 0 0\n2 1 0\n\n9 9 9\n\n0 2 0\n0 3 0\n";
 	const char *radius = "<float name='radius' value='0.1'/>";
-	struct built_shape a = built_ok("hair", radius, text), b = built("hair", radius, bytes, binary_hair(bytes)),
+	struct built_shape a = built_ok("hair", radius, text),
+			   b = build_curves("hair", radius, bytes, binary_hair(bytes)),
 			   c = built_ok("linearcurve", "", "0 0 0 0.1\n1 0 0 0.1\n2 1 0 0.1\n\n0 2 0 0.1\n0 3 0 0.1\n"),
 			   d = built_ok("hair", "", text),
 			   s = built_ok("hair",
@@ -364,7 +365,7 @@ static void test_bad_files(void **state)
 		{"hair", "BINARY_HAI 0 0", "m:1: a control point has 3 numbers"},
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-		struct built_shape b = built(cases[i].type, "", cases[i].text, strlen(cases[i].text));
+		struct built_shape b = build_curves(cases[i].type, "", cases[i].text, strlen(cases[i].text));
 		if (b.result >= 0 || !strstr(b.error.text, cases[i].error))
 			fail_msg("%d: %s\n not: %s", b.result, b.error.text, cases[i].error);
 		built_shape_release(&b);
@@ -372,12 +373,12 @@ static void test_bad_files(void **state)
 	unsigned char bytes[256];
 	size_t size = binary_hair(bytes);
 	for (size_t n = 15; n < size; n++) {
-		struct built_shape b = built("hair", "", bytes, n);
+		struct built_shape b = build_curves("hair", "", bytes, n);
 		if (b.result >= 0 || !strstr(b.error.text, "m: ends before its last"))
 			fail_msg("%zu of %zu bytes: %d: %s", n, size, b.result, b.error.text);
 		built_shape_release(&b);
 	}
-	struct built_shape b = built("hair", "<float name='reduction' value='0.5'/>", bytes, size);
+	struct built_shape b = build_curves("hair", "<float name='reduction' value='0.5'/>", bytes, size);
 	assert_true(b.result < 0 && strstr(b.error.text, "\"reduction\" is only supported as 0"));
 	built_shape_release(&b);
 }
@@ -400,7 +401,7 @@ static void test_extremes(void **state)
 			used += (size_t)snprintf(text + used, sizeof text - used, "%s %s %s %s\n", v[0], v[1], v[2],
 						 v[3][0] == '-' ? v[3] + 1 : v[3]);
 		}
-		struct built_shape b = built(round % 4 < 2 ? "linearcurve" : "bsplinecurve", "", text, used);
+		struct built_shape b = build_curves(round % 4 < 2 ? "linearcurve" : "bsplinecurve", "", text, used);
 		assert_true(b.result <= 0);
 		meshes += b.result == 0 && b.g.mesh.triangle_count > 0;
 		for (uint32_t i = 0; b.result == 0 && i < b.g.mesh.vertex_count; i++) {

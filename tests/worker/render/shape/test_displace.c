@@ -60,7 +60,7 @@ static void release(struct built *b)
 }
 
 /* Different at the two ends of each unit, and nowhere smooth: the hardest case for seams. */
-static double rough(const void *user, double u, double v)
+static double rough_height(const void *user, double u, double v)
 {
 	(void)user;
 	double x = sin(127.1 * u + 311.7 * v) * 43758.5;
@@ -73,7 +73,7 @@ static double waves(const void *user, double u, double v)
 	return sin(2 * M_PI * u) * cos(2 * M_PI * v) + 0.3 * u * v;
 }
 
-static double one(const void *user, double u, double v)
+static double unit_height(const void *user, double u, double v)
 {
 	(void)user, (void)u, (void)v;
 	return 1;
@@ -167,7 +167,7 @@ static void test_no_cracks(void **state)
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
 		for (uint32_t level = 0; level < 5; level++) {
-			struct displacement d = {rough, NULL, false, 0.05, level, 1};
+			struct displacement d = {rough_height, NULL, false, 0.05, level, 1};
 			struct built b = build_ok(cases[i].type, cases[i].content, cases[i].obj, &d);
 			const struct mesh *m = &b.g.mesh;
 			assert_int_equal(m->triangle_count, cases[i].base << 2 * level);
@@ -183,7 +183,7 @@ static void test_no_cracks(void **state)
 static void test_unused_vertices_stay(void **state)
 {
 	(void)state;
-	struct displacement d = {one, NULL, true, 3, 2, 1};
+	struct displacement d = {unit_height, NULL, true, 3, 2, 1};
 	struct built b =
 		build_ok("obj", "", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 9 9 9\nv 9 9 9\nv 9 8 9\nf 1 2 3\nf 4 5 6\n", &d);
 	assert_int_equal(b.g.mesh.triangle_count, 16);
@@ -199,7 +199,7 @@ static void test_height_zero_is_the_base(void **state)
 	(void)state;
 	static const char *const types[] = {"cube", "rectangle", "sphere", "obj", "obj"};
 	for (size_t i = 0; i < 5; i++) {
-		struct displacement d = {rough, NULL, false, 0, 3, 1};
+		struct displacement d = {rough_height, NULL, false, 0, 3, 1};
 		const char *content = i == 4 ? "<boolean name='face_normals' value='true'/>" : "";
 		struct built b = build_ok(types[i], content, i >= 3 ? TETRAHEDRON : NULL, &d);
 		const struct mesh *m = &b.g.mesh;
@@ -233,7 +233,7 @@ static void test_height_zero_is_the_base(void **state)
 static void test_constant_on_a_cube(void **state)
 {
 	(void)state;
-	struct displacement d = {one, NULL, true, 0.25, 3, 1};
+	struct displacement d = {unit_height, NULL, true, 0.25, 3, 1};
 	struct built b = build_ok("cube", "", NULL, &d);
 	const struct mesh *m = &b.g.mesh;
 	uint32_t corners = 0, edges = 0, faces = 0;
@@ -363,8 +363,8 @@ static void ball(double u, double v, vec3 *p, vec3 *n)
 
 /* Positions lie on the surface; normals are off by the square of the step (a quarter at the next level), what is
  * interpolated from them has derivatives off by the step (a half). */
-static void approaches(const char *type, double (*height)(const void *, double, double), double scale, surface *of,
-		       double margin)
+static void expect_convergence(const char *type, double (*height)(const void *, double, double), double scale,
+			       surface *of, double margin)
 {
 	struct misses last = {0, 0, 0};
 	for (uint32_t level = 5; level <= 7; level++) {
@@ -387,13 +387,13 @@ static void approaches(const char *type, double (*height)(const void *, double, 
 static void test_plane_approaches(void **state)
 {
 	(void)state;
-	approaches("rectangle", waves, 0.2, plane, 0);
+	expect_convergence("rectangle", waves, 0.2, plane, 0);
 }
 
 static void test_ball_approaches(void **state)
 {
 	(void)state;
-	approaches("sphere", bumps, 0.1, ball, 0.1);
+	expect_convergence("sphere", bumps, 0.1, ball, 0.1);
 }
 
 /* At the poles, where u says nothing, the normal is right too. */

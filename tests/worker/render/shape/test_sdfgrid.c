@@ -24,7 +24,7 @@ static void fill(struct vol *v, uint32_t nx, uint32_t ny, uint32_t nz, vol_field
 	vol_make(v, (const uint32_t[3]){nx, ny, nz}, 1, f);
 }
 
-static struct built_shape built(const char *content, const struct vol *v)
+static struct built_shape build_grid(const char *content, const struct vol *v)
 {
 	char xml[512];
 	snprintf(xml, sizeof xml,
@@ -109,7 +109,7 @@ static vec3 gradient_of(vol_field *f, vec3 p)
 
 static void check_body(const struct vol *v, vol_field *f, double volume, double most_degrees)
 {
-	struct built_shape b = built("", v), flat = built("<string name='normals' value='analytic'/>", v);
+	struct built_shape b = build_grid("", v), flat = build_grid("<string name='normals' value='analytic'/>", v);
 	if (b.result || flat.result)
 		fail_msg("%s%s", b.error.text, flat.error.text);
 	const struct mesh *m = &b.g.mesh;
@@ -161,7 +161,7 @@ static void test_plane(void **state)
 	(void)state;
 	static struct vol v;
 	fill(&v, 2, 5, 9, slope);
-	struct built_shape b = built("", &v);
+	struct built_shape b = build_grid("", &v);
 	assert_int_equal(b.result, 0);
 	const struct mesh *m = &b.g.mesh;
 	const vec3 normal = vec3_normalize((vec3){2, 1, -1});
@@ -193,7 +193,7 @@ static void test_noise(void **state)
 					v.value[at] = (float)(face || dice_below(&d, 2) ? value : -value);
 				}
 		vol_write(&v);
-		struct built_shape b = built("<string name='normals' value='analytic'/>", &v);
+		struct built_shape b = build_grid("<string name='normals' value='analytic'/>", &v);
 		if (b.result) {
 			assert_non_null(strstr(b.error.text, "there is no surface"));
 		} else {
@@ -207,7 +207,7 @@ static void test_noise(void **state)
 
 static void refuses(const struct vol *v, const char *text)
 {
-	struct built_shape b = built("", v);
+	struct built_shape b = build_grid("", v);
 	if (b.result >= 0 || !strstr(b.error.text, text))
 		fail_msg("%d: %s\n not: %s", b.result, b.error.text, text);
 	built_shape_release(&b);
@@ -256,7 +256,7 @@ static void test_bad_files(void **state)
 		for (size_t i = 0; i < 64; i++)
 			v.value[i] = numbers[dice_below(&d, sizeof numbers / sizeof *numbers)];
 		vol_write(&v);
-		struct built_shape b = built("", &v);
+		struct built_shape b = build_grid("", &v);
 		assert_true(b.result <= 0);
 		for (uint32_t i = 0; b.result == 0 && i < b.g.mesh.vertex_count; i++)
 			for (int k = 0; k < 3; k++)
@@ -270,7 +270,7 @@ static void test_memory_runs_out(void **state)
 	(void)state;
 	static struct vol v;
 	fill(&v, 6, 6, 6, ball);
-	struct built_shape b = built("", &v);
+	struct built_shape b = build_grid("", &v);
 	const struct memory_file files[] = {{"m", v.bytes, v.size}, {0}};
 	built_shape_without_memory(&b.scene, files, 6);
 	built_shape_release(&b);

@@ -58,15 +58,15 @@ static struct built build_ok(const char *type, const char *content, const char *
 	return b;
 }
 
-static vec3 at(const double v[3])
+static vec3 to_vec3(const double v[3])
 {
 	return (vec3){v[0], v[1], v[2]};
 }
 
 static vec3 triangle_normal(const struct mesh *m, uint32_t i)
 {
-	vec3 a = at(m->position[m->index[i][0]]), b = at(m->position[m->index[i][1]]),
-	     c = at(m->position[m->index[i][2]]);
+	vec3 a = to_vec3(m->position[m->index[i][0]]), b = to_vec3(m->position[m->index[i][1]]),
+	     c = to_vec3(m->position[m->index[i][2]]);
 	return vec3_normalize(vec3_cross(vec3_sub(b, a), vec3_sub(c, a)));
 }
 
@@ -82,11 +82,11 @@ static void assert_facing(const struct mesh *m, double sign)
 	for (uint32_t i = 0; i < m->triangle_count; i++) {
 		vec3 g = triangle_normal(m, i);
 		for (int k = 0; k < 3; k++) {
-			vec3 p = at(m->position[m->index[i][k]]);
+			vec3 p = to_vec3(m->position[m->index[i][k]]);
 			assert_true(sign * vec3_dot(g, p) > 0);
 			if (m->normal) {
-				assert_true(sign * vec3_dot(at(m->normal[m->index[i][k]]), p) > 0);
-				assert_true(fabs(vec3_length(at(m->normal[m->index[i][k]])) - 1) < 1e-12);
+				assert_true(sign * vec3_dot(to_vec3(m->normal[m->index[i][k]]), p) > 0);
+				assert_true(fabs(vec3_length(to_vec3(m->normal[m->index[i][k]])) - 1) < 1e-12);
 			}
 		}
 	}
@@ -101,13 +101,13 @@ static void test_rectangle(void **state)
 	for (uint32_t i = 0; i < 4; i++) {
 		assert_true(fabs(m->position[i][0]) == 1 && fabs(m->position[i][1]) == 1 && m->position[i][2] == 0);
 		assert_true(m->uv[i][0] == (m->position[i][0] + 1) / 2 && m->uv[i][1] == (m->position[i][1] + 1) / 2);
-		assert_vec3(at(m->normal[i]), 0, 0, 1);
+		assert_vec3(to_vec3(m->normal[i]), 0, 0, 1);
 	}
 	assert_vec3(triangle_normal(m, 0), 0, 0, 1);
 	assert_vec3(triangle_normal(m, 1), 0, 0, 1);
 	release(&b);
 	b = build_ok("rectangle", "<boolean name='flip_normals' value='true'/>", NULL);
-	assert_vec3(at(b.g.mesh.normal[0]), 0, 0, -1);
+	assert_vec3(to_vec3(b.g.mesh.normal[0]), 0, 0, -1);
 	assert_vec3(triangle_normal(&b.g.mesh, 0), 0, 0, -1);
 	release(&b);
 }
@@ -180,8 +180,8 @@ static double area(const struct mesh *m)
 {
 	double sum = 0;
 	for (uint32_t i = 0; i < m->triangle_count; i++) {
-		vec3 a = at(m->position[m->index[i][0]]), b = at(m->position[m->index[i][1]]),
-		     c = at(m->position[m->index[i][2]]);
+		vec3 a = to_vec3(m->position[m->index[i][0]]), b = to_vec3(m->position[m->index[i][1]]),
+		     c = to_vec3(m->position[m->index[i][2]]);
 		sum += 0.5 * vec3_length(vec3_cross(vec3_sub(b, a), vec3_sub(c, a)));
 	}
 	return sum;
@@ -204,7 +204,7 @@ static void test_ellipsoid(void **state)
 		vec3 o = {-p[0] / 2, p[1] + p[0] / 4, p[2] / 3};
 		assert_true(fabs(vec3_length(o) - 2) < 1e-12);
 		vec3 n = vec3_normalize((vec3){-o.x / 2 + o.y / 4, o.y, o.z / 3});
-		assert_true(vec3_length(vec3_sub(n, at(m->normal[i]))) < 1e-6);
+		assert_true(vec3_length(vec3_sub(n, to_vec3(m->normal[i]))) < 1e-6);
 	}
 	assert_facing(m, 1);
 	release(&b);
@@ -228,7 +228,7 @@ static void test_disk(void **state)
 	for (uint32_t i = 0; i < m->triangle_count; i++)
 		assert_vec3(triangle_normal(m, i), 0, 0, 1);
 	for (uint32_t i = 0; i < m->vertex_count; i++) {
-		vec3 p = at(m->position[i]);
+		vec3 p = to_vec3(m->position[i]);
 		double r = hypot(p.x, p.y) / 3, u = m->uv[i][0], turn = atan2(p.y, p.x) / (2 * M_PI);
 		assert_true(p.z == 1 && fabs(r - u) < 1e-4 && m->uv[i][1] >= 0 && m->uv[i][1] <= 1);
 		assert_true(u == 0 || fabs(m->uv[i][1] - turn - floor(m->uv[i][1] - turn + 0.5)) < 1e-12);
@@ -246,13 +246,13 @@ static void test_cylinder(void **state)
 	const struct mesh *m = &b.g.mesh;
 	assert_true(fabs(area(m) / (2 * M_PI * 0.5 * 4) - 1) < 1e-4);
 	for (uint32_t i = 0; i < m->vertex_count; i++) {
-		vec3 p = at(m->position[i]), out = vec3_normalize((vec3){p.x - 1, 0, p.z});
+		vec3 p = to_vec3(m->position[i]), out = vec3_normalize((vec3){p.x - 1, 0, p.z});
 		assert_true(fabs(hypot(p.x - 1, p.z) - 0.5) < 1e-4);
-		assert_true(vec3_length(vec3_sub(out, at(m->normal[i]))) < 1e-12);
+		assert_true(vec3_length(vec3_sub(out, to_vec3(m->normal[i]))) < 1e-12);
 		assert_true(p.y == 4 * m->uv[i][1]);
 	}
 	for (uint32_t i = 0; i < m->triangle_count; i++)
-		assert_true(vec3_dot(triangle_normal(m, i), at(m->normal[m->index[i][0]])) > 0.99);
+		assert_true(vec3_dot(triangle_normal(m, i), to_vec3(m->normal[m->index[i][0]])) > 0.99);
 	release(&b);
 	b = build("cylinder", "<point name='p0' x='1' y='0' z='0'/><point name='p1' x='1' y='0' z='0'/>", NULL);
 	assert_int_equal(b.result, -EINVAL);
@@ -271,12 +271,12 @@ static void test_obj_polygons(void **state)
 	assert_null(b.g.mesh.uv);
 	assert_vec3(triangle_normal(&b.g.mesh, 0), 0, 0, 1);
 	assert_vec3(triangle_normal(&b.g.mesh, 1), 0, 0, 1);
-	assert_vec3(at(b.g.mesh.normal[2]), 0, 0, 1);
+	assert_vec3(to_vec3(b.g.mesh.normal[2]), 0, 0, 1);
 	release(&b);
 	/* Backwards indices, joined lines, blanks, carriage returns, colours after positions. */
 	b = build_ok("obj", "", "v 0 0 0 1 1 1\r\nv 1 0 \\\r\n 0\r\n  v\t1 1 0\r\nf -3 \\\n -2 -1 # end");
 	assert_int_equal(b.g.mesh.triangle_count, 1);
-	assert_vec3(at(b.g.mesh.position[b.g.mesh.index[0][1]]), 1, 0, 0);
+	assert_vec3(to_vec3(b.g.mesh.position[b.g.mesh.index[0][1]]), 1, 0, 0);
 	release(&b);
 }
 
@@ -380,8 +380,8 @@ static void test_obj_attributes(void **state)
 	assert_true(m->uv[t[1]][1] == 1);
 	assert_int_equal(t[2], s[1]);
 	assert_int_not_equal(t[0], s[0]);
-	assert_vec3(at(m->normal[t[0]]), 0, 0, 1);
-	assert_vec3(at(m->normal[s[0]]), 0, 0.6, 0.8);
+	assert_vec3(to_vec3(m->normal[t[0]]), 0, 0, 1);
+	assert_vec3(to_vec3(m->normal[s[0]]), 0, 0.6, 0.8);
 	release(&b);
 	b = build_ok("obj", "<boolean name='flip_tex_coords' value='false'/>", obj);
 	assert_true(b.g.mesh.uv[b.g.mesh.index[0][0]][1] == 0.25);
@@ -403,7 +403,7 @@ static void test_smooth_normals(void **state)
 	struct built b = build_ok("obj", "", OCTAHEDRON);
 	assert_facing(&b.g.mesh, 1);
 	for (uint32_t i = 0; i < 6; i++) /* by symmetry the normal of a corner is its place */
-		assert_vec3(at(b.g.mesh.normal[i]), b.g.mesh.position[i][0], b.g.mesh.position[i][1],
+		assert_vec3(to_vec3(b.g.mesh.normal[i]), b.g.mesh.position[i][0], b.g.mesh.position[i][1],
 			    b.g.mesh.position[i][2]);
 	release(&b);
 	b = build_ok("obj", "<transform name='to_world'><scale x='-1' y='2' z='3'/></transform>", OCTAHEDRON);
@@ -420,7 +420,7 @@ static void test_normals_are_weighted_by_angle(void **state)
 	(void)state;
 	struct built b =
 		build_ok("obj", "", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 9\nv 0.5 0.5 0\nf 1 2 5\nf 1 5 3\nf 1 3 4\n");
-	vec3 n = at(b.g.mesh.normal[b.g.mesh.index[0][0]]);
+	vec3 n = to_vec3(b.g.mesh.normal[b.g.mesh.index[0][0]]);
 	assert_vec3(n, sqrt(0.5), 0, sqrt(0.5));
 	release(&b);
 }
@@ -434,7 +434,7 @@ static void test_normals_decide_the_outside(void **state)
 	b = build_ok("obj", "<transform name='to_world'><scale z='-1'/></transform>",
 		     SQUARE "vn 0 0 -1\nf 1//1 2//1 3//1\n");
 	assert_vec3(triangle_normal(&b.g.mesh, 0), 0, 0, 1);
-	assert_vec3(at(b.g.mesh.normal[0]), 0, 0, 1);
+	assert_vec3(to_vec3(b.g.mesh.normal[0]), 0, 0, 1);
 	release(&b);
 }
 

@@ -76,7 +76,7 @@ static uint32_t inverse(uint32_t odd)
 }
 
 /* Finite floats that all fall on one slot of the hash table. */
-static void collide(float *x, uint32_t count)
+static void fill_with_collisions(float *x, uint32_t count)
 {
 	uint32_t unmix = inverse(0x9e3779b1u), found = 0;
 	for (uint32_t low = 0; found < count; low++) {
@@ -94,7 +94,7 @@ static void test_collisions(void **state)
 	enum { NUMBERS = 30000, SIDE = 256 };
 	struct image from = {SIDE, SIDE, 1, malloc(sizeof(float) * SIDE * SIDE)};
 	assert_non_null(from.pixels);
-	collide(from.pixels, NUMBERS);
+	fill_with_collisions(from.pixels, NUMBERS);
 	for (size_t k = NUMBERS; k < (size_t)SIDE * SIDE; k++)
 		from.pixels[k] = from.pixels[k % NUMBERS];
 	check(&from, 0);
@@ -109,7 +109,7 @@ static void test_far_number(void **state)
 	enum { NUMBERS = 200, SIDE = 256, FEW = 256 };
 	struct image from = {SIDE, SIDE, 1, malloc(sizeof(float) * SIDE * SIDE)};
 	assert_non_null(from.pixels);
-	collide(from.pixels, NUMBERS);
+	fill_with_collisions(from.pixels, NUMBERS);
 	for (size_t k = NUMBERS; k < (size_t)SIDE * SIDE; k++)
 		from.pixels[k] = from.pixels[k < (size_t)SIDE * SIDE - FEW ? 0 : NUMBERS - 1];
 	check(&from, 1);

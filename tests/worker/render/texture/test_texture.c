@@ -54,7 +54,7 @@ static int teardown(void **state)
 	return 0;
 }
 
-static int try(struct fixture *f, const char *text, enum color_role role, struct texture *t, struct error *e)
+static int try_texture(struct fixture *f, const char *text, enum color_role role, struct texture *t, struct error *e)
 {
 	struct scene_node *owner = node_make(&f->arena, PLUGIN_BSDF, "owner");
 	node_add_ref(&f->arena, owner, "reflectance", node_make(&f->arena, PLUGIN_TEXTURE, text));
@@ -65,7 +65,7 @@ static struct texture make_texture(struct fixture *f, const char *text, enum col
 {
 	struct texture t;
 	struct error e;
-	if (try(f, text, role, &t, &e))
+	if (try_texture(f, text, role, &t, &e))
 		fail_msg("%s: %s", text, e.text);
 	return t;
 }
@@ -258,7 +258,7 @@ static void test_refusals_say_why(void **state)
 	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
 		struct texture t;
 		struct error e = {{0}};
-		if (try(*state, bad[i].text, COLOR_REFLECTANCE, &t, &e) >= 0 || !strstr(e.text, bad[i].word))
+		if (try_texture(*state, bad[i].text, COLOR_REFLECTANCE, &t, &e) >= 0 || !strstr(e.text, bad[i].word))
 			fail_msg("%s: \"%s\" does not say \"%s\"", bad[i].text, e.text, bad[i].word);
 	}
 }
@@ -395,7 +395,7 @@ static void test_numbers(void **state)
 	assert_true(x.v[2] > 2 * x.v[1]);
 }
 
-static struct texture tinted(struct fixture *f, const char *scale, const char *inner, enum color_role role)
+static struct texture tinted_texture(struct fixture *f, const char *scale, const char *inner, enum color_role role)
 {
 	struct scene_node *n = node_make(&f->arena, PLUGIN_TEXTURE, scale);
 	struct texture t;
@@ -415,17 +415,17 @@ static void test_tint(void **state)
 	assert_int_equal(color_from_rgb(tint, COLOR_REFLECTANCE, &other), 0);
 	spectrum a = color_eval_rgb_reflectance(red, &colour), b = color_eval(&other, &colour),
 		 light = color_eval_rgb_illuminant(red, &colour);
-	struct texture t = tinted(f, "scale scale=rgb(0.25,1,0.5)", "bitmap filename=p1", COLOR_REFLECTANCE),
-		       lamp = tinted(f, "scale scale=rgb(1,4,2)", "bitmap filename=p1", COLOR_ILLUMINANT);
+	struct texture t = tinted_texture(f, "scale scale=rgb(0.25,1,0.5)", "bitmap filename=p1", COLOR_REFLECTANCE),
+		       lamp = tinted_texture(f, "scale scale=rgb(1,4,2)", "bitmap filename=p1", COLOR_ILLUMINANT);
 	spectrum x = look_up(&t, 0.25, 0.5, &colour), y = look_up(&lamp, 0.25, 0.5, &colour);
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
 		assert_true(fabs(x.v[i] - a.v[i] * b.v[i]) < 1e-12);
 		assert_true(fabs(y.v[i] - 4 * light.v[i] * b.v[i]) < 1e-12 * y.v[i]);
 		assert_true(x.v[i] <= texture_max(&t));
 	}
-	t = tinted(f, "scale scale=rgb(0.25,1,0.5)", "bitmap filename=p0", COLOR_REFLECTANCE);
+	t = tinted_texture(f, "scale scale=rgb(0.25,1,0.5)", "bitmap filename=p0", COLOR_REFLECTANCE);
 	assert_int_equal(texture_shape(&t), COLOR_SHAPE_OTHER);
-	t = tinted(f, "scale scale=rgb(0.5,0.5,0.5)", "bitmap filename=p0", COLOR_REFLECTANCE);
+	t = tinted_texture(f, "scale scale=rgb(0.5,0.5,0.5)", "bitmap filename=p0", COLOR_REFLECTANCE);
 	assert_int_equal(texture_shape(&t), COLOR_SHAPE_CONSTANT);
 	assert_value(&t, 0.5 / 3, 0.75, 0.375);
 	struct scene_node *n = node_make(&f->arena, PLUGIN_TEXTURE, "scale scale=rgb(1,1,0)");

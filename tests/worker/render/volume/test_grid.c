@@ -68,7 +68,7 @@ static void set_box(struct grid *g)
 }
 
 /* As volume.c makes them: the box ends half a cell behind the points, or at the points where outside is 0. */
-static void make(struct trial *t, struct dice *d, bool upright)
+static void make_trial(struct trial *t, struct dice *d, bool upright)
 {
 	struct grid *g = &t->g;
 	*g = (struct grid){.channels = dice_below(d, 2) ? 3 : 1,
@@ -102,7 +102,7 @@ static void test_values(void **state)
 	struct dice d = dice_of("values of grids");
 	unsigned inside = 0;
 	for (int round = 0; round < 4000; round++) {
-		make(&t, &d, round % 2 == 0);
+		make_trial(&t, &d, round % 2 == 0);
 		mat4 back;
 		assert_true(mat4_invert(t.g.to_cells, &back));
 		for (int i = 0; i < 4; i++) {
@@ -196,7 +196,7 @@ static void test_rays(void **state)
 	unsigned met = 0;
 	for (int round = 0; round < 3000; round++) {
 		bool whole = round % 2 == 0;
-		make(&t, &d, whole);
+		make_trial(&t, &d, whole);
 		for (int i = 0; i < 4; i++) {
 			struct grid_ray r = some_ray(&t.g, &d, whole);
 			double sum[3];
@@ -225,7 +225,7 @@ static void test_hard_rays(void **state)
 	struct dice d = dice_of("hard rays through grids");
 	const double slopes[] = {0, -0.0, 1e-320, -1e-320, 1e-200, -1e-200, 1e-30, -1e-17};
 	for (int round = 0; round < 2000; round++) {
-		make(&t, &d, true);
+		make_trial(&t, &d, true);
 		double x = dice_between(&d, 0, 3), y = dice_between(&d, 0, 3), sum[3], straight[3];
 		double slope = slopes[dice_below(&d, sizeof slopes / sizeof *slopes)];
 		struct grid_ray r = {{x, y, -4}, {slope, slope, 1}, 0, INFINITY},

@@ -23,7 +23,7 @@
 static struct vol grid, second;
 static const vec3 along_z = {0, 0, 1};
 
-static double numbers(double x, double y, double z, uint32_t channel)
+static double linear_field(double x, double y, double z, uint32_t channel)
 {
 	return 0.3 + 0.1 * x + 0.2 * y * z + 0.05 * channel * x;
 }
@@ -140,7 +140,7 @@ static void test_places(void **state)
 		 {1, 3, 5},
 		 false},
 	};
-	vol_make(&grid, (const uint32_t[3]){4, 3, 5}, 1, numbers);
+	vol_make(&grid, (const uint32_t[3]){4, 3, 5}, 1, linear_field);
 	vol_set_box(&grid, (const float[3]){-1, -2, 0}, (const float[3]){3, 1, 0.5f});
 	for (size_t i = 0; i < sizeof places / sizeof *places; i++)
 		check_place(&places[i]);
@@ -150,7 +150,7 @@ static void test_places(void **state)
 static void test_turned(void **state)
 {
 	(void)state;
-	vol_make(&grid, (const uint32_t[3]){4, 3, 5}, 1, numbers);
+	vol_make(&grid, (const uint32_t[3]){4, 3, 5}, 1, linear_field);
 	const double c = cos(0.5), s = sin(0.5);
 	for (int old = 0; old <= 1; old++) {
 		char inner[1024];
@@ -205,7 +205,7 @@ static void test_outside(void **state)
 		{"0.6.0", "", 0.5, 0.5},
 	};
 	const struct wavelengths wl = wavelengths_sample(0.3);
-	vol_make(&grid, (const uint32_t[3]){2, 2, 2}, 1, numbers);
+	vol_make(&grid, (const uint32_t[3]){2, 2, 2}, 1, linear_field);
 	for (size_t i = 0; i < 8; i++)
 		grid.value[i] = i % 2 ? 0.75f : 0.25f;
 	vol_write(&grid);
@@ -232,7 +232,7 @@ static void test_colours(void **state)
 {
 	(void)state;
 	enum { WAVELENGTHS = 4000 };
-	vol_make(&grid, (const uint32_t[3]){1, 1, 1}, 3, numbers);
+	vol_make(&grid, (const uint32_t[3]){1, 1, 1}, 3, linear_field);
 	const struct wavelengths rgb = {.rgb = true};
 	for (int k = 0; k < 4; k++) {
 		for (int i = 0; i < 3; i++)
@@ -346,7 +346,7 @@ static void test_bytes(void **state)
 {
 	(void)state;
 	const struct wavelengths wl = wavelengths_sample(0.3);
-	vol_make(&grid, (const uint32_t[3]){2, 1, 1}, 1, numbers);
+	vol_make(&grid, (const uint32_t[3]){2, 1, 1}, 1, linear_field);
 	vol_put32(&grid, 4, 3);
 	grid.bytes[VOL_HEAD] = 51;
 	grid.bytes[VOL_HEAD + 1] = 255;
@@ -366,8 +366,8 @@ static void test_shared(void **state)
 	(void)state;
 	static const char other[] =
 		"<volume type='gridvolume' name='albedo'><string name='filename' value='h.vol'/></volume>";
-	vol_make(&second, (const uint32_t[3]){2, 2, 2}, 1, numbers);
-	vol_make(&grid, (const uint32_t[3]){4, 3, 5}, 1, numbers);
+	vol_make(&second, (const uint32_t[3]){2, 2, 2}, 1, linear_field);
+	vol_make(&grid, (const uint32_t[3]){4, 3, 5}, 1, linear_field);
 	struct world *w = world_with("3.0.0", GRID("sigma_t", "") GRID("albedo", TWICE));
 	assert_ptr_equal(w->media[0].first.grid->value, w->media[0].second.grid->value);
 	assert_ptr_equal(w->media[0].first.grid->full, w->media[0].second.grid->full);
@@ -391,7 +391,7 @@ static void refused(const char *version, const char *inner, const char *sentence
 static void test_refused(void **state)
 {
 	(void)state;
-	vol_make(&grid, (const uint32_t[3]){4, 3, 5}, 1, numbers);
+	vol_make(&grid, (const uint32_t[3]){4, 3, 5}, 1, linear_field);
 	world_of_files_refused(scene_of("3.0.0", "homogeneous", GRID("sigma_t", "")),
 			       "sigma_t is the same everywhere in a homogeneous medium");
 	/* A turn by 90 degrees as exporters write it. */
@@ -419,7 +419,7 @@ static void test_refused(void **state)
 		"this volume of Mitsuba's is not supported; --lenient leaves it out (supported: constvolume, gridvolume)");
 	refused("3.0.0", GRID("sigma_x", ""), "`sigma_x`");
 	refused("3.0.0", "<volume type='constvolume' name='albedo'><float name='value' value='1.5'/></volume>", "1.5");
-	vol_make(&grid, (const uint32_t[3]){4, 1, 5}, 1, numbers);
+	vol_make(&grid, (const uint32_t[3]){4, 1, 5}, 1, linear_field);
 	refused("0.6.0", GRID("density", "") EVEN, "its box, or its grid, is flat along y");
 	vol_set_box(&grid, (const float[3]){0, 0, 1}, (const float[3]){1, 1, 1});
 	refused("3.0.0", GRID("sigma_t", "<boolean name='use_grid_bbox' value='true'/>"), "is flat along z");
@@ -464,7 +464,7 @@ static void test_effects(void **state)
 {
 	(void)state;
 	const struct wavelengths wl = wavelengths_sample(0.3);
-	vol_make(&grid, (const uint32_t[3]){1, 1, 1}, 1, numbers); /* 0.3 */
+	vol_make(&grid, (const uint32_t[3]){1, 1, 1}, 1, linear_field); /* 0.3 */
 	static const struct {
 		const char *effects;
 		double share; /* of sigma_t that is left */

@@ -23,7 +23,7 @@ enum { SIDE = 8, SPP = 64 };
 #define TWO_SIDES "<bsdf type='twosided'>" GREY "</bsdf>"
 
 /* The mean luminance of a rectangle that fills the picture. */
-static double shown(const char *accuracy, const char *material, bool back)
+static double mean_luminance(const char *accuracy, const char *material, bool back)
 {
 	worlds_accuracy = accuracy;
 	/* clang-format off */
@@ -40,7 +40,7 @@ static double shown(const char *accuracy, const char *material, bool back)
 	return lease_brightness(w, SIDE, SPP, 2);
 }
 
-static void backs(void **state)
+static void backs_by_material_and_setting(void **state)
 {
 	(void)state;
 	static const struct {
@@ -57,7 +57,7 @@ static void backs(void **state)
 		static const char *const how[] = {"backs=lit", "backs=black", "backs=auto"};
 		for (int k = 0; k < 6; k++) {
 			const double back = k % 3 ? cases[i].black : cases[i].lit;
-			double is = shown(how[k % 3], cases[i].material, k / 3),
+			double is = mean_luminance(how[k % 3], cases[i].material, k / 3),
 			       expected = k / 3 ? back : cases[i].front;
 			print_message("%zu, %s, %s: %.4f of %.4f\n", i, k / 3 ? "back" : "front", how[k % 3], is,
 				      expected);
@@ -67,7 +67,7 @@ static void backs(void **state)
 }
 
 /* One in twenty of what is seen, under the file's own rule; lamps, glass and what has two sides do not count. */
-static void note(void **state)
+static void one_sided_materials_are_noted(void **state)
 {
 	(void)state;
 	static const struct {
@@ -134,8 +134,8 @@ static void integrators_agree(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(backs),
-		cmocka_unit_test(note),
+		cmocka_unit_test(backs_by_material_and_setting),
+		cmocka_unit_test(one_sided_materials_are_noted),
 		cmocka_unit_test(integrators_agree),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

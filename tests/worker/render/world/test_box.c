@@ -11,7 +11,7 @@
 
 #include <cmocka.h>
 
-static bool holds(const struct box *b, vec3 p, double out)
+static bool is_inside(const struct box *b, vec3 p, double out)
 {
 	return p.x >= b->low.x - out && p.x <= b->high.x + out && p.y >= b->low.y - out && p.y <= b->high.y + out &&
 	       p.z >= b->low.z - out && p.z <= b->high.z + out;
@@ -38,8 +38,8 @@ static void test_points(void **state)
 		bool near = false, inside = false;
 		w = vec3_normalize(w);
 		for (double t = 0; t <= length; t += out) {
-			near |= holds(&b, vec3_madd(p, t, w), out);
-			inside |= holds(&b, vec3_madd(p, t, w), 0);
+			near |= is_inside(&b, vec3_madd(p, t, w), out);
+			inside |= is_inside(&b, vec3_madd(p, t, w), 0);
 		}
 		bool is = box_is_met(&b, p, w, length);
 		assert_true(!inside || is);

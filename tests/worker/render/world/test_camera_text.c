@@ -26,7 +26,7 @@ static void camera_of(const char *sensor, char text[RENDER_CAMERA_TEXT], mat4 *m
 	world_free(w);
 }
 
-static void has(const char *text, const char *part)
+static void expect_part(const char *text, const char *part)
 {
 	if (!strstr(text, part))
 		fail_msg("\"%s\" does not say \"%s\"", text, part);
@@ -61,11 +61,11 @@ static void test_text(void **state)
 	assert_true(strncmp(text, "perspective fov=45 fov_axis=x ", 30) == 0);
 	assert_true(fabs(m.m[2][3] + 1 + 1 / tan(M_PI / 8)) < 1e-9);
 	camera_of("<sensor type='orthographic'>" LOOK FILM "</sensor>", text, &m);
-	has(text, "orthographic half_width=1 near_clip=");
+	expect_part(text, "orthographic half_width=1 near_clip=");
 	camera_of("<sensor type='perspective'><float name='fov' value='40'/><float name='principal_point_offset_x' "
 		  "value='0.25'/>" LOOK FILM "</sensor>",
 		  text, &m);
-	has(text, " principal_point_offset_x=0.25 principal_point_offset_y=0 ");
+	expect_part(text, " principal_point_offset_x=0.25 principal_point_offset_y=0 ");
 }
 
 static void check_note(const char *scene, bool dark)
@@ -75,7 +75,7 @@ static void check_note(const char *scene, bool dark)
 	char text[512];
 	world_summary(w, &s);
 	assert_true(render_scene_note(&s, 0, text, sizeof text));
-	has(text, "the scene has no <sensor>");
+	expect_part(text, "the scene has no <sensor>");
 	assert_int_equal(strstr(text, "the image is black") != NULL, dark);
 	world_free(w);
 }

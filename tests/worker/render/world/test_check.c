@@ -40,7 +40,7 @@ static void check(const char *xml, struct checked *c)
 		fail_msg("%s", e.text);
 }
 
-static void finish(struct checked *c)
+static void free_checked(struct checked *c)
 {
 	scene_fini(&c->scene);
 	arena_fini(&c->arena);
@@ -71,7 +71,7 @@ static void test_all_problems(void **state)
 		if (i >= COUNT || strncmp(c.found.problems[i], expected[i], strlen(expected[i])) != 0)
 			fail_msg("problem %u: %s", i, c.found.problems[i]);
 	assert_int_equal(c.found.problem_count, COUNT);
-	finish(&c);
+	free_checked(&c);
 }
 
 static void test_good_scene(void **state)
@@ -88,7 +88,7 @@ static void test_good_scene(void **state)
 	const struct render_options as_it_is = {0};
 	assert_int_equal(render_check(&c.scene, &assets, &as_it_is, &alone, &e), 0);
 	assert_true(c.summary.shapes == 1 && alone.shapes == 1 && c.summary.brightest == alone.brightest);
-	finish(&c);
+	free_checked(&c);
 }
 
 /* Of most metals Mitsuba has two tables, and here is one: that is said, unless Mitsuba has this one alone. */
@@ -104,7 +104,7 @@ static void test_second_tables(void **state)
 	assert_int_equal(c.scene.note_count, 1);
 	assert_string_equal(c.scene.notes[0],
 			    "s.xml:2: <bsdf type=\"conductor\">: the indices of Cu are used for Cu_palik");
-	finish(&c);
+	free_checked(&c);
 }
 
 /* A name that Mitsuba has and this does not is unknown, and stands for nothing. */
@@ -123,7 +123,7 @@ static void test_unknown_metals(void **state)
 	assert_non_null(strstr(c.found.problems[0], ", W, none)"));
 	assert_non_null(strstr(c.found.problems[1], "unknown conductor \"Agg\"; did you mean `Ag`?"));
 	assert_non_null(strstr(c.found.problems[2], "unknown conductor \"Gold\"; did you mean `Au`?"));
-	finish(&c);
+	free_checked(&c);
 }
 
 static void test_unknown_indices(void **state)
@@ -140,7 +140,7 @@ static void test_unknown_indices(void **state)
 	assert_non_null(
 		strstr(c.found.problems[2], "\"Kryptonite\"; a number is accepted, too (known: vacuum, helium, "));
 	assert_non_null(strstr(c.found.problems[2], ", sapphire (o))"));
-	finish(&c);
+	free_checked(&c);
 }
 
 /* The texture inside, which Mitsuba 0.6 takes; a value alone is no mistake. */
@@ -160,7 +160,7 @@ static void test_values_beside_textures(void **state)
 	assert_string_equal(c.scene.notes[0],
 			    "s.xml:3: <texture type=\"scale\">: `value` has no effect: the texture inside is scaled, "
 			    "as in Mitsuba 0.6");
-	finish(&c);
+	free_checked(&c);
 }
 
 /* No more than there is room for. */
@@ -178,7 +178,7 @@ static void test_too_many(void **state)
 	struct checked c;
 	check(xml, &c);
 	assert_int_equal(c.found.problem_count, REPORT_PROBLEMS_MAX);
-	finish(&c);
+	free_checked(&c);
 	free(xml);
 }
 

@@ -26,7 +26,7 @@
 	"<texture name='displacement' type='bitmap'><string name='filename' value='h.png'/>" inner "</texture>"
 #define RECTANGLE(inner) SENSOR("0,0,5", "0,0,0") "<shape type='rectangle'>" inner "</shape>"
 
-static const struct effect_line *effect(const struct world *w)
+static const struct effect_line *effect_named(const struct world *w)
 {
 	for (size_t i = 0; i < w->effects.line_count; i++)
 		if (strcmp(w->effects.lines[i].name, "displacement") == 0)
@@ -39,15 +39,16 @@ static void test_effect(void **state)
 {
 	(void)state;
 	struct world *w = world_of_text(8, 8, RECTANGLE("") "%s", "");
-	assert_false(effect(w)->on);
-	assert_string_equal(effect(w)->why, "no shape is displaced");
+	assert_false(effect_named(w)->on);
+	assert_string_equal(effect_named(w)->why, "no shape is displaced");
 	world_free(w);
 	w = world_of_text(8, 8,
 			  RECTANGLE(CHECKERS SCALE("0.1") LEVEL("6")) "<shape type='sphere'>" CHECKERS SCALE("0.1")
 				  LEVEL("3") "</shape>%s",
 			  "");
-	assert_true(effect(w)->on);
-	assert_string_equal(effect(w)->why, "the rectangle in test.xml:1 and 1 more are displaced: 8704 triangles");
+	assert_true(effect_named(w)->on);
+	assert_string_equal(effect_named(w)->why,
+			    "the rectangle in test.xml:1 and 1 more are displaced: 8704 triangles");
 	assert_false(w->shapes[1].is_sphere);
 	world_free(w);
 }

@@ -33,7 +33,7 @@
 #define BOX(size, inner) \
 	"<shape type='cube'><transform name='to_world'><scale value='" size "'/></transform>" inner "</shape>"
 
-static struct world *forced(const char *effects, const char *scene)
+static struct world *world_with_effects(const char *effects, const char *scene)
 {
 	worlds_effects = effects;
 	struct world *w = world_of_text(16, 16, "%s", scene);
@@ -52,7 +52,7 @@ static const struct effect_line *line_of(const struct world *w, const char *name
 
 static void expect(const char *scene, const char *name, bool on, const char *why)
 {
-	struct world *w = forced(NULL, scene);
+	struct world *w = world_with_effects(NULL, scene);
 	const struct effect_line *l = line_of(w, name);
 	if (l->on != on || strcmp(l->why, why) != 0)
 		fail_msg("%s: %s, \"%s\"", name, l->on ? "on" : "off", l->why);
@@ -102,7 +102,7 @@ static void test_what_does_not_enclose(void **state)
 		/* clang-format on */
 	};
 	for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++) {
-		struct world *w = forced(NULL, scenes[i]);
+		struct world *w = world_with_effects(NULL, scenes[i]);
 		if (!w->effects.dispersion)
 			fail_msg("scene %zu: %s", i, line_of(w, "dispersion")->why);
 		world_free(w);
@@ -171,13 +171,13 @@ static void test_surfaces(void **state)
 static void test_forced(void **state)
 {
 	(void)state;
-	struct world *w = forced("+dispersion", VIEW LAMP BALL("1", "<bsdf type='dielectric' id='g'/>"));
+	struct world *w = world_with_effects("+dispersion", VIEW LAMP BALL("1", "<bsdf type='dielectric' id='g'/>"));
 	assert_true(w->effects.dispersion && w->effects.colour && line_of(w, "dispersion")->forced &&
 		    line_of(w, "colour")->forced);
 	assert_non_null(strstr(line_of(w, "colour")->why, "dispersion needs it"));
 	assert_true(w->bsdfs[w->parts[1].bsdf].dispersive);
 	world_free(w);
-	w = forced("-dispersion", VIEW LAMP SF11("sf") BALL("1", USES("sf")));
+	w = world_with_effects("-dispersion", VIEW LAMP SF11("sf") BALL("1", USES("sf")));
 	assert_true(!w->effects.dispersion && line_of(w, "dispersion")->forced &&
 		    line_of(w, "dispersion")->other_scene);
 	struct render_summary s;
@@ -186,13 +186,13 @@ static void test_forced(void **state)
 	render_effects_note(&s, note, sizeof note);
 	assert_string_equal(note, "the image is of another scene: without dispersion");
 	world_free(w);
-	w = forced("-half-vectors,-area-light", VIEW LAMP BALL("1", "<bsdf type='dielectric'/>"));
+	w = world_with_effects("-half-vectors,-area-light", VIEW LAMP BALL("1", "<bsdf type='dielectric'/>"));
 	world_summary(w, &s);
 	render_effects_note(&s, note, sizeof note);
 	assert_string_equal(note, "the image is of another scene: without area-light");
 	assert_true(w->emitter_cdf[w->emitter_count] == 0);
 	world_free(w);
-	w = forced("all", VIEW LAMP BALL("1", ""));
+	w = world_with_effects("all", VIEW LAMP BALL("1", ""));
 	assert_true(w->effects.aperture && camera_has_aperture(&w->camera) && line_of(w, "half-vectors")->on &&
 		    w->effects.max_depth == 128);
 	world_free(w);
@@ -207,26 +207,26 @@ static void test_forced(void **state)
 static void test_scattering(void **state)
 {
 	(void)state;
-	struct world *w = forced("", VIEW LAMP BALL("1", CLOUD("0")));
+	struct world *w = world_with_effects("", VIEW LAMP BALL("1", CLOUD("0")));
 	assert_true(w->effects.absorption && !w->effects.scattering && !w->parts[1].passable);
 	assert_string_equal(line_of(w, "scattering")->why, "no medium scatters");
 	world_free(w);
-	w = forced("", VIEW LAMP BALL("1", CLOUD("2")));
+	w = world_with_effects("", VIEW LAMP BALL("1", CLOUD("2")));
 	assert_true(w->effects.absorption && w->effects.scattering && w->parts[1].passable && w->has_passable);
 	assert_true(w->media[0].scatters && w->media[0].absorbs);
 	assert_non_null(strstr(line_of(w, "scattering")->why, "borders on a medium that scatters"));
 	world_free(w);
-	w = forced("", VIEW LAMP BALL("1", CLOUD("2") "<emitter type='area'/>"));
+	w = world_with_effects("", VIEW LAMP BALL("1", CLOUD("2") "<emitter type='area'/>"));
 	assert_true(w->effects.scattering && !w->has_passable); /* what shines is a vertex */
 	world_free(w);
-	w = forced("-scattering", VIEW LAMP BALL("1", CLOUD("2")));
+	w = world_with_effects("-scattering", VIEW LAMP BALL("1", CLOUD("2")));
 	assert_true(!w->effects.scattering && !w->media[0].scatters && w->media[0].absorbs && !w->has_passable);
 	assert_true(line_of(w, "scattering")->other_scene);
 	world_free(w);
-	w = forced("-absorption", VIEW LAMP BALL("1", CLOUD("2")));
+	w = world_with_effects("-absorption", VIEW LAMP BALL("1", CLOUD("2")));
 	assert_true(w->media[0].scatters && !w->media[0].absorbs);
 	world_free(w);
-	w = forced("", "<sensor type='perspective'><medium type='homogeneous' name='m'/></sensor>" LAMP);
+	w = world_with_effects("", "<sensor type='perspective'><medium type='homogeneous' name='m'/></sensor>" LAMP);
 	assert_true(w->effects.scattering && w->camera_medium == 1 && w->effects.max_depth == 128);
 	world_free(w);
 	char text[PLAN_EFFECTS_MAX];
@@ -240,24 +240,24 @@ static void test_medium_light(void **state)
 {
 	(void)state;
 #define GLOW(radiance) "<emitter type='volumelight'><rgb name='radiance' value='" radiance "'/></emitter>"
-	struct world *w = forced("", VIEW BALL("1", CLOUD("0") GLOW("2,2,2")));
+	struct world *w = world_with_effects("", VIEW BALL("1", CLOUD("0") GLOW("2,2,2")));
 	assert_true(w->effects.medium_light && w->effects.scattering && w->parts[0].passable && w->emitter_count == 0);
 	assert_true(!w->effects.colour && w->effects.max_depth == 128 && !w->media[0].scatters);
 	assert_string_equal(line_of(w, "scattering")->why, "no medium scatters");
 	assert_non_null(strstr(line_of(w, "medium-light")->why, "borders on a medium that shines"));
 	world_free(w);
-	w = forced("", VIEW BALL("1", CLOUD("0") GLOW("2,1,2")));
+	w = world_with_effects("", VIEW BALL("1", CLOUD("0") GLOW("2,1,2")));
 	assert_true(w->effects.colour);
 	world_free(w);
-	w = forced("", VIEW LAMP BALL("1", CLOUD("0") GLOW("0,0,0")));
+	w = world_with_effects("", VIEW LAMP BALL("1", CLOUD("0") GLOW("0,0,0")));
 	assert_true(!w->effects.medium_light && !w->effects.scattering);
 	assert_string_equal(line_of(w, "medium-light")->why, "no medium shines");
 	world_free(w);
-	w = forced("-medium-light", VIEW LAMP BALL("1", CLOUD("2") GLOW("2,2,2")));
+	w = world_with_effects("-medium-light", VIEW LAMP BALL("1", CLOUD("2") GLOW("2,2,2")));
 	assert_true(!w->effects.medium_light && w->effects.scattering && !w->media[0].shines && w->media[0].scatters);
 	assert_true(line_of(w, "medium-light")->other_scene);
 	world_free(w);
-	w = forced("-scattering", VIEW LAMP BALL("1", CLOUD("2") GLOW("2,2,2")));
+	w = world_with_effects("-scattering", VIEW LAMP BALL("1", CLOUD("2") GLOW("2,2,2")));
 	assert_true(w->effects.medium_light && w->media[0].shines && !w->media[0].scatters && w->media[0].absorbs);
 	world_free(w);
 }
@@ -267,23 +267,23 @@ static void test_transparent_shadows(void **state)
 {
 	(void)state;
 #define PANE "<shape type='rectangle'><bsdf type='thindielectric' id='pane'/></shape>"
-	struct world *w = forced("", VIEW LAMP PANE);
+	struct world *w = world_with_effects("", VIEW LAMP PANE);
 	assert_true(w->effects.transparent_shadows);
 	assert_string_equal(line_of(w, "transparent-shadows")->why, "`pane` lets light straight through");
 	world_free(w);
-	w = forced("-transparent-shadows", VIEW LAMP PANE);
+	w = world_with_effects("-transparent-shadows", VIEW LAMP PANE);
 	assert_true(!w->effects.transparent_shadows && !line_of(w, "transparent-shadows")->other_scene);
 	world_free(w);
 	static const char *const without[] = {VIEW LAMP "<shape type='sphere'><bsdf type='dielectric'/></shape>",
 					      VIEW LAMP "<shape type='sphere'><bsdf type='hair'/></shape>"};
 	for (int i = 0; i < 2; i++) {
-		w = forced("", without[i]);
+		w = world_with_effects("", without[i]);
 		assert_true(!w->effects.transparent_shadows);
 		assert_string_equal(line_of(w, "transparent-shadows")->why,
 				    "no material that light meets lets light straight through");
 		world_free(w);
 	}
-	w = forced("+transparent-shadows", VIEW LAMP BALL("1", CLOUD("2")) PANE);
+	w = world_with_effects("+transparent-shadows", VIEW LAMP BALL("1", CLOUD("2")) PANE);
 	assert_true(!w->effects.transparent_shadows && !line_of(w, "transparent-shadows")->on);
 	assert_non_null(strstr(line_of(w, "transparent-shadows")->why, "`null` alone"));
 	world_free(w);
@@ -294,12 +294,12 @@ static void test_refracted_shadows(void **state)
 {
 	(void)state;
 #define POOL "<shape type='rectangle'><bsdf type='dielectric' id='water'/></shape>"
-	struct world *w = forced("", VIEW LAMP POOL);
+	struct world *w = world_with_effects("", VIEW LAMP POOL);
 	assert_true(w->effects.refracted_shadows);
 	assert_string_equal(line_of(w, "refracted-shadows")->why, "`water` refracts light exactly");
 	assert_true(w->refracting.low.x < w->refracting.high.x);
 	world_free(w);
-	w = forced("-refracted-shadows", VIEW LAMP POOL);
+	w = world_with_effects("-refracted-shadows", VIEW LAMP POOL);
 	assert_true(!w->effects.refracted_shadows && !line_of(w, "refracted-shadows")->other_scene);
 	assert_true(w->refracting.low.x > w->refracting.high.x);
 	world_free(w);
@@ -309,13 +309,13 @@ static void test_refracted_shadows(void **state)
 		VIEW LAMP "<shape type='sphere'><bsdf type='mask'><float name='opacity' value='.5'/><bsdf "
 			  "type='dielectric'/></bsdf></shape>"};
 	for (size_t i = 0; i < sizeof without / sizeof *without; i++) {
-		w = forced("", without[i]);
+		w = world_with_effects("", without[i]);
 		assert_true(!w->effects.refracted_shadows);
 		assert_string_equal(line_of(w, "refracted-shadows")->why,
 				    "no material that light meets refracts light exactly");
 		world_free(w);
 	}
-	w = forced("+refracted-shadows", VIEW LAMP BALL("1", CLOUD("2")) POOL);
+	w = world_with_effects("+refracted-shadows", VIEW LAMP BALL("1", CLOUD("2")) POOL);
 	assert_true(!w->effects.refracted_shadows && !line_of(w, "refracted-shadows")->on);
 	world_free(w);
 }

@@ -44,7 +44,7 @@ enum { PLACES = 4 };
 
 /* A pot with a flat foot at y = -0.47, which is no float in its frame: n around, rows upwards, smooth with texture
  * coordinates. */
-static size_t pot(char *out, size_t size, int n, int rows)
+static size_t print_pot(char *out, size_t size, int n, int rows)
 {
 	size_t at = 0;
 	for (int j = 0; j <= rows; j++)
@@ -77,10 +77,10 @@ static size_t pot(char *out, size_t size, int n, int rows)
 
 /* `common` comes first, `inside` is what stands in each place; shared: by one group, else by one for each, which is
  * used once and built as if it were written out. */
-static struct world *pots(bool shared, const char *common, const char *inside, int n, int rows)
+static struct world *world_of_pots(bool shared, const char *common, const char *inside, int n, int rows)
 {
 	static char obj[1 << 19], xml[1 << 14];
-	size_t size = pot(obj, sizeof obj, n, rows), at = 0;
+	size_t size = print_pot(obj, sizeof obj, n, rows), at = 0;
 	at += (size_t)snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s", common);
 	for (int k = 0; k < PLACES; k++) {
 		if (k == 0 || !shared)
@@ -102,7 +102,7 @@ static struct world *pots(bool shared, const char *common, const char *inside, i
 	"<bsdf type='diffuse'/></bsdf>"
 
 /* Vertices are rounded in the mesh's frame instead of the world's: by parts in 2^24 of either. */
-static double apart(vec3 a, vec3 b)
+static double distance(vec3 a, vec3 b)
 {
 	return vec3_length(vec3_sub(a, b));
 }
@@ -111,7 +111,8 @@ static double apart(vec3 a, vec3 b)
 static void compare_surfaces(const char *shape, bool tangents, double turn)
 {
 	struct dice d = dice_of("surfaces of instances");
-	struct world *a = pots(true, VIEW SKY, shape, 24, 16), *b = pots(false, VIEW SKY, shape, 24, 16);
+	struct world *a = world_of_pots(true, VIEW SKY, shape, 24, 16),
+		     *b = world_of_pots(false, VIEW SKY, shape, 24, 16);
 	assert_int_equal(a->shape_count, PLACES);
 	assert_int_equal(b->shape_count, PLACES);
 	assert_int_equal(a->instance_count, PLACES);
@@ -136,14 +137,14 @@ static void compare_surfaces(const char *shape, bool tangents, double turn)
 			surface_on_triangle(t, prim, b1, b2, &y);
 			/* The scenes' boxes differ, and with them their centres. */
 			vec3 p = vec3_madd(a->center, 1 / a->scale, x.p), q = vec3_madd(b->center, 1 / b->scale, y.p);
-			assert_true(apart(p, q) < 1e-6);
-			assert_true(apart(x.ng, y.ng) < 1e-4 && apart(x.sh.n, y.sh.n) < 1e-5);
-			assert_true(apart(x.sh.s, y.sh.s) < turn && apart(x.sh.t, y.sh.t) < turn);
+			assert_true(distance(p, q) < 1e-6);
+			assert_true(distance(x.ng, y.ng) < 1e-4 && distance(x.sh.n, y.sh.n) < 1e-5);
+			assert_true(distance(x.sh.s, y.sh.s) < turn && distance(x.sh.t, y.sh.t) < turn);
 			assert_true(fabs(x.u - y.u) < 1e-6 && fabs(x.v - y.v) < 1e-6);
 			surface_change_of(s, &x, &c);
 			surface_change_of(t, &y, &e);
 			for (int m = 0; m < 2; m++)
-				assert_true(apart(vec3_scale(a->scale, c.dn[m]), vec3_scale(b->scale, e.dn[m])) <
+				assert_true(distance(vec3_scale(a->scale, c.dn[m]), vec3_scale(b->scale, e.dn[m])) <
 					    2 * turn * (1 + vec3_length(c.dn[m])));
 		}
 	}
@@ -169,8 +170,8 @@ static void test_coincident(void **state)
 			lift ? VIEW SKY "<shape type='rectangle'>" TO(
 				       "<scale value='5'/><rotate x='1' angle='-90'/><translate y='0.01'/>") "</shape>"
 			     : VIEW SKY FLOOR;
-		struct world *a = pots(true, floor, FILE_OF(GLASS), 24, 16),
-			     *b = pots(false, floor, FILE_OF(GLASS), 24, 16);
+		struct world *a = world_of_pots(true, floor, FILE_OF(GLASS), 24, 16),
+			     *b = world_of_pots(false, floor, FILE_OF(GLASS), 24, 16);
 		assert_int_equal(a->instance_count, PLACES);
 		assert_true((a->coincidence != NULL) == !lift && (b->coincidence != NULL) == !lift);
 		if (!lift) {
@@ -193,14 +194,14 @@ static void test_displaced(void **state)
 #define DISPLACED                                                                               \
 	"<float name='displacement' value='1'/><float name='displacement_scale' value='0.05'/>" \
 	"<integer name='displacement_level' value='1'/>"
-	struct world *a = pots(true, VIEW SKY, FILE_OF(DISPLACED), 12, 8),
-		     *b = pots(false, VIEW SKY, FILE_OF(DISPLACED), 12, 8);
+	struct world *a = world_of_pots(true, VIEW SKY, FILE_OF(DISPLACED), 12, 8),
+		     *b = world_of_pots(false, VIEW SKY, FILE_OF(DISPLACED), 12, 8);
 	assert_int_equal(a->instance_count, 1); /* of the four one is merely moved */
 	for (uint32_t k = 0; k < PLACES; k++) {
 		struct surface_point x, y;
 		surface_on_triangle(&a->shapes[k], (struct prim_ref){k, 77, 0}, 0.3, 0.3, &x);
 		surface_on_triangle(&b->shapes[k], (struct prim_ref){k, 77, 0}, 0.3, 0.3, &y);
-		assert_true(apart(vec3_madd(a->center, 1 / a->scale, x.p), vec3_madd(b->center, 1 / b->scale, y.p)) <
+		assert_true(distance(vec3_madd(a->center, 1 / a->scale, x.p), vec3_madd(b->center, 1 / b->scale, y.p)) <
 			    1e-6);
 	}
 	world_free(a);
@@ -216,7 +217,7 @@ static void test_not_shared(void **state)
 		FILE_OF("<emitter type='area'><float name='radiance' value='1'/></emitter>"),
 	};
 	for (size_t i = 0; i < sizeof inside / sizeof *inside; i++) {
-		struct world *w = pots(true, VIEW SKY, inside[i], 12, 8);
+		struct world *w = world_of_pots(true, VIEW SKY, inside[i], 12, 8);
 		assert_int_equal(w->instance_count, 0);
 		assert_int_equal(w->shape_count, PLACES);
 		world_free(w);
@@ -240,7 +241,7 @@ static void test_images(void **state)
 			"<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>"
 		"</shape>";
 	/* clang-format on */
-	struct world *a = pots(true, room, inside, 24, 16), *b = pots(false, room, inside, 24, 16);
+	struct world *a = world_of_pots(true, room, inside, 24, 16), *b = world_of_pots(false, room, inside, 24, 16);
 	assert_int_equal(a->instance_count, 2 * PLACES);
 	static struct agree_image shared, written, chains;
 	agree_render(a, __func__, "instances", &(struct agree_side){"path", 640, 32, 0, 0}, &shared);

@@ -47,7 +47,7 @@ static const struct course courses[] = {
 };
 enum { COURSES = sizeof courses / sizeof *courses };
 
-static double between(const double v[2], double t)
+static double at_time(const double v[2], double t)
 {
 	return (1 - t) * v[0] + t * v[1];
 }
@@ -59,7 +59,7 @@ static size_t put_steps(char *out, size_t size, const struct course *c, double t
 		at[i] = (1 - t) * c->at[0][i] + t * c->at[1][i];
 	return (size_t)snprintf(
 		out, size, "<scale value='%.17g'/><rotate %s angle='%.17g'/><translate x='%.17g' y='%.17g' z='%.17g'/>",
-		between(c->scale, t), c->axis, between(c->turn, t), at[0], at[1], at[2]);
+		at_time(c->scale, t), c->axis, at_time(c->turn, t), at[0], at[1], at[2]);
 }
 
 /* As shape k is at time t; below 0: as it moves. */
@@ -296,7 +296,7 @@ static struct world *lights_at(double t)
 	return world_of_files(32, 32, files);
 }
 
-static void same(double a, double b, double tolerance)
+static void expect_close(double a, double b, double tolerance)
 {
 	if (!(fabs(a - b) <= tolerance * fabs(b)))
 		fail_msg("%.17g is not %.17g", a, b);
@@ -332,8 +332,8 @@ static void check_light(const struct world *moving, const struct world *still, u
 	assert_true(a->ops->sample_point(a, u, &x, &p));
 	assert_true(b->ops->sample_point(b, u, &y, &q));
 	near_point(moving, still, &x, &y, 100 * OFF); /* of a narrow triangle's cell */
-	same(per_area(moving, a, p), per_area(still, b, q), OFF);
-	same(a->ops->pdf_point(a, &x), p, 1e-9);
+	expect_close(per_area(moving, a, p), per_area(still, b, q), OFF);
+	expect_close(a->ops->pdf_point(a, &x), p, 1e-9);
 	if (moving->emitter_shape[id] != UINT32_MAX) {
 		const struct prim_ref prim = {moving->emitter_shape[id], x.where.prim, t};
 		struct surface_point on;
@@ -348,11 +348,11 @@ static void check_light(const struct world *moving, const struct world *still, u
 		assert_true(a->ops->sample_direction(a, &x, v, &from, &p));
 		assert_true(b->ops->sample_direction(b, &y, v, &to, &q));
 		near(from, to, 1e-4);
-		same(p, q, 2e-2);
+		expect_close(p, q, 2e-2);
 		double l = a->ops->radiance(a, &x, from, &grey).v[0], m = b->ops->radiance(b, &y, to, &grey).v[0];
-		same(a->delta ? l / (moving->scale * moving->scale) : l,
-		     a->delta ? m / (still->scale * still->scale) : m, 2e-2);
-		same(a->ops->pdf_direction(a, &x, from), p, 1e-9);
+		expect_close(a->delta ? l / (moving->scale * moving->scale) : l,
+			     a->delta ? m / (still->scale * still->scale) : m, 2e-2);
+		expect_close(a->ops->pdf_direction(a, &x, from), p, 1e-9);
 	}
 	vec3 ref = vec3_scale(dice_between(d, 0, 4), dice_direction(d));
 	bool met = emitter_sample_toward(a, in_world(moving, ref), u, &x, &p),
@@ -360,8 +360,8 @@ static void check_light(const struct world *moving, const struct world *still, u
 	if (!met || !met2)
 		return;
 	near_point(moving, still, &x, &y, 100 * OFF); /* at the edge of a cone */
-	same(per_area(moving, a, p), per_area(still, b, q), 1e-3);
-	same(emitter_pdf_toward(a, in_world(moving, ref), &x), p, 1e-6);
+	expect_close(per_area(moving, a, p), per_area(still, b, q), 1e-3);
+	expect_close(emitter_pdf_toward(a, in_world(moving, ref), &x), p, 1e-6);
 }
 
 static void test_lights(void **state)
@@ -417,7 +417,7 @@ static void test_stretched(void **state)
 			share[i] = em->ops->pdf_point(em, &x) * area_at(w, i, times[k]);
 			sum += share[i];
 		}
-		same(sum, 1, 1e-12);
+		expect_close(sum, 1, 1e-12);
 		for (size_t i = 0; i < n; i++) {
 			const double u[2] = {dice_throw(&d), dice_throw(&d)};
 			struct emitter_point x;
@@ -451,7 +451,7 @@ static void check_power(const char *shape, double area)
 	for (size_t i = 0; i < w->effects.line_count; i++)
 		said |= strstr(w->effects.lines[i].why, "moves while the shutter is open") != NULL;
 	assert_true(said); /* one thing, not a shape and an emitter */
-	same(em->power / (M_PI * em->brightest * w->scale * w->scale), area * 7 / 3, 1e-3);
+	expect_close(em->power / (M_PI * em->brightest * w->scale * w->scale), area * 7 / 3, 1e-3);
 	world_free(w);
 }
 

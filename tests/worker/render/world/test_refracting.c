@@ -29,7 +29,7 @@ static struct world *world_with(const char *shapes)
 }
 
 /* In the scene's lengths. */
-static vec3 place(const struct world *w, uint32_t i)
+static vec3 place_of(const struct world *w, uint32_t i)
 {
 	return vec3_add(vec3_scale(1 / w->scale, w->refracting_points[i].p), w->center);
 }
@@ -50,7 +50,7 @@ static void test_spread(void **state)
 	assert_int_equal(w->refracting_point_count, 128);
 	for (uint32_t i = 0; i < 128; i++) {
 		const struct refracting_point *q = &w->refracting_points[i];
-		vec3 p = place(w, i), out = vec3_sub(p, (vec3){0, 4, 0});
+		vec3 p = place_of(w, i), out = vec3_sub(p, (vec3){0, 4, 0});
 		if (fabs(p.y) < 1e-5) {
 			assert_true(fabs(p.x) <= 4 && fabs(p.z) <= 2 && q->n.y > 1 - 1e-6);
 			assert_true(fabs(q->eta - 1.33) < 1e-6);
@@ -84,7 +84,7 @@ static void test_by_area(void **state)
 						  "z='0'/><float name='radius' value='.16'/>" WATER("1.5") "</shape>");
 	uint32_t on_ball = 0;
 	for (uint32_t i = 0; i < w->refracting_point_count; i++)
-		on_ball += place(w, i).y > 1;
+		on_ball += place_of(w, i).y > 1;
 	assert_true(on_ball <= 2);
 	world_free(w);
 }

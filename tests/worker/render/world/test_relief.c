@@ -46,7 +46,7 @@ static void image_of(struct world *w, double mean[SIDE * SIDE])
 }
 
 /* Root of the mean square of the difference, over the root of the mean square of b. */
-static double apart(const double *a, const double *b)
+static double relative_difference(const double *a, const double *b)
 {
 	double d = 0, m = 0;
 	for (int i = 0; i < SIDE * SIDE; i++) {
@@ -89,11 +89,12 @@ static void test_bump_against_geometry(void **state)
 			"<integer name='displacement_level' value='8'/>"
 		"</shape>"), real);
 	/* clang-format on */
-	print_message("apart from displaced geometry: flat %.3g, bump %.3g, dents %.3g\n", apart(flat, real),
-		      apart(bump, real), apart(back, real));
-	assert_true(apart(flat, real) > 0.01);
-	assert_true(apart(bump, real) < 0.15 * apart(flat, real));
-	assert_true(apart(back, real) > apart(flat, real));
+	print_message("apart from displaced geometry: flat %.3g, bump %.3g, dents %.3g\n",
+		      relative_difference(flat, real), relative_difference(bump, real),
+		      relative_difference(back, real));
+	assert_true(relative_difference(flat, real) > 0.01);
+	assert_true(relative_difference(bump, real) < 0.15 * relative_difference(flat, real));
+	assert_true(relative_difference(back, real) > relative_difference(flat, real));
 }
 
 /* A square whose normals lean by 45 degrees along the map's y, in light that falls along that direction or across it:

@@ -80,7 +80,7 @@ static void point_on(const struct world *w, uint64_t i, struct surface_point *x)
 
 /* f |cos| of light from wi that goes to wo, both in the world; *side: whether the shading normal sees both as the
  * geometric one does. */
-static spectrum scattered(const struct world *w, uint64_t i, vec3 wo, vec3 wi, enum transport t, bool *side)
+static spectrum scattered_at(const struct world *w, uint64_t i, vec3 wo, vec3 wi, enum transport t, bool *side)
 {
 	struct surface_point x;
 	point_on(w, i, &x);
@@ -106,13 +106,13 @@ static void compare(const char *shape, const char *whole, const char *const *bsd
 		vec3 wo = direction_of_square(u), wi = direction_of_square(u + 2);
 		enum transport t = i % 2 ? TRANSPORT_RADIANCE : TRANSPORT_IMPORTANCE;
 		bool side, part_side, via_side = true;
-		spectrum got = scattered(all, i, wo, wi, t, &side), expected = spectrum_of(0);
+		spectrum got = scattered_at(all, i, wo, wi, t, &side), expected = spectrum_of(0);
 		if (!side) /* the integrators ask no further */
 			continue;
 		if (via)
-			scattered(one[via], i, wo, wi, t, &via_side);
+			scattered_at(one[via], i, wo, wi, t, &via_side);
 		for (int k = 0; k < parts; k++) {
-			spectrum f = scattered(one[k], i, wo, wi, t, &part_side);
+			spectrum f = scattered_at(one[k], i, wo, wi, t, &part_side);
 			if (part_side && (via_side || k == 0))
 				expected = spectrum_add(expected, spectrum_scale(share[k], f));
 		}

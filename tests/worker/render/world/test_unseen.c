@@ -64,7 +64,7 @@ static void test_sentences(void **state)
 }
 
 /* One of n x n rays, from places all over the aperture, meets something. */
-static bool meets(const struct world *w, uint32_t n)
+static bool meets_something(const struct world *w, uint32_t n)
 {
 	const struct camera *c = &w->camera;
 	for (uint32_t i = 0; i < n * n; i++) {
@@ -104,7 +104,7 @@ static void test_against_rays(void **state)
 			-x[4]);
 		char note[1024];
 		note_of(w, NOTE, note);
-		bool seen = meets(w, 64);
+		bool seen = meets_something(w, 64);
 		if (*note && seen)
 			fail_msg("case %zu: a ray meets a shape, but '%s'", i, note);
 		blind += !seen;

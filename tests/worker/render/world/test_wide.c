@@ -30,7 +30,7 @@ static const struct form {
 } forms[] = {{"rectangle", 0}, {"disk", 0}, {"cube", -1}};
 
 /* TURN of (0,1,0), by Rodrigues' formula. */
-static vec3 up(void)
+static vec3 turned_up(void)
 {
 	double l = sqrt(1.09), c = cos(M_PI / 9), s = sin(M_PI / 9);
 	return (vec3){-s * 0.3 / l, c, s / l};
@@ -39,7 +39,7 @@ static vec3 up(void)
 /* Over the plane, in the scene's lengths. */
 static double height(const struct world *w, vec3 p)
 {
-	return vec3_dot(up(), vec3_add(vec3_scale(1 / w->scale, p), w->center));
+	return vec3_dot(turned_up(), vec3_add(vec3_scale(1 / w->scale, p), w->center));
 }
 
 /* Largest distance from the plane of what n rays meet; from within a few units above the floor to all sides. */
@@ -49,11 +49,11 @@ static double rays(const struct world *w, struct dice *d, size_t n)
 	size_t met = 0;
 	for (size_t i = 0; i < n; i++) {
 		vec3 o = {dice_between(d, -3, 3), dice_between(d, -3, 3), dice_between(d, -3, 3)};
-		o = vec3_madd(o, dice_between(d, 0.01, 4) - vec3_dot(o, up()), up());
+		o = vec3_madd(o, dice_between(d, 0.01, 4) - vec3_dot(o, turned_up()), turned_up());
 		vec3 toward = dice_direction(d);
-		if (vec3_dot(toward, up()) > 0)
+		if (vec3_dot(toward, turned_up()) > 0)
 			toward = vec3_neg(toward);
-		toward = vec3_normalize(vec3_madd(toward, -0.1, up()));
+		toward = vec3_normalize(vec3_madd(toward, -0.1, turned_up()));
 		const struct ray_end from = {.p = vec3_scale(w->scale, vec3_sub(o, w->center)), .prim = PRIM_NONE};
 		struct ray_hit hit;
 		struct surface_point x;
@@ -69,7 +69,7 @@ static double rays(const struct world *w, struct dice *d, size_t n)
 }
 
 /* Of where light begins. */
-static double light(const struct world *w, struct dice *d, size_t n)
+static double largest_extent(const struct world *w, struct dice *d, size_t n)
 {
 	const struct emitter *em = &w->emitters[1];
 	double most = 0;
@@ -91,7 +91,7 @@ static void test_wide(void **state)
 		for (double b = 1e4; b < 3e10; b *= 10) {
 			bool shines = forms[k].y == 0;
 			struct world *w = world_of_text(8, 8, text, forms[k].type, forms[k].y, b, shines ? SHINES : "");
-			double off = rays(w, &d, 1000), light_off = shines ? light(w, &d, 1000) : 0;
+			double off = rays(w, &d, 1000), light_off = shines ? largest_extent(w, &d, 1000) : 0;
 			print_message("%s of %.0e: met %.2g off its plane, light %.2g\n", forms[k].type, b, off,
 				      light_off);
 			assert_true(off <= 1e-5 + 0x1p-49 * b && light_off <= 1e-5 + 0x1p-49 * b);
