@@ -107,7 +107,8 @@ struct plan {
 /* Their numbers, but for the kind: those that a plan has from its request, and those that plan_make may choose.
  * Messages have members of the same names. */
 /* clang-format off */
-#define PLAN_GIVEN(X) X(width) X(height) X(crop_x) X(crop_y) X(crop_width) X(crop_height) X(border) X(seed) X(min_depth) X(max_depth)
+#define PLAN_FILM(X) X(width) X(height) X(crop_x) X(crop_y) X(crop_width) X(crop_height) X(border)
+#define PLAN_GIVEN(X) PLAN_FILM(X) X(seed) X(min_depth) X(max_depth)
 #define PLAN_CHOSEN(X) X(groups) X(parts) X(chains) X(bootstrap) X(epoch)
 #define PLAN_BITS(X) PLAN_GIVEN(X) PLAN_CHOSEN(X)
 #define PLAN_NUMBERS(X) PLAN_BITS(X) X(rounds) X(seconds) X(target_error)

@@ -22,22 +22,23 @@ if [ -n "$silent" ]; then
 	exit 1
 fi
 echo "ok: each source above 200 lines opens with a comment"
-wide=$(echo "$sources" | LC_ALL=C xargs awk -v most=140 '
+# 120 columns, as .clang-format says. It never breaks a string, so lines with one, and macros of strings, may have 140.
+wide=$(echo "$sources" | LC_ALL=C xargs awk -v most=120 -v most_with_text=140 '
 	{
 		line = $0
 		if (length(line) + 7 * gsub(/\t/, "\t", line) <= most)
 			next
 		while ((at = index(line, "\t")) > 0)
 			line = substr(line, 1, at - 1) substr("        ", (at - 1) % 8 + 1) substr(line, at + 1)
-		if (length(line) > most)
+		if (length(line) > (line ~ /"|\\$/ ? most_with_text : most))
 			print FILENAME ":" FNR ": " length(line) " columns"
 	}')
 if [ -n "$wide" ]; then
-	echo "WRONG: lines of more than 140 columns, with tabs of 8 (a scene without parameters can be a file in tests/scenes)"
+	echo "WRONG: lines of more than 120 columns with tabs of 8, or 140 with a string (a scene without parameters can be a file in tests/scenes)"
 	echo "$wide" | sed 's/^/	/'
 	exit 1
 fi
-echo "ok: no line has more than 140 columns"
+echo "ok: no line has more than 120 columns, or 140 with a string"
 format=$(command -v clang-format-14 || command -v clang-format)
 if ! "${format:-false}" --version 2> /dev/null | grep -q 'version 14\.'; then
 	echo "clang-format 14 is not installed"

@@ -16,8 +16,8 @@
 #define FILM "<film type='hdrfilm'><rfilter type='box'/></film>"
 #define ALL {"bdpt", "pssmlt", "hslt"}
 
-/* A cube and a ball of metal under a lamp, a few `a` large, on a ground that is `b` wide. TURN: the same for all, so that nothing
- * is along the axes. */
+/* A cube and a ball of metal under a lamp, a few `a` large, on a ground that is `b` wide. TURN: the same for all, so
+ * that nothing is along the axes. */
 #define TURN "<rotate x='1' z='0.3' angle='20'/>"
 #define SCALED "<scale value='%.17g'/>" TURN
 #define SMALL_THINGS                                                                                                            \
@@ -39,8 +39,8 @@ static struct world *on_a_floor(const struct agree_case *k)
 			     SMALL_VALUES(k->a), k->b);
 }
 
-/* The floor is turned about an axis that it does not lie along, and its middle is elsewhere: each of its vertices is rounded in
- * another way. */
+/* The floor is turned about an axis that it does not lie along, and its middle is elsewhere: each of its vertices is
+ * rounded in another way. */
 static struct world *on_a_tilted_floor(const struct agree_case *k)
 {
 	return world_of_text(32, 32, SMALL_THINGS
@@ -89,8 +89,9 @@ static struct world *mirror_box(const struct agree_case *k)
 			     k->a);
 }
 
-/* A rod of glass, `a` wide and 2 long, that is lit at one end and looked into at the other, from so near that light has bounced
- * 64 times and more. Nothing is lost on the way: roulette would keep one path in thirty, and those would be the noise of the image. */
+/* A rod of glass, `a` wide and 2 long, that is lit at one end and looked into at the other, from so near that light has
+ * bounced 64 times and more. Nothing is lost on the way: roulette would keep one path in thirty, and those would be the
+ * noise of the image. */
 static struct world *fibre(const struct agree_case *k)
 {
 	return world_of_text(32, 32, "<integrator type='path'><integer name='rr_depth' value='128'/></integrator>"
@@ -113,8 +114,8 @@ static struct world *fibre(const struct agree_case *k)
 		FILM \
 	"</sensor>"
 
-/* A lamp that shines down lies in the lower side of a slab of glass and across its rim; another, which shines up, in the upper side, a
- * times as wide as the slab. */
+/* A lamp that shines down lies in the lower side of a slab of glass and across its rim; another, which shines up, in
+ * the upper side, a times as wide as the slab. */
 static struct world *lamp_in_glass(const struct agree_case *k)
 {
 	return world_of_text(32, 32, LOOK_AT_IT GROUND SKY
@@ -176,8 +177,8 @@ static struct world *lamp_pasted(const struct agree_case *k)
 			     "<shape type='cube'>" AT("<scale value='0.3'/><translate y='0.3'/>" TURN) GREY("0.5") "</shape>");
 }
 
-/* The pole of a displaced ball, where the meridians of its texture meet: steps as high as a, near and from above; of metal
- * (b = 0) or glass. */
+/* The pole of a displaced ball, where the meridians of its texture meet: steps as high as a, near and from above; of
+ * metal (b = 0) or glass. */
 static struct world *displaced_pole(const struct agree_case *k)
 {
 	static const char *const matter[] = {"<bsdf type='roughconductor'><string name='material' value='Au'/>"
@@ -210,8 +211,8 @@ static struct world *lamp_on_glass(const struct agree_case *k)
 			     "<emitter type='area'><rgb name='radiance' value='3'/></emitter></shape>");
 }
 
-/* A sheet that shines on both sides, between balls; and a half transparent box around a ball that does, so that light from its
- * inside comes out. */
+/* A sheet that shines on both sides, between balls; and a half transparent box around a ball that does, so that light
+ * from its inside comes out. */
 static struct world *two_sided_lamps(const struct agree_case *k)
 {
 	(void)k;
@@ -243,8 +244,8 @@ static struct world *beams(const struct agree_case *k)
 			     "<emitter type='directionalarea'><rgb name='radiance' value='5'/></emitter></shape>");
 }
 
-/* A wall stands before the near plane and another behind the far one, which cuts the ground: of neither does the camera see anything.
- * a = 1: the camera is orthographic, and the first wall behind it. */
+/* A wall stands before the near plane and another behind the far one, which cuts the ground: of neither does the camera
+ * see anything. a = 1: the camera is orthographic, and the first wall behind it. */
 static struct world *clipped_view(const struct agree_case *k)
 {
 #define CLIPPED(type, more, turn) "<sensor type='" type "'>" more "<float name='near_clip' value='2'/><float name='far_clip' value='7'/>" \
@@ -272,7 +273,8 @@ static struct world *bright_texel(const struct agree_case *k)
 	(void)k;
 	memcpy(hdr, head, sizeof head - 1);
 	for (size_t i = 0; i < WIDTH * HEIGHT; i++)
-		memcpy(hdr + sizeof head - 1 + 4 * i, (unsigned char[]){0x80, 0x80, 0x80, i == 2 * WIDTH + 5 ? 0x9c : 0x81}, 4);
+		memcpy(hdr + sizeof head - 1 + 4 * i,
+		       (unsigned char[]){0x80, 0x80, 0x80, i == 2 * WIDTH + 5 ? 0x9c : 0x81}, 4);
 	int n = snprintf(xml, sizeof xml,
 			 "<scene version='3.0.0'>" LOOK_AT_IT GROUND
 				"<emitter type='envmap'><string name='filename' value='sky.hdr'/></emitter>"
@@ -303,8 +305,8 @@ static size_t coarse_sphere(char *out, size_t size)
 	return at;
 }
 
-/* Anisotropic metal, anisotropic glass, and a normal map on meshes of few triangles, one of them a stretched and mirrored instance: their
- * frames turn within each triangle. */
+/* Anisotropic metal, anisotropic glass, and a normal map on meshes of few triangles, one of them a stretched and
+ * mirrored instance: their frames turn within each triangle. */
 static struct world *smooth_tangents(const struct agree_case *k)
 {
 	static char xml[1 << 12], obj[1 << 13];
@@ -462,8 +464,8 @@ static struct world *scattering_media(const struct agree_case *k)
 			     "<emitter type='area'><rgb name='radiance' value='5'/></emitter></shape>", k->a);
 }
 
-/* A cloud of three colours around a stone and a lamp, with holes in it, beside rough glass that is clouded within; a > 0:
- * they only absorb. Their grids are upright, the scene is not. */
+/* A cloud of three colours around a stone and a lamp, with holes in it, beside rough glass that is clouded within; a >
+ * 0: they only absorb. Their grids are upright, the scene is not. */
 static double puffs(double x, double y, double z, uint32_t channel)
 {
 	return fmax(0, 0.4 + sin(9 * x + 0.3 * channel) * cos(8 * y) * sin(7 * z + channel));
@@ -504,7 +506,8 @@ static struct world *uneven_media(const struct agree_case *k)
 	return world_of_files(32, 32, files);
 }
 
-/* A cloud of flakes that turn from place to place around a stone and a lamp, beside rough glass with other flakes inside. */
+/* A cloud of flakes that turn from place to place around a stone and a lamp, beside rough glass with other flakes
+ * inside. */
 static double flakes(double x, double y, double z, uint32_t channel)
 {
 	double c = cos(3 * x + y), s = sin(3 * x + y), thin = 0.05 + 0.4 * z;
@@ -539,8 +542,8 @@ static struct world *flaky_media(const struct agree_case *k)
 	return world_of_files(32, 32, files);
 }
 
-/* A lamp in a cloud that says something else of what is around it; and a lamp outside, from which light enters the cloud
- * through a face that states haze there. Most light sub-paths are in other media than the camera's. */
+/* A lamp in a cloud that says something else of what is around it; and a lamp outside, from which light enters the
+ * cloud through a face that states haze there. Most light sub-paths are in other media than the camera's. */
 static struct world *media_that_do_not_fit(const struct agree_case *k)
 {
 	(void)k;

@@ -157,7 +157,8 @@ static struct world *mesh(double uv, double thin, const char *bsdf)
 	for (int i = 0; i <= UP; i++)
 		for (int j = 0; j <= AROUND; j++) {
 			/* Every other circle of latitude lies near the one before it. */
-			double t = M_PI * (i % 2 && i < UP ? i - 1 + thin : i) / UP, p = 2 * M_PI * (j % AROUND) / AROUND;
+			double t = M_PI * (i % 2 && i < UP ? i - 1 + thin : i) / UP;
+			double p = 2 * M_PI * (j % AROUND) / AROUND;
 			double x = sin(t) * cos(p), y = cos(t), z = sin(t) * sin(p), shared = uv == 2;
 			n += (size_t)snprintf(obj + n, SIZE - n, "v %.9g %.9g %.9g\nvn %.9g %.9g %.9g\nvt %.9g %.9g\n",
 					      0.8 * x, 0.8 * y - 0.6, 0.8 * z - 0.3, x, y, z,

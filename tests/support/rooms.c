@@ -209,9 +209,9 @@ static struct world *fog(void)
 				"<ref name='exterior' id='fog'/></shape>");
 }
 
-/* Fog of which only the camera knows: the light's own sub-paths begin outside of it, and many paths that the camera could have are
- * none of any technique. The strips before the wall end it: there the light's sub-paths bring what a mirror sends, and beside them
- * no technique does, so that a mutation that leaves a strip leaves what is rendered. */
+/* Fog of which only the camera knows: the light's own sub-paths begin outside of it, and many paths that the camera
+ * could have are none of any technique. The strips before the wall end it: there the light's sub-paths bring what a
+ * mirror sends, and beside them no technique does, so that a mutation that leaves a strip leaves what is rendered. */
 #define STRIP(x)                                                                                                                \
 	"<shape type='rectangle'>" AT("<scale x='0.2' y='1.2'/><translate x='" x "' y='-0.5' z='-1.9'/>") PLAIN("0.5,0.45,0.35")  \
 	INSIDE("<float name='sigma_t' value='0.3'/><float name='albedo' value='0.8'/>") "</shape>"
@@ -236,8 +236,8 @@ static struct world *misfit(void)
 #define FROM(t, inner) "<transform time='" t "'>" inner "</transform>"
 #define MOVES(a, b) "<animation name='to_world'>" FROM("0", a) FROM("1", b) "</animation>"
 
-/* While the shutter is open the camera follows a little, a ball of metal rolls and shrinks, cloudy glass turns, a group slides, and the
- * lamp swings and is stretched. */
+/* While the shutter is open the camera follows a little, a ball of metal rolls and shrinks, cloudy glass turns, a group
+ * slides, and the lamp swings and is stretched. */
 static struct world *moving(void)
 {
 	static const char scene[] = "<scene version='3.0.0'>"
