@@ -194,7 +194,7 @@ test-numerics: programs $(NUMERICS_BIN)
 
 # What happens to machines while a job runs, each fault as often as the tables of tests/e2e/README.md say, which it writes.
 .PHONY: test-faults
-test-faults: programs $(FAULTY_WORKER) $(BUILD)/tests/coordinator/power_loss/test_power
+test-faults: programs $(FAULTY_WORKER) $(BUILD)/tests/coordinator/power_loss/test_durability
 	sh tests/e2e/faults.sh $(BUILD) --write
 
 # Fuzzers: tests/fuzz/fuzz_*.c, one libFuzzer program each; run.sh calls `make fuzzers` with clang and its sanitizers.

@@ -68,10 +68,10 @@ case $threads in
 esac
 
 # Homes may be shared by hosts, and numbers of processes come again: whose is it?
-remote="f=~/.hslt-worker.\$(hostname).pid; lives() { p=\$(cat \"\$f\" 2>/dev/null) && readlink \"/proc/\$p/exe\" >/dev/null 2>&1 &&"
+remote="f=~/.hslt-worker.\$(hostname).pid; is_running() { p=\$(cat \"\$f\" 2>/dev/null) && readlink \"/proc/\$p/exe\" >/dev/null 2>&1 &&"
 remote="$remote case \$(cat \"/proc/\$p/comm\") in hslt-worker | $(quote "$(basename "$program" | cut -c 1-15)")) ;; *) false ;; esac; };"
 if [ -n "$stop" ]; then
-	remote="$remote if lives; then kill \"\$p\" && rm -f \"\$f\" && echo stopped; else rm -f \"\$f\"; echo 'no worker of this script is here' >&2; exit 1; fi"
+	remote="$remote if is_running; then kill \"\$p\" && rm -f \"\$f\" && echo stopped; else rm -f \"\$f\"; echo 'no worker of this script is here' >&2; exit 1; fi"
 else
 	command="$(quote "$program") --coordinator $(quote "$coordinator")"
 	[ -z "$threads" ] || command="$command --threads $threads"
@@ -79,7 +79,7 @@ else
 	[ -z "$insecure" ] || command="$command --insecure"
 	target='~/hslt-worker.log'
 	[ -z "$log" ] || target=$(quote "$log")
-	remote="$remote if lives; then echo \"a worker of this script is here (process \$p): --stop first\" >&2; exit 1; fi;"
+	remote="$remote if is_running; then echo \"a worker of this script is here (process \$p): --stop first\" >&2; exit 1; fi;"
 	remote="$remote nohup $command --name \"\$(hostname)\" >>$target 2>&1 </dev/null & echo \$! >\"\$f\";"
 	remote="$remote sleep 1; kill -0 \"\$(cat \"\$f\")\" && echo started || { tail -n 3 $target; exit 1; }"
 fi

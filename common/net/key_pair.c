@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A pair of two files cannot be replaced at once. hslt-ca writes the next certificate and the next key beside the old
- * ones, gives the key its name, and then the certificate (authority.c). If the power goes in between, the key is the
+ * ones, gives the key its name, and then the certificate (authority.c). If power is lost in between, the key is the
  * next certificate's, which is still under its own name: then that is used. Without a certificate for the key, what is
  * wrong with the first one is the failure.
  */

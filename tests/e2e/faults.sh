@@ -22,9 +22,9 @@ for f in worker coordinator network versions resources people spool disk; do
 	. "$HERE/faults/$f.sh"
 done
 
-# The count itself, of two lives: one result is merged again, one twice, one was acknowledged and not stored, one waited in the journal,
+# The count itself, over two runs of the coordinator: one result is merged again, one twice, one was acknowledged and not stored, one waited in the journal,
 # one was taken back before it was on the disk, and merged again; twenty in the film. Of one chain two epochs are given out again after one
-# worker, of which one had been given to two at once, then another one after a life.
+# worker, of which one had been given to two at once, then another one after a restart.
 counted=$(sed 's/^/x event=/' <<TEXT | awk -v job=j1 -f "$HERE/faults/count.awk"
 start program=hslt-coordinator
 batch_merged job=j1 kind=render group=0 part=0 epoch=1

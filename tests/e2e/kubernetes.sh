@@ -16,7 +16,7 @@ done
 # secret NAME FOLDER: as a kubelet mounts it, links through one that is replaced
 secret() {
 	mkdir -p "$DIR/$1"
-	new=$(mktemp -d "$DIR/$1/..life.XXXXXX")
+	new=$(mktemp -d "$DIR/$1/..start.XXXXXX")
 	cp "$2"/*.pem "$new"
 	chmod 755 "$new"
 	chmod 440 "$new"/*.pem

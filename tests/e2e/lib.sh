@@ -136,7 +136,7 @@ free_ports() {
 	done
 }
 
-# the coordinator has read the jobs of an earlier life, or is gone
+# the coordinator has read the jobs from before its restart, or is gone
 has_read() {
 	! "$BIN/hslt-status" --json 2>/dev/null | grep -q '"reading": *[0-9]'
 }

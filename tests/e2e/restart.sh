@@ -39,7 +39,7 @@ is_merging() {
 	[ "$(tail -n +"$seen" "$DIR/coordinator.log" | grep -c event=batch_merged)" -ge "$1" ] || is_state "$a" done
 }
 
-# leases that are merged, and those that were acknowledged in all lives
+# leases that are merged, and those that were acknowledged in all runs
 merged() {
 	value "$1" merged
 }

@@ -93,14 +93,14 @@ export PATH="$PROGRAMS:$PATH" TMPDIR="$DIR/tmp" HSLT_SPOOL="$DIR/shared" HSLT_GR
 export SUBMIT=0 FETCH=0 JOB= NAPS= LIST_DIES= THEN= AGAIN= FOREIGN=
 unset HSLT_BIN HSLT_CA HSLT_INSECURE SLURM_CPUS_PER_TASK
 
-# life CODE SPOOL [NAME=VALUE...]: what it ends with, and whether the spool is "kept" or "gone"
-life() {
+# run_batch CODE SPOOL [NAME=VALUE...]: what it ends with, and whether the spool is "kept" or "gone"
+run_batch() {
 	wanted=$1 spool=$2
 	shift 2
 	rm -f "$DIR"/*.pid "$DIR/worker.left" "$DIR/asked" "$DIR/naps"
 	: >"$DIR/naps"
 	got=0
-	env "$@" bash "$SBATCH" box.xml -o image.exr >"$DIR/life.log" 2>&1 || got=$?
+	env "$@" bash "$SBATCH" box.xml -o image.exr >"$DIR/sbatch.log" 2>&1 || got=$?
 	[ "$got" = "$wanted" ] || fail "it ended with $got, not with $wanted: $*"
 	[ -d "$DIR/shared/hslt-farm-7" ] && found=kept || found=gone
 	[ $found = "$spool" ] || fail "the spool is $found: $*"
@@ -110,26 +110,26 @@ life() {
 		! kill -0 "$(cat "$p")" 2>/dev/null || fail "$(basename "$p" .pid) was left behind: $*"
 	done
 	[ -s "$DIR/worker.left" ] || fail "the worker was not left to leave: $*"
-	! grep -q "Killed\|syntax" "$DIR/life.log" || fail "it was in a hurry: $*"
+	! grep -q "Killed\|syntax" "$DIR/sbatch.log" || fail "it was in a hurry: $*"
 	[ -z "$(ls -A "$DIR/tmp")" ] || fail "it left $(ls -A "$DIR/tmp"): $*"
 }
 
 says() {
-	grep -q -- "$1" "$DIR/life.log" || fail "it does not say '$1'"
+	grep -q -- "$1" "$DIR/sbatch.log" || fail "it does not say '$1'"
 }
 
-# first: no job in the spool yet; next STATE CODE RESULT: an earlier life's is
+# first: no job in the spool yet; next STATE CODE RESULT: an earlier start left one
 first() {
 	echo '[]' >"$DIR/list"
-	life "$@"
+	run_batch "$@"
 }
 next() {
 	sh "$DIR/list_of" "$1" "$2" "$3"
 	shift 3
-	life "$@"
+	run_batch "$@"
 }
 
-# ---- the first life ----
+# ---- the first start ----
 
 for code in 0 4 5; do
 	first $code gone SUBMIT=$code JOB="done $code true"
@@ -147,13 +147,13 @@ first 0 gone AGAIN=1 # a signal while everything ends
 first 0 gone NAPS=150 # as often as 0.1 s are in 15 s
 [ "$(grep -c '^0.1$' "$DIR/naps")" -ge 150 ] || fail "the coordinator was not slow, this tests nothing"
 
-# ---- the next ----
+# ---- the next start ----
 
 next done 0 true 0 gone
-says "goes on from an earlier life"
+says "continues from an earlier start"
 next done 5 true 5 gone
 next running 0 false 3 gone THEN="failed 3 false" FETCH=1
-next failed 3 false 0 gone SUBMIT=0 JOB="done 0 true" FETCH=1 # the life before ended while it submitted
+next failed 3 false 0 gone SUBMIT=0 JOB="done 0 true" FETCH=1 # the start before ended while it submitted
 next done 0 true 1 kept FETCH=1
 next done 0 true 75 kept FETCH=75
 next done 0 true 143 kept FETCH=TERM
@@ -166,12 +166,12 @@ done
 # Somebody else's of that name
 mkdir "$DIR/tmp/hslt-farm-7.0"
 echo '[]' >"$DIR/list"
-env FOREIGN=1 bash "$SBATCH" box.xml -o image.exr >"$DIR/life.log" 2>&1 || fail "a foreign folder ends it"
+env FOREIGN=1 bash "$SBATCH" box.xml -o image.exr >"$DIR/sbatch.log" 2>&1 || fail "a foreign folder ends it"
 [ -z "$(ls -A "$DIR/tmp/hslt-farm-7.0")" ] || fail "it uses a foreign folder"
 /bin/rm -r "$DIR/tmp"/*
 # Without a file system that all nodes see an image that could not be written stays where it is.
 echo '[]' >"$DIR/list"
-env HSLT_SPOOL= SUBMIT=1 bash "$SBATCH" box.xml -o image.exr >"$DIR/life.log" 2>&1 && fail "an image that cannot be written ends with 0"
+env HSLT_SPOOL= SUBMIT=1 bash "$SBATCH" box.xml -o image.exr >"$DIR/sbatch.log" 2>&1 && fail "an image that cannot be written ends with 0"
 [ -d "$DIR/tmp"/hslt-farm-7.0.*/spool ] || fail "the image is gone: $(ls -R "$DIR/tmp")"
-! grep -q requeue "$DIR/life.log" || fail "it promises what it cannot do"
+! grep -q requeue "$DIR/sbatch.log" || fail "it promises what it cannot do"
 echo "farm.sbatch: exit codes, and the spool goes with the image only"

@@ -139,7 +139,7 @@ pause() {
 	"$BIN/hslt-job" "$1" "$id" 2>>"$DIR/submit.log" || fail "hslt-job $1 $id"
 }
 
-# requeued JOB: is pending for its next life, which begins now instead of two minutes later
+# requeued JOB: is pending for its next start, which begins now instead of two minutes later
 requeued() {
 	until_true 60 is_job "$1" PENDING || return 1
 	sleep 2 # a slurmd kills a job that begins anew in the second in which it was told to end it
@@ -227,7 +227,7 @@ done
 
 # ---- a whole farm in a job ----
 
-# farm_port JOB.RESTART: of its coordinator, in a folder that no other life's is
+# farm_port JOB.RESTART: of its coordinator, in a folder of no other start
 farm_port() {
 	cat "$DIR/hslt-farm-$1".*/port 2>/dev/null
 }
@@ -246,7 +246,7 @@ told() {
 mkdir "$DIR/shared"
 batch --nodes=3 --export="ALL,HSLT_SPOOL=$DIR/shared" "$DEPLOY/slurm/farm.sbatch" "$BOX" -o "$DIR/farm.exr" $SHORT
 until_true 20 running "$JOB.0" || fail "the farm does not run: $(squeue; told)"
-# Between the lives somebody has the spool, until the next has been there for a second.
+# Between the two starts somebody has the spool, until the next has been there for a second.
 flock "$DIR/shared/hslt-farm-$JOB/lock" sh -c "while [ ! -e '$DIR/spool-free' ]; do sleep 0.1; done" &
 PIDS="$PIDS $!"
 scontrol requeue "$JOB"
@@ -257,7 +257,7 @@ until_true 60 is_job "$JOB" COMPLETED || fail "the farm is $(told)"
 [ "$(job_field "$JOB" Restarts)" = 1 ] || fail "the farm was not requeued"
 [ "$(grep -c 'event=peer_hello.*@n[123]' "$DIR/$JOB.log")" -ge 3 ] || fail "not all nodes worked"
 [ "$(grep -c "name=\"$JOB.1@.*ended the connection" "$DIR/$JOB.log")" = 3 ] || fail "workers were not left to leave"
-grep -q 'goes on from an earlier life' "$DIR/$JOB.log" || fail "the farm began anew"
+grep -q 'continues from an earlier start' "$DIR/$JOB.log" || fail "the farm began anew"
 [ -z "$(ls "$DIR/shared")" ] || fail "it left $(ls "$DIR/shared")"
 grep -q 'event=listen.*tls=yes' "$DIR/$JOB.log" || fail "it was not over TLS"
 grep -q 'event=peer_hello.*certificate=worker' "$DIR/$JOB.log" || fail "the workers had another certificate"
@@ -282,6 +282,6 @@ for p in $(ours); do
 done
 until_true 30 is_job "$JOB" FAILED || fail "the farm without its hslt-submit is $(told)"
 [ "$(job_field "$JOB" ExitCode)" = 143:0 ] || fail "it ended with $(job_field "$JOB" ExitCode)"
-[ -s "$DIR/shared/hslt-farm-$JOB/jobs.db" ] || fail "the image's next life has nothing to go on with: $(told)"
+[ -s "$DIR/shared/hslt-farm-$JOB/jobs.db" ] || fail "the image's next start has nothing to continue from: $(told)"
 echo "Slurm: from 1 to 3 workers, one told to leave, one preempted, one off a dead node: $repeats of $leases leases were given twice, at most" \
 	"$most of a chain; farms requeued and cut short; equal bits"

@@ -128,7 +128,7 @@ time.sleep(600)' "$DIR" &
 	AT=$DIR/at
 fi
 
-# One that was left by a life that ended badly is taken away; one that another has put there since is not.
+# One that was left by a coordinator that was killed is removed; one that another has put there since is not.
 kill -9 $COORDINATOR_PID
 wait $COORDINATOR_PID 2>/dev/null || :
 [ -S "$AT" ] || fail "it should be there still"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lives of workers by hand: lives.py PORT fails when a later start does not take the place of the earlier one's open connection, when
+"""Starts of workers by hand: starts.py PORT fails when a later start does not take the place of the earlier one's open connection, when
 an earlier one is let in, or when strangers replace each other."""
 import os, socket, sys
 
@@ -32,14 +32,14 @@ def is_open(s):
 
 first, heard = hello(b"w", b"ab12", 5)
 later, heard = hello(b"other", b"ab12", 6)
-expect("the earlier life", first.recv(4096), b"the same worker has reconnected")
+expect("the earlier start", first.recv(4096), b"the same worker has reconnected")
 stale, heard = hello(b"w", b"ab12", 5)
 expect("a start before", heard, b"its start 6 has connected before")
 again, heard = hello(b"other", b"ab12", 6)
-expect("the same life on its old connection", later.recv(4096), b"the same worker has reconnected")
+expect("the same start on its old connection", later.recv(4096), b"the same worker has reconnected")
 elsewhere, heard = hello(b"other", b"cd34", 1)
 nowhere, heard = hello(b"other", b"", 0)
-for what, s in (("the same life", again), ("one name, another home", elsewhere), ("one name, no home", nowhere)):
+for what, s in (("the same start", again), ("one name, another home", elsewhere), ("one name, no home", nowhere)):
     if not is_open(s):
         sys.exit(f"{what} is hung up on")
 expect("a home of words", hello(b"w", b"../home", 1)[1], b"out of bounds")

@@ -19,7 +19,7 @@ JOB="--integrator hslt --size 96x96 --bootstrap 20000 --mutations 640000 --chain
 "$BIN/hslt-render" "$BOX" -o "$DIR/alone.exr" $JOB 2>"$DIR/render.log"
 
 start_coordinator --heartbeat 60
-python3 "$HERE/lives.py" "${COORDINATOR#*:}" || fail "lives of workers"
+python3 "$HERE/starts.py" "${COORDINATOR#*:}" || fail "restarted workers"
 stop $COORDINATOR_PID
 start_coordinator
 start_worker honest1
@@ -47,7 +47,7 @@ says "$DIR/coordinator.log" "event=worker_quarantined"
 "$BIN/hslt-job" log "$id" >"$DIR/log"
 says "$DIR/log" "worker=\"liar\""
 
-# It comes back in another life, under another name, and to a coordinator in its next life: it is who it was.
+# It is recognised after a restart of its own, under another name, and after a restart of the coordinator.
 stop $liar
 start_worker saint
 saint=$WORKER

@@ -62,7 +62,7 @@ void farm_settle(struct farm_world *w)
 	farm_turn(w);
 }
 
-/* ---- life ---- */
+/* ---- start and end ---- */
 
 int farm_world_open(struct farm_world *w, struct error *e)
 {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Files are touched through common/base/disk.h alone by whatever keeps what must survive, so that tests can take the power away
+# Files are touched through common/base/disk.h alone by whatever keeps what must survive, so that tests can simulate a loss of power
 # there. Not of it: sockets (status/) and the programs of clients (coordinator/ctl).
 cd "$(dirname "$0")/../.." || exit 1
 calls='open|openat|creat|opendir|fdopendir|mkdir|mkdirat|rmdir|unlink|unlinkat|remove|rename|renameat|link|symlink|fsync|fdatasync|sync'

@@ -398,7 +398,7 @@ static int report(double wrong, double peak)
 	       1e-6 * (double)load.bytes / seconds);
 	printf("%-46s %9.1f MB/s\n", "written to the disk",
 	       1e-6 * (clockwork.written[1] - clockwork.written[0]) / seconds);
-	printf("%-46s %9.2f s of %.2f s; whole life %.1f s\n", "coordinator's processor",
+	printf("%-46s %9.2f s of %.2f s; in all %.1f s\n", "coordinator's processor",
 	       clockwork.cpu[1] - clockwork.cpu[0], seconds, coordinator.cpu_seconds);
 	printf("%-46s %9.1f ms\n", "... of it for each batch",
 	       1000 * (clockwork.cpu[1] - clockwork.cpu[0]) / (double)load.batches);

@@ -438,7 +438,7 @@ static void on_drained(void *user)
 			w->wish[i] = now;
 }
 
-/* Both timers: who dies or hangs calls again as another life of the same. */
+/* Both timers: a worker that dies or hangs connects again as a restart of the same worker. */
 static void on_timer_closed(uv_handle_t *h)
 {
 	struct load_worker *w = h->data;

@@ -2,7 +2,7 @@
 /*
  * A tree of names and files in memory that holds what a loss of power would leave (faulty_disk.h). Calls on the real
  * disk are carried out and told here: writes go into a list of changes, which a flush applies to the safe bytes; names
- * go through a list of renamings, which a flush of their folder applies. When the power goes, the safe state and a
+ * go through a list of renamings, which a flush of their folder applies. When power is lost, the safe state and a
  * random part of the rest are written to the other folder.
  *
  * The hooks themselves are in faulty_disk_calls.c and, for SQLite, faulty_disk_vfs.c. Memory that runs out ends the
@@ -307,7 +307,7 @@ void faulty_disk_removed(const char *path)
 		rename_in(in, last, NULL, NULL);
 }
 
-/* ---- the power goes ---- */
+/* ---- loss of power ---- */
 
 struct odds {
 	double bytes, lengths, names; /* that what was not flushed is there all the same */

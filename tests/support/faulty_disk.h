@@ -34,17 +34,16 @@ struct faulty_disk {
 	const char *root;  /* absolute, there */
 	const char *after; /* what is left is put there; not there yet */
 	uint64_t seed;
-	uint64_t lose_at;    /* the power goes before this call that changes something, counted from 1; 0: never */
+	uint64_t lose_at;    /* power is lost before this call that changes something, counted from 1; 0: never */
 	uint64_t fail_from;  /* calls fail, from this one of all on; 0: none */
 	uint64_t fail_count; /* so many */
 	int fail_with;	     /* errno */
-	uint64_t
-		lose_after; /* the power goes so many calls that change something after the first that failed; 0: not */
+	uint64_t lose_after; /* power is lost so many calls that change something after the first that failed; 0: not */
 	bool fail_writes_only; /* as on a disk that is full, or read-only: reading and making room go on */
 	enum faulty_disk_forget forget;
 	const char *forget_name; /* only of files or folders with this last part of their name; NULL: all */
 	/* Shared with the parent; NULL: nobody asks. [0]: calls that change something; [1]: all; [2]: those that
-	 * failed; [3]: sectors and names that were lost; [4]: not 0: the power goes before the next call that changes
+	 * failed; [3]: sectors and names that were lost; [4]: not 0: power is lost before the next call that changes
 	 * something. */
 	_Atomic uint64_t *counts;
 };

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Scene nodes without a scene file: "roughconductor alpha=0.1 distribution=ggx eta=rgb(0.2,0.9,1.1) on=true". Values
- * are numbers, booleans, rgb(r,g,b), or else strings (no spaces; '_' in a string becomes a space). Everything lives in
- * the arena; out of memory or bad text aborts. One thread.
+ * are numbers, booleans, rgb(r,g,b), or else strings (no spaces; '_' in a string becomes a space). Everything is
+ * allocated in the arena; out of memory or bad text aborts. One thread.
  */
 #ifndef TESTS_SUPPORT_NODES_H
 #define TESTS_SUPPORT_NODES_H

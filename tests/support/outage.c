@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Life after life of a coordinator on a faulty disk (outage.h). outage_work submits jobs, answers leases and notes
- * every acknowledgement until the process has gone; the next life starts from what the disk has kept; each life begins
- * with fetching all images, from whose counters one sees how many results each holds, and whose pixels must have the
- * bits of the undisturbed run.
+ * Runs of a coordinator, one after the other, on a faulty disk (outage.h). outage_work submits jobs, answers leases and
+ * notes every acknowledgement until the process has gone; the next run starts from what the disk has kept; each run
+ * begins with fetching all images, from whose counters one sees how many results each holds, and whose pixels must have
+ * the bits of the undisturbed run.
  */
 #include "tests/support/outage.h"
 
@@ -37,7 +37,7 @@ static uint64_t reference_results; /* that its film holds */
 static bool has_reference;
 static char port_file[80], listens_file[80], after[80];
 
-/* ---- a life ---- */
+/* ---- a run ---- */
 
 static void serve(const struct farm_run *f)
 {
@@ -83,7 +83,7 @@ int outage_gone(struct farm_run *f, bool wait)
 	return f->code;
 }
 
-/* false: the power went before it had read its jobs. */
+/* false: power was lost before it had read its jobs. */
 bool outage_start(struct farm_run *f)
 {
 	unlink(port_file);
@@ -249,7 +249,7 @@ static bool check_jobs(struct farm_run *f)
 	return true;
 }
 
-/* ---- the work of a life; false: the power went ---- */
+/* ---- the work of a run; false: the power was lost ---- */
 
 static bool submit(struct farm_run *f)
 {
@@ -383,8 +383,8 @@ void outage_stop(struct farm_run *f)
 	assert_int_equal(outage_gone(f, true), -1);
 }
 
-/* All is done and the coordinator idle: another job, and at its first call the power goes. */
-void outage_stop_in_the_dark(struct farm_run *f)
+/* All is done and the coordinator idle: another job, and at its first call power is lost. */
+void outage_cut_power(struct farm_run *f)
 {
 	atomic_store(&outage.counts[4], 1);
 	scripted_submit(f->client, &f->request, "<scene version='2'/>");

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A coordinator on a disk that loses what was not synchronised, or whose calls fail (tests/support/faulty_disk.h), and
- * a client and a worker that remember what was acknowledged: life after life, each from what the disk kept. What must
+ * a client and a worker that remember what was acknowledged: run after run, each from what the disk kept. What must
  * not be is counted: results that were acknowledged and are not there, that a film holds twice, images of other bits
  * than those of an undisturbed run. Everything else that is wrong ends the test. One process at a time in each folder
  * (tests/support/folder.h).
@@ -54,14 +54,14 @@ extern struct outage {
 } outage;
 
 void outage_begin(struct farm_run *f, uint64_t seed); /* from nothing */
-bool outage_start(struct farm_run *f); /* false: the power went before it had read its jobs, or it did not start */
-bool outage_work(struct farm_run *f);  /* to the end of all jobs; false: the power went */
+bool outage_start(struct farm_run *f); /* false: power was lost before it had read its jobs, or it did not start */
+bool outage_work(struct farm_run *f);  /* to the end of all jobs; false: power was lost */
 void outage_hang_up(struct farm_run *f);
 int outage_gone(struct farm_run *f, bool wait); /* 0: it runs; else its exit code, -1 for 0 */
 void outage_swap_folders(struct farm_run *f);	/* what the disk kept becomes the spool */
 void outage_stop(struct farm_run *f);
-/* All is done and the coordinator idle: another job, and at its first call the power goes. */
-void outage_stop_in_the_dark(struct farm_run *f);
+/* All is done and the coordinator idle: another job, and at its first call power is lost. */
+void outage_cut_power(struct farm_run *f);
 void outage_quiet_run(void); /* undisturbed: before the others */
 
 #endif

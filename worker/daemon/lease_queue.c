@@ -287,7 +287,7 @@ static void take_job_info(struct agent *a, struct envelope *env)
 	if (b->state == JOB_CACHE_ASKED && job_cache_set_info(b, env, &e))
 		fail_job_cache(a, b, &e);
 	fetch_or_build(a, b);
-	for (struct lease_task *l = a->leases; l; l = l->next) /* the job lives: earlier results are welcome */
+	for (struct lease_task *l = a->leases; l; l = l->next) /* the job is not over: earlier results are welcome */
 		if (l->job_cache == b && l->state == LEASE_RENDERED)
 			send_result(a, l);
 	scenes_kept_tidy(a);

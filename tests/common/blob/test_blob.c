@@ -71,7 +71,7 @@ static void keeps_and_reads_back(void **state)
 	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
 	struct blob_hash h = store_text(s, "hello, farm");
 	blob_store_close(s);
-	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0); /* another life */
+	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0); /* opened again */
 	assert_true(blob_has(s, &h, &size));
 	assert_int_equal(size, 11);
 	int fd = blob_open(s, &h, &size, &e);
@@ -133,7 +133,7 @@ static void forgets_the_oldest_that_nobody_holds(void **state)
 	blob_store_close(s);
 }
 
-/* The last twenty of a hundred fit; in each life it is they and nobody else who are there. */
+/* The last twenty of a hundred fit; whenever the store is opened, they are there and no others. */
 static void knows_many(void **state)
 {
 	(void)state;
@@ -148,7 +148,7 @@ static void knows_many(void **state)
 		h[i] = store_text(s, text);
 		blob_release(s, &h[i]);
 	}
-	for (int life = 0; life < 2; life++) {
+	for (int start = 0; start < 2; start++) {
 		for (int i = 0; i < MANY; i++)
 			assert_true(blob_has(s, &h[i], NULL) == (i >= MANY - FIT));
 		assert_int_equal(bytes_of_folder(), 4 * FIT);
@@ -224,7 +224,7 @@ static void evicts_as_bytes_arrive(void **state)
 	blob_store_close(s);
 }
 
-/* A smaller limit in the next life: what is held by then stays, though it is the oldest. */
+/* A smaller limit after a restart: what is held by then stays, though it is the oldest. */
 static void held_before_it_is_trimmed(void **state)
 {
 	(void)state;
@@ -522,7 +522,7 @@ static void stored_meanwhile(void **state)
 	blob_store_close(s);
 }
 
-/* The power goes before the flush: the next start finds nothing of it. */
+/* Power is lost before the flush: the next start finds nothing of it. */
 static void not_flushed(void **state)
 {
 	(void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The power goes before each call of hslt-ca that changes the disk, and takes another part of what was not flushed:
+ * Power is lost before each call of hslt-ca that changes the disk, and another part of what was not flushed is lost:
  * what a command reported as done is there afterwards (a certificate with its key and its record, a revocation in every
  * list), and a command that was interrupted can be repeated.
  */
@@ -157,7 +157,7 @@ static void a_loss_of_power_undoes_nothing_that_was_reported(void **state)
 	for (uint64_t at = 1;; at++) {
 		assert_int_equal(system(command), 0);
 		code = run_until(ca, root, after, at, at);
-		if (code == 0) /* the power stays until the end */
+		if (code == 0) /* power is not lost before the end */
 			break;
 		assert_int_equal(code, FAULTY_DISK_EXIT);
 		assert_true(at < CALLS_MOST);

@@ -266,7 +266,7 @@ static void half_a_frame_is_not_waited_for(void **state)
 	close_ends();
 }
 
-/* Of the second message one bit is another one than was sent, of the first (a hello in life) none. */
+/* Of the second message one bit is another one than was sent, of the first (a hello in practice) none. */
 static void changed_bytes_close(void **state)
 {
 	(void)state;

@@ -22,10 +22,11 @@ static void play_line(struct farm *f, const char *line)
 	transcript_play(f, (const char *const[]){line, NULL});
 }
 
-/* The process that renders ends, the worker calls again in its next life and says which lease it was: a failure, as if
- * it had held the lease still, once. Three workers, and the job is over; its owner's next job gets one lease at a time.
+/* The process that renders ends, the worker connects again after a restart and says which lease it was: a failure, as
+ * if it had held the lease still, once. Three workers, and the job is over; its owner's next job gets one lease at a
+ * time.
  */
-static void told_by_the_next_life(void **state)
+static void told_after_a_restart(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
@@ -43,7 +44,7 @@ static void told_by_the_next_life(void **state)
 			"[2] w4 fails j1 g0 p0 boot SIGSEGV -> -", /* reported once */
 			"[2] w4 wants 1 -> -",			   /* and pauses */
 			"[2] w2 wants 1 -> w2 gets j1 g0 p0 boot",
-			/* the new life calls before the old connection is known to be cut */
+			/* the restarted worker connects before the old connection is known to be cut */
 			"[3] w5 joins A threads=1 home=b start=2 -> close w2",
 			"[3] w5 fails j1 g0 p0 boot SIGABRT -> -",
 			"[3] w3 wants 1 -> w3 gets j1 g0 p0 boot",
@@ -219,7 +220,7 @@ static void one_certificate(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(told_by_the_next_life),
+		cmocka_unit_test(told_after_a_restart),
 		cmocka_unit_test(limit_ends),
 		cmocka_unit_test(never_heard_again),
 		cmocka_unit_test(back_again),

@@ -242,7 +242,7 @@ static void extend_while_it_ends(void **state)
 	});
 }
 
-/* A job that has ended comes to life again under its id; what it had counted is told by whoever remembers. */
+/* A job that has ended is continued under its id; whoever stored its counters passes them in. */
 static void extend_when_it_has_ended(void **state)
 {
 	(void)state;

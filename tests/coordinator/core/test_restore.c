@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Jobs of an earlier life, and jobs that are held, as transcripts. */
+/* Jobs from before a restart of the coordinator, and jobs on hold, as transcripts. */
 #include "coordinator/core/doubt.h"
 #include "tests/support/transcript.h"
 
@@ -56,8 +56,8 @@ static void in_a_round(void **state)
 	farm_free(f);
 }
 
-/* A result from an earlier life that waited for another one: it counts when it can, without a word to anybody but who
- * has its lease. */
+/* A result from before the restart that waited for another one: it counts when it can, without a word to anybody but
+ * who has its lease. */
 static void stored_results(void **state)
 {
 	(void)state;

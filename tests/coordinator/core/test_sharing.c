@@ -160,7 +160,8 @@ static void owners_share_first(void **state)
 	farm_free(f);
 }
 
-/* An owner without a name is one as any other, however many they are; a job of an earlier life has its owner still. */
+/* An owner without a name is one as any other, however many they are; a job from before a restart still has its owner.
+ */
 static void the_nameless_and_the_restored(void **state)
 {
 	(void)state;

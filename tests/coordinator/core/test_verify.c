@@ -291,11 +291,11 @@ static void one_identity_is_one_worker_at_a_time(void **state)
 		"[0] submit groups=1 -> j1 submitted, j1 is queued",
 		"[0] w1 joins A threads=1 name=a home=a start=7 -> -",
 		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
-		/* the later life: what the earlier one held is free at once */
+		/* started again: what it held before is free at once */
 		"[1] w2 joins A threads=1 name=b home=a start=8 -> close w1",
 		"[1] w2 wants 1 -> w2 gets j1 g0 p0 boot",
 		"[2] w3 joins A threads=1 name=a home=a start=7 -> rejected: this is start 7 of a, and its start 8 has connected before",
-		/* the same life on a new connection */
+		/* the same start on a new connection */
 		"[3] w4 joins A threads=1 name=b home=a start=8 -> close w2",
 		"[3] w4 wants 1 -> w4 gets j1 g0 p0 boot",
 		"[4] w4 leaves -> -",

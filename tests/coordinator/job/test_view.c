@@ -167,7 +167,7 @@ static void shows_the_share(void **state)
 	json_decref(o);
 }
 
-/* While a job lives, the core's numbers replace those of its record; the rest of the record stays. */
+/* While a job is not over, the core's numbers replace those of its record; the rest of the record stays. */
 static void shows_what_the_core_says(void **state)
 {
 	(void)state;

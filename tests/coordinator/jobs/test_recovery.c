@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A coordinator that reads the jobs of an earlier life from a disk that gives out one piece when the test says so: it
- * lets peers in, says how far it is, answers what it can, and the rest in its order when the jobs are there; no result
- * that was acknowledged is asked for again.
+ * A coordinator that reads the jobs from before its restart from a disk that gives out one piece when the test says so:
+ * it lets peers in, says how far it is, answers what it can, and the rest in its order when the jobs are there; no
+ * result that was acknowledged is asked for again.
  */
 #include "common/base/disk.h"
 #include "coordinator/server/server.h"

@@ -483,7 +483,7 @@ static void extensions_wait_for_films(void **state)
 	hear_done(a, false, "one extension at a time");
 	hear_done(a, false, "one extension at a time");
 	hear_done(a, true, "continues after");
-	hear_done(b, true, "continues after"); /* the job lives by then */
+	hear_done(b, true, "continues after"); /* the job is running by then */
 	say_extend(a, 1, 8, 1);
 	hear_done(a, false, "it is black");
 	scripted_hang_up(a);
@@ -608,7 +608,7 @@ int main(void)
 		cmocka_unit_test(what_is_fetched_is_one_file), /* of that job */
 		cmocka_unit_test(strategies_are_counted_once),
 		cmocka_unit_test(what_is_useless_does_not_wait),
-		cmocka_unit_test(extensions_wait_for_films), /* the job of strategies_are_counted_once lives again */
+		cmocka_unit_test(extensions_wait_for_films), /* continues the job of strategies_are_counted_once */
 		cmocka_unit_test(extensions_are_served_as_they_came),
 		cmocka_unit_test(a_failure_counts_whatever_its_text),
 		cmocka_unit_test(complaints_do_not_fill_the_log), /* of that job */

@@ -231,7 +231,7 @@ static void what_no_end_makes_room_for(void **state)
 	jobs.ended_count = 1;
 	assert_int_equal(room_could_hold(&jobs, 7300, &e), 0);
 	assert_int_equal(room_could_hold(&jobs, 7301, &e), -ENOSPC);
-	jobs.found = (struct recovering_job *)&jobs; /* not known yet: jobs of an earlier life are being read */
+	jobs.found = (struct recovering_job *)&jobs; /* not known yet: jobs from before the restart are being read */
 	assert_int_equal(room_could_hold(&jobs, 7301, &e), 0);
 	disk_use(NULL);
 	blob_store_close(jobs.blobs);

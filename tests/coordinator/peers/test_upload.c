@@ -98,7 +98,7 @@ static void count_flushes(const char *spool)
 	disk_use(&counted);
 }
 
-/* Files of an earlier life with a higher limit: all but 64 exceed that of this one. */
+/* Files from before a restart, when the limit was higher: all but 64 exceed that of this one. */
 enum { STORED = 500, STORED_BYTES = 1 << 14, STORED_LEFT = (1 << 20) / STORED_BYTES };
 static void store_too_much(const char *spool)
 {

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The spool is damaged while no coordinator runs. What is not known is never deleted; what can be known again is; what
- * was lost is said and computed again, to the same bits, and nothing else is. Each run: the power goes in the middle of
- * the work, something is damaged, and the next life, which the power may end, too, goes on. Results that were
+ * was lost is said and computed again, to the same bits, and nothing else is. Each run: power is lost in the middle of
+ * the work, something is damaged, and the next start, which another loss of power may end, continues. Results that were
  * acknowledged and are handed out again are counted.
  */
 #include "tests/support/folder.h"
@@ -186,7 +186,7 @@ static void flip_in(const char *name, uint64_t seed)
 	flip(path, seed * 7919 * 104729 % size);
 }
 
-/* A job whose submission was under way when the power went may be in one file alone. It was not acknowledged, and a
+/* A job whose submission was under way when power was lost may be in one file alone. It was not acknowledged, and a
  * damaged row is all that is left of it: then the start is refused. So these are not damaged. */
 #define IN_BOTH "id IN (SELECT id FROM other.jobs)"
 
@@ -262,7 +262,7 @@ static void what_is_lost(void **state)
 	static const char *const files[] = {"jobs.db", "jobs-copy.db"};
 	run_before_damage(0);
 	uint64_t put_aside = 0;
-	/* Whether a life leaves a checkpoint depends on what was under way when it ended. */
+	/* Whether a run leaves a checkpoint depends on what was under way when it ended. */
 	for (uint64_t seed = 201; put_aside < 4; seed++) {
 		char path[256];
 		assert_true(seed < 240);

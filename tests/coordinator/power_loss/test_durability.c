@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The power goes at a random call of the disk, again and again, while a coordinator takes jobs, merges, writes
- * checkpoints and results; each life goes on with what the disk kept (tests/support/faulty_disk.h). Whatever was
+ * Power is lost at a random call of the disk, again and again, while a coordinator takes jobs, merges, writes
+ * checkpoints and results; each restart continues with what the disk kept (tests/support/faulty_disk.h). Whatever was
  * acknowledged is there: jobs, batches (a lease whose result was acknowledged is not handed out again), results that
  * were said to be there; and the image has the bits of an undisturbed run, which it has not if a batch is missing or
  * counted twice.
@@ -37,7 +37,7 @@
 #include <sys/mman.h>
 #include <sys/stat.h>
 
-enum { LIVES_MAX = 12, KINDS = 4 /* of calls that fail */, TESTS = 4 /* that count */ };
+enum { STARTS_MAX = 12, KINDS = 4 /* of calls that fail */, TESTS = 4 /* that count */ };
 
 static struct sums { /* of all shares */
 	struct outage_found found;
@@ -52,21 +52,21 @@ static void run_seed(uint64_t seed, uint64_t *losses, uint64_t *acks)
 	static struct farm_run f;
 	uint64_t draw = seed;
 	outage_begin(&f, seed);
-	bool dark = false;
-	for (int life = 0;; life++) {
+	bool power_cut = false;
+	for (int start = 0;; start++) {
 		struct lease_key k = {.kind = LEASE_RENDER, .epoch = draw++};
 		atomic_store(&outage.counts[0], 0);
 		atomic_store(&outage.counts[4], 0);
-		f.disk.seed = seed * 100 + (uint64_t)life;
-		f.disk.lose_at = life < LIVES_MAX && !dark
+		f.disk.seed = seed * 100 + (uint64_t)start;
+		f.disk.lose_at = start < STARTS_MAX && !power_cut
 					 ? 1 + scripted_tag(&k) % (outage.quiet_calls + outage.quiet_calls / 4)
 					 : 0;
 		bool done = outage_start(&f) && outage_work(&f);
-		if (done && dark)
+		if (done && power_cut)
 			break;
 		if (done) {
-			outage_stop_in_the_dark(&f);
-			dark = true;
+			outage_cut_power(&f);
+			power_cut = true;
 			continue;
 		}
 		outage_hang_up(&f);
@@ -78,7 +78,7 @@ static void run_seed(uint64_t seed, uint64_t *losses, uint64_t *acks)
 	*acks += f.acks;
 }
 
-/* Calls fail, from the n-th on; then all is well again, the power goes, and all that was acknowledged is there. */
+/* Calls fail, from the n-th on; then all is well again, power is lost, and all that was acknowledged is there. */
 static void run_faults(uint64_t from, uint64_t count, int with, bool writes_only, uint64_t *refused, uint64_t *failed)
 {
 	static struct farm_run f;
@@ -89,8 +89,8 @@ static void run_faults(uint64_t from, uint64_t count, int with, bool writes_only
 	f.disk.fail_writes_only = writes_only;
 	f.disk.lose_after = from % 3 ? 1 + from % 23 : 0;
 	f.faulty = true;
-	for (int life = 0;; life++) {
-		assert_true(life < 3);
+	for (int start = 0;; start++) {
+		assert_true(start < 3);
 		atomic_store(&outage.counts[4], 0);
 		if (outage_start(&f) && outage_work(&f))
 			break;
@@ -101,7 +101,7 @@ static void run_faults(uint64_t from, uint64_t count, int with, bool writes_only
 			f.refused++; /* it did not start, and said why */
 		f.disk.fail_from = 0;
 	}
-	outage_stop_in_the_dark(&f);
+	outage_cut_power(&f);
 	f.disk.fail_from = 0;
 	f.faulty = false;
 	atomic_store(&outage.counts[4], 0);
@@ -111,7 +111,7 @@ static void run_faults(uint64_t from, uint64_t count, int with, bool writes_only
 	*failed += f.failed;
 }
 
-/* The power goes in the middle of the work; calls of the next start fail, from the n-th on. It starts or says why not;
+/* Power is lost in the middle of the work; calls of the next start fail, from the n-th on. It starts or says why not;
  * no job fails of it, and all that was acknowledged is there, then or after another start. */
 static bool begin_restart(struct farm_run *f, uint64_t from)
 {
@@ -207,7 +207,7 @@ static void power_goes_at_any_time(void **state)
 	now->taken += atomic_load(&outage.counts[3]);
 	bool pass = share || one || shares_pass();
 	if (share == 0)
-		printf("   %llu runs of %llu calls: the power took %llu sectors and names; %llu batches were acknowledged\n",
+		printf("   %llu runs of %llu calls: %llu sectors and names were lost; %llu batches were acknowledged\n",
 		       (unsigned long long)(one ? 1 : seeds), (unsigned long long)outage.quiet_calls,
 		       (unsigned long long)now->taken, (unsigned long long)now->acks);
 	say_harm("power", now->losses);
@@ -384,7 +384,7 @@ static uint64_t living_job(void)
 	return 0;
 }
 
-/* What a job has come to when the power goes is a matter of chance. */
+/* What a job has come to when power is lost is a matter of chance. */
 static uint64_t begin_living_restart(struct farm_run *f)
 {
 	uint64_t id = 0;

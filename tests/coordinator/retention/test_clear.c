@@ -77,7 +77,7 @@ static void add(uint64_t id, double ended)
 		assert_int_equal(ledger_end(jobs.ledger, &r, false, &e), 0);
 	assert_int_equal(spool_make_job(jobs.spool, id, &e), 0);
 	write_file(id, "result.exr");
-	write_file(id, "checkpoint.tmp"); /* of a life that was cut short */
+	write_file(id, "checkpoint.tmp"); /* of a run that was cut short */
 }
 
 static void open_jobs(void)
@@ -136,7 +136,7 @@ static void jumps_of_the_wall_clock_remove_nothing(void **state)
 	}
 }
 
-/* The last half hour of observed time was not stored when the power went: the job that ended then is older all the same
+/* The last half hour of observed time was not stored when power was lost: the job that ended then is older all the same
  * than what ends now. */
 static void the_order_outlives_a_loss_of_power(void **state)
 {
@@ -226,7 +226,7 @@ static void many_rows_are_read_bit_by_bit(void **state)
 	spool_close(jobs.spool);
 }
 
-/* Records of an earlier version, and of a life whose clock went ahead: they are as young as they can be. */
+/* Records of an earlier version, and of a run whose clock was ahead: they are as young as they can be. */
 static void of_unknown_age(void **state)
 {
 	(void)state;

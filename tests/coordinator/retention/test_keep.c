@@ -120,7 +120,7 @@ static void end_at(uint64_t id, double seconds)
 	mem_free(record);
 }
 
-/* A start knows the jobs that ended last, as the earlier life did: however old they are, a long one among them. The
+/* A start knows the jobs that ended last, as the run before it did: however old they are, a long one among them. The
  * films of others nobody would count. */
 static void the_last_are_known_after_a_start(void **state)
 {

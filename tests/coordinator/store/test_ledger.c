@@ -134,7 +134,7 @@ static void living_jobs(void **state)
 	assert_int_equal(ledger_drop(l, (uint64_t[]){2, 3}, 2, &e), 0);
 	assert_int_equal(ledger_ended_count(l), 0);
 	assert_int_equal(ledger_get(l, 2, &j, &e), 0);
-	assert_int_equal(ledger_get(l, 3, &j, &e), 1); /* it lives */
+	assert_int_equal(ledger_get(l, 3, &j, &e), 1); /* it is not over */
 	struct ledger_job again = {.id = 3, .owner = "", .name = "", .version = "", .record = ""};
 	assert_int_equal(ledger_add(l, &again, &e), -EEXIST); /* an id is given once */
 	ledger_close(l);
@@ -193,8 +193,8 @@ static void hold_and_priority_are_kept(void **state)
 	ledger_close(l);
 }
 
-/* A job that ended lives again with another plan, whether the row knew of its end or not; and that end is not one of
- * its next life. */
+/* A job that ended is continued with another plan, whether the row knew of its end or not; and that end is not one of
+ * the continued job. */
 static void an_ended_job_can_be_extended(void **state)
 {
 	(void)state;
@@ -309,7 +309,7 @@ static void what_is_kept_of_an_ended_job(void **state)
 	struct ledger *l = open_ledger();
 	add(l, 1);
 	assert_int_equal(ledger_read_record(l, 1, &r, &e), -ENOENT);
-	assert_int_equal(ledger_drop_submission(l, 1, &e), 0); /* it lives */
+	assert_int_equal(ledger_drop_submission(l, 1, &e), 0); /* it is not over */
 	assert_int_equal(ledger_end(l, record_of(1, 0, "failed"), true, &e), 0);
 	assert_int_equal(ledger_get(l, 1, &j, &e), 1);
 	assert_true(j.ended > 1e9 && j.submission_size == 4 && j.plan_size == 2);
@@ -378,7 +378,7 @@ static void stays_small(void **state)
 	ledger_close(l);
 }
 
-/* Rows as large as those of real jobs, every third of which lives. */
+/* Rows as large as those of real jobs, every third of which is not over. */
 static void fill(int rows)
 {
 	char sql[600];

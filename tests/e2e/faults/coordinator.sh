@@ -11,7 +11,7 @@ kill_coordinator() {
 	finish_job
 }
 coordinator_dies() {
-	lives=$(times_restored)
+	restores=$(times_restored)
 	kill -9 "$COORDINATOR_PID"
 	again "$@"
 	is_restored || LATE=yes
@@ -19,9 +19,9 @@ coordinator_dies() {
 times_restored() {
 	times_said coordinator "event=job_state job=$ID state=restored"
 }
-# since `lives` was counted: otherwise it had ended
+# since `restores` was counted: otherwise it had ended
 is_restored() {
-	[ "$(times_restored)" -gt "$lives" ]
+	[ "$(times_restored)" -gt "$restores" ]
 }
 
 fault checkpoint_coordinator 20 1 "the same, with a checkpoint after every few results"

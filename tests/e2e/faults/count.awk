@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-# What came of a job's results. Reads the coordinator's log of all its lives (-v), then the workers' logs (-v), and prints
+# What came of a job's results. Reads the coordinator's log of all its runs (-v), then the workers' logs (-v), and prints
 # "LOST DOUBLED RESULTS AGAIN".
 #   awk -v job=j1 -f count.awk coordinator.log w1.log ...
-# The film of a life is what the coordinator found on the disk when it started, and what it merged from then on. LOST are
-# results that were acknowledged and that it had to merge again in a later life, or that the last film does not hold; and
-# those of which a worker was told that they count and that never were on the disk. What a life merged and lost before it was
+# The film of a run is what the coordinator found on the disk when it started, and what it merged from then on. LOST are
+# results that were acknowledged and that it had to merge again in a later run, or that the last film does not hold; and
+# those of which a worker was told that they count and that never were on the disk. What a run merged and lost before it was
 # acknowledged is computed again and is no loss, nor is what the coordinator took back, before or after it was on the disk. DOUBLED: how often a film held a result beyond the first time. RESULTS: how
 # many the last film holds. AGAIN: the most epochs of one chain that were given out again because one worker was gone that had them, or
-# one life of the coordinator; one that is given to two at once, as at the end of a round, is no loss.
+# one run of the coordinator; one that is given to two at once, as at the end of a round, is no loss.
 
 function get(name) {
 	return match($0, " " name "=[^ ]*") ? substr($0, RSTART + length(name) + 2, RLENGTH - length(name) - 2) : ""
@@ -29,20 +29,20 @@ function add(k, fresh) {
 
 / event=start / && /program=hslt-coordinator/ {
 	started = 1
-	life++
+	run++
 	split("", unstored)
 	split("", void)
 }
 
-/ event=(peer_closed|peer_accept) .*text=/ { gone[life, get("peer")] = 1 }
+/ event=(peer_closed|peer_accept) .*text=/ { gone[run, get("peer")] = 1 }
 
 / event=lease_granted / && get("job") == job {
 	k = key(get("kind"), get("epoch"))
-	if (k in holder && (split(holder[k], had, SUBSEP) && had[1] != life || holder[k] in gone)) {
-		n = ++repeats[had[1] != life ? had[1] : holder[k], get("group"), get("part")]
+	if (k in holder && (split(holder[k], had, SUBSEP) && had[1] != run || holder[k] in gone)) {
+		n = ++repeats[had[1] != run ? had[1] : holder[k], get("group"), get("part")]
 		again = n > again ? n : again
 	}
-	holder[k] = life SUBSEP get("peer")
+	holder[k] = run SUBSEP get("peer")
 }
 
 / event=batch_/ && get("job") == job {

@@ -19,13 +19,13 @@ failing_starts() {
 
 # disk_test WHAT SEEDS STEP: TIMES is how often it says that it did that
 disk_test() {
-	[ -x "$BUILD/tests/coordinator/power_loss/test_power" ] || fail "$NAME: tests/coordinator/power_loss/test_power is not built"
-	HSLT_POWER_SEEDS=$2 HSLT_FAULT_STEP=$3 "$BUILD/tests/coordinator/power_loss/test_power" >"$DIR/power.log" 2>&1 && CODE=0 || CODE=$?
+	[ -x "$BUILD/tests/coordinator/power_loss/test_durability" ] || fail "$NAME: tests/coordinator/power_loss/test_durability is not built"
+	HSLT_POWER_SEEDS=$2 HSLT_FAULT_STEP=$3 "$BUILD/tests/coordinator/power_loss/test_durability" >"$DIR/power.log" 2>&1 && CODE=0 || CODE=$?
 	# shellcheck disable=SC2046
 	set -- $(sed -n "s/^ *$1: times=\([0-9]*\) lost=\([0-9]*\) doubled=\([0-9]*\) images=\([0-9]*\) unequal=\([0-9]*\)$/\1 \2 \3 \4 \5/p" "$DIR/power.log")
 	[ $# -eq 5 ] && [ "$1" -gt 0 ] && [ "$4" -gt 0 ] || fail "$NAME: it counts nothing: $(tail -n 9 "$DIR/power.log")"
 	TIMES=$1
 	[ "$5" -eq 0 ] && equal=yes || equal=no
-	[ $CODE -eq 0 ] || [ "$2 $3 $5" != "0 0 0" ] || fail "$NAME: test_power ended with $CODE: $(tail -n 9 "$DIR/power.log")"
+	[ $CODE -eq 0 ] || [ "$2 $3 $5" != "0 0 0" ] || fail "$NAME: test_durability ended with $CODE: $(tail -n 9 "$DIR/power.log")"
 	row "$2" "$3" $equal -
 }

@@ -51,7 +51,7 @@ job() {
 	ID=$(submit "$BOX" -o "$DIR/image.exr" $JOB "$@") || fail "$NAME: $(tail -n 1 "$DIR/submit.log")"
 }
 
-# what the coordinator has merged in all its lives
+# what the coordinator has merged in all its runs
 merged() {
 	grep -c "event=batch_merged job=$ID " "$DIR/coordinator.log" || :
 }

@@ -52,7 +52,7 @@ while_chains_go_on() {
 # The other worker stands still meanwhile, lest it leaves only the last epochs.
 somebody_spoils() {
 	hold_job $((RESULTS / 4)) $((RESULTS * 3 / 4))
-	faulty_worker "liar$i" spoil=1,lie=1,hang=3 --cache "$DIR/cache$i" # of no life of another
+	faulty_worker "liar$i" spoil=1,lie=1,hang=3 --cache "$DIR/cache$i" # its own, or it would be another start of the same worker
 	says coordinator "event=peer_hello .*name=\"liar$i\""
 	stand_still "$OTHER"
 	release_job

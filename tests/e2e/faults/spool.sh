@@ -187,7 +187,7 @@ TEXT
 
 fault folder_gone 6 2 "a job's folder is removed, moved away, or removed twice while the job runs"
 folder_gone() {
-	farm # from the first life's journal a new one is made, in the second one there are checkpoints
+	farm # the second start makes a new journal from the first's; in the second run there are checkpoints
 	worker w0
 	worker w1
 	job

@@ -17,15 +17,15 @@
 
 #include <cmocka.h>
 
-enum { LIVES_MOST = 8, BY_SIGNAL = 1000, NEVER = -1 };
+enum { STARTS_MOST = 8, BY_SIGNAL = 1000, NEVER = -1 };
 
 /* Shared with the processes. */
 static struct {
-	int ends[LIVES_MOST]; /* of each life: its exit code, BY_SIGNAL and a signal, or NEVER */
-	atomic_int lives;
+	int ends[STARTS_MOST]; /* of each process, by start: its exit code, BY_SIGNAL and a signal, or NEVER */
+	atomic_int starts;
 	atomic_int forks, failing_forks; /* so many of the supervisor's, after the first, fail */
-	int hang_up;			 /* the life that sends SIGHUP to the supervisor before it ends; 0: none does */
-	bool counts;			 /* in the supervisor */
+	int hang_up; /* the process that sends SIGHUP to the supervisor before it ends; 0: none does */
+	bool counts; /* in the supervisor */
 } * plan;
 
 pid_t __real_fork(void);
@@ -39,11 +39,11 @@ pid_t __wrap_fork(void)
 	return __real_fork();
 }
 
-static int run_life(void *user)
+static int run_child(void *user)
 {
 	(void)user;
-	int life = atomic_fetch_add(&plan->lives, 1), end = life < LIVES_MOST ? plan->ends[life] : 99;
-	if (plan->hang_up == life + 1)
+	int start = atomic_fetch_add(&plan->starts, 1), end = start < STARTS_MOST ? plan->ends[start] : 99;
+	if (plan->hang_up == start + 1)
 		kill(getppid(), SIGHUP); /* which it receives before this process ends: SIGCHLD has a higher number */
 	while (end == NEVER)
 		pause();
@@ -56,14 +56,14 @@ static int run_life(void *user)
 static int supervise_code(void (*hang_up)(int))
 {
 	int status;
-	atomic_store(&plan->lives, 0);
+	atomic_store(&plan->starts, 0);
 	atomic_store(&plan->forks, 0);
 	pid_t p = __real_fork();
 	assert_true(p >= 0);
 	if (p == 0) {
 		signal(SIGHUP, hang_up);
 		plan->counts = true;
-		_exit(supervise(1, run_life, NULL));
+		_exit(supervise(1, run_child, NULL));
 	}
 	assert_int_equal(waitpid(p, &status, 0), p);
 	plan->counts = false;
@@ -77,7 +77,7 @@ static void is_the_last(int process, const int *codes, size_t count)
 	for (size_t i = 0; i < count; i++) {
 		plan->ends[process] = codes[i];
 		assert_int_equal(supervise_code(SIG_DFL), codes[i]);
-		assert_int_equal(plan->lives, process + 1);
+		assert_int_equal(plan->starts, process + 1);
 	}
 }
 
@@ -103,7 +103,7 @@ static void no_process_for_a_while(void **state)
 	plan->ends[1] = 6;
 	atomic_store(&plan->failing_forks, 2);
 	assert_int_equal(supervise_code(SIG_DFL), 6);
-	assert_int_equal(plan->lives, 2);
+	assert_int_equal(plan->starts, 2);
 	assert_int_equal(plan->forks, 4);
 }
 
@@ -115,10 +115,10 @@ static void ignored_hang_up(void **state)
 	plan->ends[0] = BY_SIGNAL + SIGKILL;
 	plan->ends[1] = 6;
 	assert_int_equal(supervise_code(SIG_IGN), 6);
-	assert_int_equal(plan->lives, 2);
+	assert_int_equal(plan->starts, 2);
 	plan->ends[0] = NEVER; /* it is passed on */
 	assert_int_equal(supervise_code(SIG_DFL), 0);
-	assert_int_equal(plan->lives, 1);
+	assert_int_equal(plan->starts, 1);
 	plan->hang_up = 0;
 }
 

@@ -13,7 +13,7 @@
 
 #include <cmocka.h>
 
-static char folder[] = "/tmp/hslt-life.XXXXXX";
+static char folder[] = "/tmp/hslt-identity.XXXXXX";
 
 static struct worker_identity begin_identity(const char *name)
 {

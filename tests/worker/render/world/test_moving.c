@@ -455,7 +455,7 @@ static void check_power(const char *shape, double area)
 	world_free(w);
 }
 
-static void test_power(void **state)
+static void test_emitted_power(void **state)
 {
 	(void)state;
 	check_power("rectangle", 4);
@@ -605,7 +605,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_at_a_time), cmocka_unit_test(test_lights),
-		cmocka_unit_test(test_stretched), cmocka_unit_test(test_power),
+		cmocka_unit_test(test_stretched), cmocka_unit_test(test_emitted_power),
 		cmocka_unit_test(test_camera),	  cmocka_unit_test(test_still),
 		cmocka_unit_test(test_refused),	  cmocka_unit_test(test_many_keyframes),
 	};
