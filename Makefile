@@ -10,6 +10,7 @@
 # make fuzz-numbers   scenes with extreme numbers against a farm of sanitized workers, FUZZ_SECONDS (60) long
 # make corpus DIR=...   tries every scene file under a folder: loaded, or refused for what
 # make man completion   what the programs print with --man and --completion, into build/man and build/completion
+# make pictures accuracy   the pictures of the documentation, and the reports on accuracy settings
 # make demo bench fuzz install uninstall clean
 
 CC       ?= gcc
@@ -233,10 +234,15 @@ BENCH_WRAP := -Wl,--wrap=accel_closest,--wrap=accel_occluded,--wrap=accel_occlud
 bench: programs $(BUILD)/bench/bench $(if $(filter effects,$(BENCH)),plain)
 	$(BUILD)/bench/bench --bin $(BUILD)/bin --json $(BUILD)/bench.json $(BENCH)
 
-# build/equal-time.png, the pictures of the README: eight processor seconds each, about seven minutes of one core.
-.PHONY: row
-row: programs
-	python3 tests/bench/row.py $(BUILD) $(BUILD)/equal-time.png 9 5
+# The pictures of the documentation, into build/pictures: about half an hour of one core. make pictures PICTURES="equal-time window"
+.PHONY: pictures
+pictures: programs
+	$(PYTHON) tests/bench/pictures.py $(BUILD) $(BUILD)/pictures $(PICTURES)
+
+# The reports of tests/bench/accuracy/README.md as pages and tables, into build/accuracy: about 20 minutes of one core.
+.PHONY: accuracy
+accuracy: programs
+	sh tests/bench/accuracy/reports.sh $(BUILD)/bin $(BUILD)/accuracy
 
 # Stated errors against true ones: about an hour of one core. CALIBRATION="--renders 8 --lengths 2" for less.
 CALIBRATION_SRC := $(filter-out tests/image/test_%.c,$(wildcard tests/image/*.c))
