@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The farm's processes against hslt-render on the same plan, and their memory. */
+/*
+ * Benchmarks farm, memory and sending: a coordinator with workers on loopback against hslt-render on the same plan, in
+ * CPU time and throughput; peak memory of coordinator and worker; bytes that hslt-submit sends the first and the second
+ * time. Programs that are not built skip the benchmark with a message; one that fails ends it.
+ */
 #include "common/base/mem.h"
 #include "common/plan/plan.h"
 #include "tests/bench/bench.h"

@@ -1,5 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* One of the crowd: the conversation of proto/README.md from a worker's side. */
+/*
+ * A fake worker of the load test: the worker's side of the conversation in proto/README.md, without rendering. It says
+ * hello, asks for leases, fetches the job's files, waits as long as a lease would take, sends a prepared result and
+ * waits for its acknowledgement. Workers of other kinds than honest (load.h) hang up, send results that are no numbers,
+ * hoard leases, or fall silent. What the protocol does not allow is counted as a fault of the run; a plan that is not
+ * the job's ends it.
+ */
 #include "tests/load/load.h"
 
 #include "common/base/mem.h"

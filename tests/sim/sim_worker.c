@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Workers that compute, crash, freeze, come back, fail, lie and volunteer. */
+/*
+ * The simulated workers: they compute leases at their own speed, crash, freeze, return, fail leases, send wrong results
+ * and offer results that nobody asked for, as the seed says. sim_result_of defines the right result of a lease;
+ * sim_shell.c checks what is merged against it.
+ */
 #include "tests/sim/sim_private.h"
 
 #include <math.h>

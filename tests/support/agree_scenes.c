@@ -1,4 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Scenes that are hard on the numbers, for the comparison of integrators: very small and very large things, tilted
+ * planes, glass inside glass, fibres, poles, clouds, media that contradict each other. Each function makes one world;
+ * the table at the end says at which sizes, with how many samples, and which bias must be found.
+ */
 /* Scenes are laid out by hand. */
 /* clang-format off */
 #include "tests/support/agree_scenes.h"

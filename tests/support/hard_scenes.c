@@ -1,4 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Small scenes in which one number goes to its limit: smooth metal, thin bubbles, grazing light, narrow gaps, slivers,
+ * a distant sun. Each function takes that number and makes the world; tests let it approach the limit and look for what
+ * is not finite, and for bias.
+ */
 /* Scenes are laid out by hand. */
 /* clang-format off */
 #include "tests/support/hard_scenes.h"

@@ -1,4 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Small rooms for tests of mutations and densities, each with one more kind of transport: glass, mirrors, bent normals,
+ * fog, clouds, a sky, point lights, thin lenses, moving things. Few surfaces and a lamp, so that a pass over all rooms
+ * takes seconds.
+ */
 /* Scenes are laid out by hand. */
 /* clang-format off */
 #include "tests/support/rooms.h"

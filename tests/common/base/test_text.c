@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Buffers keep their limit, texts are cut between characters, log values cannot forge a line, figures read well. */
+/*
+ * Text helpers (common/base/text.h): buffers never exceed their limit, texts are cut between UTF-8 characters and lose
+ * their control characters, values cannot forge a line of the log, and numbers, counts and times are printed for
+ * people.
+ */
 #include "common/base/buf.h"
 #include "common/base/error.h"
 #include "common/base/log.h"

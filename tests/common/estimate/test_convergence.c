@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What makes chains disagree, from synthetic images: each criterion alone, on both sides of its limit, and its words.
+/*
+ * When chains are said to disagree (common/estimate/convergence.h), from synthetic images. Each criterion alone, just
+ * below and just above its limit: tiles that have not mixed, classes that differ from the bootstrap, groups that are
+ * apart, chains that stand still. Then the sentences, which must fit however many criteria fail, and what the image
+ * file says.
  */
 #include "common/estimate/convergence.h"
 

@@ -1,5 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Counters of strategies: exact sums over rounds, what a batch may say, and the table that people see. */
+/*
+ * Counters of mutation strategies: rounds add up exactly, each batch once; a batch with impossible counts is refused;
+ * the printed table, the JSON and the image header show the same numbers, and every counter has a name.
+ */
 #include "common/estimate/strategy.h"
 
 #include "common/base/mem.h"

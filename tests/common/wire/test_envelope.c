@@ -1,5 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Messages go out and come in again; unknown fields, memory bombs and broken bytes do not. */
+/*
+ * Packing and unpacking of messages. What is packed is read back, and the macros make the same bytes as protobuf-c's
+ * functions. Refused, with an error and no memory left behind: unknown fields, damaged bytes, texts that are not UTF-8,
+ * and messages that would take far more memory than they have bytes. Running out of memory is an error of its own, not
+ * the sender's fault.
+ */
 #include "common/wire/envelope.h"
 #include "common/wire/frame.h"
 #include "common/base/mem.h"

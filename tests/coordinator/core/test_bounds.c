@@ -1,5 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* How a job ends, as transcripts; and what is said about it on the way. */
+/*
+ * How a job ends, as transcripts of events and actions: by samples, by time, by its error, without any light, or
+ * failed, with the exit code of each; and what its status says on the way: progress, rate, remaining time and forecast.
+ */
 #include "tests/support/transcript.h"
 
 #include <math.h>

@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What people want of jobs that are there, as transcripts: hold, release, priority. */
+/*
+ * What people do to existing jobs, as transcripts: hold and release, change the priority, extend while the job runs,
+ * while it ends and after it has ended. Leases that are out when the order arrives still count, time on hold does not,
+ * and damaged files are nobody's fault.
+ */
 #include "tests/support/transcript.h"
 
 #include <setjmp.h>

@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Jobs from before a restart of the coordinator, and jobs on hold, as transcripts. */
+/*
+ * Jobs restored after a restart of the coordinator, as transcripts: in the bootstrap, in the middle of a round, with
+ * stored results, at a bound that was met already, on hold, and more of them than may run at once. What was merged
+ * before is a repeat, what was leased before is accepted when it arrives.
+ */
 #include "coordinator/core/doubt.h"
 #include "tests/support/transcript.h"
 

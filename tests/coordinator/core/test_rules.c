@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What is merged, repeated, refused and handed out again, as transcripts. */
+/*
+ * The rules for one lease, as transcripts: what is merged, what counts as a repeat, what is refused, and when a lease
+ * is handed out again, because its worker left, fell silent, returned it, or is much slower than others. Also limits on
+ * what a worker may ask for and on names.
+ */
 #include "tests/support/transcript.h"
 
 #include <setjmp.h>

@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Several jobs and several kinds of workers: priority, fairness, fingerprints, limits, and why a job waits. */
+/*
+ * How several jobs share several workers, as transcripts: higher priorities first, then equal shares by owner and by
+ * job; numeric fingerprints, which pin a job to one kind of worker; limits on jobs, workers and memory; and the reason
+ * that the status gives for a job that waits.
+ */
 #include "tests/support/failing_memory.h"
 #include "tests/support/transcript.h"
 

@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Leases that two workers compute, and workers that are quarantined, as transcripts. */
+/*
+ * Verified leases, as transcripts: a result counts once two workers returned the same numbers, a third decides where
+ * they differ, and a worker that was outvoted too often is quarantined with everything it has noted. Also who counts as
+ * the same worker after restarts, reconnections and changes of name.
+ */
 #include "coordinator/core/worker_registry.h"
 #include "tests/support/transcript.h"
 
@@ -191,7 +195,7 @@ static void a_share_of_the_leases_is_verified(void **state)
 	farm_free(f);
 }
 
-static void set_aside(void **state)
+static void outvoted_three_times_is_quarantined(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
@@ -403,7 +407,7 @@ int main(void)
 		cmocka_unit_test(leaves_between),
 		cmocka_unit_test(a_restart_computes_unverified_leases_anew),
 		cmocka_unit_test(a_share_of_the_leases_is_verified),
-		cmocka_unit_test(set_aside),
+		cmocka_unit_test(outvoted_three_times_is_quarantined),
 		cmocka_unit_test(notes_of_a_liar),
 		cmocka_unit_test(quarantined_workers_are_remembered),
 		cmocka_unit_test(one_identity_is_one_worker_at_a_time),

@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A job as JSON: the counters of its strategies, and what is to be said about it. */
+/*
+ * A job as JSON, as status and records show it: counters of strategies, the estimated error or the reason why none is
+ * stated, the forecast, the share of the work that is done, and the core's numbers instead of the record's while the
+ * job is not over.
+ */
 #include "coordinator/job/view.h"
 
 #include <math.h>

@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The coordinator's shell against peers that say rubbish, lie, straggle, crowd, or do not read. */
+/*
+ * The coordinator against bad peers, over real sockets: bytes that are no messages, too many connections, peers that
+ * never say hello, read nothing, send too slowly or submit what cannot be. Each is refused or disconnected with a
+ * reason, others are served meanwhile, and the coordinator's memory stays bounded.
+ */
 #include "tests/support/served.h"
 
 #include "common/blob/blob.h"

@@ -1,5 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The plan of a job that goes on: the later bounds, and nothing that decides bits. */
+/*
+ * The plan of an extended job. It has the later bounds and everything else as before, so that a job extended twice has
+ * the bits of one long job; bounds that are met already, or that no job could end at, are refused with a sentence.
+ */
 #include "coordinator/jobs/extend.h"
 
 #include <math.h>

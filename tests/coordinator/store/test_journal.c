@@ -1,5 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A journal gives back what was appended and whole, wherever the machine stopped and whatever bit fell over. */
+/*
+ * The journal of a job's results gives back every record that was appended completely, in order, and no other: after a
+ * cut at every byte, a flip of every bit, holes, records forged inside of records, read errors, a loss of power and a
+ * full disk. A damaged record costs itself alone; a read error is reported as such and never mistaken for the end of
+ * the journal.
+ */
 #include "coordinator/store/journal.h"
 #include "coordinator/store/journal_file.h"
 #include "common/base/crc.h"

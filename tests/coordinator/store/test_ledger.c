@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The database of jobs: what was added is there again, what has ended is not, another version is refused. */
+/*
+ * The database of jobs (coordinator/store/ledger.h): rows survive closing and opening, ended jobs keep what they must
+ * and no more, ids are never given twice, notes and checksums stay what they are, databases of earlier versions are
+ * read and of later ones refused, and the file stays small while jobs come and go.
+ */
 #include "coordinator/store/ledger.h"
 
 #include "common/base/mem.h"

@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The worker's parts: threads and their way back, the cache's slots, what is fetched, the fingerprint. */
+/*
+ * Parts of the worker daemon: the thread pool runs tasks and returns them on the loop's thread, workers share a cache
+ * folder without sharing a slot and never use somebody else's, files of an earlier run are hashed before use, a job is
+ * built from the files that it needs, and the numeric fingerprint is the same each time.
+ */
 #include "common/base/mem.h"
 #include "worker/daemon/job_cache.h"
 #include "worker/daemon/cache.h"
@@ -52,7 +56,7 @@ static void count_done(struct task *t)
 	((struct job *)t)->done++;
 }
 
-static void the_crew_works(void **state)
+static void the_pool_runs_tasks(void **state)
 {
 	(void)state;
 	enum { JOBS = 100 };
@@ -256,7 +260,7 @@ static void files_of_an_earlier_run_are_read(void **state)
 	cache_close(&cache);
 }
 
-static void a_bundle_holds_what_it_needs(void **state)
+static void a_job_is_built_from_its_files(void **state)
 {
 	(void)state;
 	struct cache cache;
@@ -317,10 +321,10 @@ static void the_fingerprint_is_stable(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(the_crew_works),
+		cmocka_unit_test(the_pool_runs_tasks),
 		cmocka_unit_test_setup_teardown(workers_share_a_cache_folder, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_cache_of_others_is_not_used, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(a_bundle_holds_what_it_needs, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(a_job_is_built_from_its_files, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(files_of_an_earlier_run_are_read, folder_set_up, folder_tear_down),
 		cmocka_unit_test(the_fingerprint_is_stable),
 	};

@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Which scenes a worker holds at the same time after memory has run short, with a scripted coordinator. */
+/*
+ * Which scenes a worker holds at once after memory ran short, with a scripted coordinator: one at a time for ten
+ * minutes, twice as long when it happens again, then all. Leases of the scene that waits are given back, and no job
+ * fails of it.
+ */
 #include "common/base/clock.h"
 #include "common/base/mem.h"
 #include "worker/daemon/lease_queue.h"

@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* plastic, roughplastic, coating, roughcoating and thindielectric against what their formulas stand for. */
+/*
+ * plastic, roughplastic, coating, roughcoating and thindielectric. Light that goes in and out of the layer is followed
+ * bounce by bounce and compared with the closed forms: energy over a white base, absorption by Beer's law, total
+ * reflection inside, rough layers that become smooth ones, layers without a boundary, on both sides, and textured.
+ */
 #include "tests/worker/render/bsdf/bsdf_cases.h"
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/microfacet.h"

@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Exactly specular lobes asked for by name, against the ones that sample() finds; and the mean roughness. */
+/*
+ * Exactly specular lobes. Their directions and shares, asked for by name, are those that sample() finds by chance;
+ * nothing passes beyond the critical angle; masks and polarization filters let light straight through; and the mean
+ * roughness that mutations use is that of all lobes.
+ */
 #include "tests/support/dice.h"
 #include "tests/worker/render/bsdf/bsdf_cases.h"
 #include "worker/render/bsdf/diffuse.h"

@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Measured materials: against the formulas that their files were made of, and files that are broken. */
+/*
+ * Measured materials (measured, after Dupuy and Jakob 2018). Files made of a known microfacet formula must give that
+ * formula's values, symmetries, sampling and roughness back, spectrally and in RGB. Truncated and damaged files,
+ * impossible sizes and numbers, and other files are refused with a sentence.
+ */
 #include "tests/support/measured_file.h"
 #include "tests/support/nodes.h"
 #include "tests/support/stats.h"

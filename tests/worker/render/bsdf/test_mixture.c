@@ -1,5 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* ward, mixturebsdf and difftrans against their formulas, written as their papers and Mitsuba 0.6's manual have them.
+/*
+ * ward, mixturebsdf and difftrans against their formulas, written out as their papers and the manual of Mitsuba 0.6
+ * have them. Also sums of BSDFs whose weights exceed 1, parts that let light straight through, twosided inside
+ * twosided, textures as numbers, and coloured opacities.
  */
 #include "tests/support/dice.h"
 #include "tests/worker/render/bsdf/bsdf_cases.h"

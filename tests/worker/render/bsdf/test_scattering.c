@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What light may do at a surface: reciprocity, energy, colour, closed forms, refusals. */
+/*
+ * Laws that every BSDF obeys, over all of bsdf_cases.h: reciprocity unless it says otherwise, no energy gained, white
+ * furnaces, the same values without wavelengths and in any frame. Then closed forms of the simple ones, microfacet
+ * values computed by hand, textured roughness, and errors: parameters that make no sense, and memory that runs out.
+ */
 #include "tests/support/length.h"
 #include "tests/support/stats.h"
 #include "tests/worker/render/bsdf/bsdf_cases.h"

@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The pinhole and the thin lens against what these are. Exact but for rounding; derivatives by central differences. */
+/*
+ * The pinhole and the thin lens. Projection and direction are inverse, derivatives agree with central differences,
+ * fov_axis and principal_point_offset mean what Mitsuba says, near and far clip across the axis, rays through the lens
+ * meet in the plane of focus, and a lens without a radius is the pinhole bit for bit.
+ */
 #include "tests/support/dice.h"
 #include "worker/render/camera/camera.h"
 

@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The densities of sub-paths and techniques (tests/support/density.h), on worlds of all kinds. */
+/*
+ * Densities of sub-paths and of the techniques that could have made a path, recomputed independently
+ * (tests/support/density.h) on worlds of all kinds: rough and specular surfaces, environments, surfaces that are
+ * passed, fog, clouds, flakes, thin lenses, point lights and bent normals.
+ */
 #include "tests/support/density.h"
 #include "tests/support/memory_assets.h"
 #include "tests/support/rooms.h"

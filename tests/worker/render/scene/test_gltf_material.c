@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Materials of glTF: what becomes of the format's layers and extensions. */
+/*
+ * Materials of glTF as the scene reader translates them: base colour and metal, the layers and volumes that extensions
+ * add (clearcoat, sheen, transmission, anisotropy, specular reflection), surfaces that shine, images in buffers, WebP
+ * and formats that are not read. What has no equivalent is named in a note or refused.
+ */
 #include "tests/support/gltf_files.h"
 #include "tests/support/pictures.h"
 #include "tests/support/scene_parts.h"

@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* glTF files with several sets of texture coordinates, without extents, of version 1; how their shapes are called. */
+/*
+ * Less usual glTF files: several sets of texture coordinates, unlit materials, files without extents of their
+ * accessors, cameras and lights, version 1, and materials of specular and glossiness; and the names that the reader
+ * gives to shapes.
+ */
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_parts.h"
 #include "worker/render/render.h"

@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What the reader makes of each feature of the language. */
+/*
+ * What the reader makes of the scene language: values and spectra, transforms, defaults and parameters, includes,
+ * references and aliases, both dialects (0.6 and 3.x), names of files. Unknown or ignored features are noted once, with
+ * the place. Files that are refused are in test_bad_scenes.c.
+ */
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_parts.h"
 #include "tests/support/scene_tables.h"

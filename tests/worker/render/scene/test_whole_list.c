@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* One run lists all problems of a scene, and none that only follows from another. */
+/*
+ * scene_read_all lists all problems of a scene in one run and none that merely follows from another: names without
+ * values, missing files, duplicate ids, unknown types, includes that break off. What uses a name that is missing is not
+ * reported again.
+ */
 #include "tests/support/memory_assets.h"
 #include "worker/render/render.h"
 

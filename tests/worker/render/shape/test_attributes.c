@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Attributes of meshes as the readers of PLY, serialized and OBJ files find them. */
+/*
+ * Attributes of meshes (colours and numbers of vertices and faces) as read from PLY, serialized and OBJ files: which
+ * names they get, whether integers are sRGB, what belongs to vertices and what to faces, and files that would make far
+ * more numbers than they have bytes.
+ */
 #include "tests/support/memory_assets.h"
 #include "tests/support/mesh_files.h"
 #include "tests/support/scene_tables.h"

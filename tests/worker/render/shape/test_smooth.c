@@ -1,5 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* max_smooth_angle against the same meshes with their normals written out. */
+/*
+ * max_smooth_angle against the same meshes with their normals written out: which faces share a normal, weights by
+ * angle, the order of faces where three meet, seams of texture coordinates and colours, and angles that are refused.
+ */
 #include "tests/support/append.h"
 #include "tests/support/built_shape.h"
 #include "tests/support/scene_tables.h"

@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What scenes call for: reachability, the sentence that says why, and what is forced. Nothing is rendered. */
+/*
+ * Which effects a scene needs (worker/render/world/effects.h), without rendering: what light can reach, what encloses
+ * what, colour, depth, media, shadows through glass. Each case expects the decision and the sentence that explains it;
+ * then what --effects forces on or off.
+ */
 #include "tests/support/worlds.h"
 
 #include <setjmp.h>

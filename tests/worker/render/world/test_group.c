@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Shapes in merges and instances against the same shapes written out; shapes without an area; which sensor;
- * orthographic cameras.
+ * Shapes in merges and instances: the world has the same shapes, materials and emitters as from a scene in which every
+ * copy is written out. Also shapes without area, which are left out and noted, materials that come with mesh files, the
+ * choice of a sensor, and orthographic cameras.
  */
 #include "worker/render/render.h"
 #include "tests/support/memory_assets.h"

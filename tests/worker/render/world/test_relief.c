@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Bump and normal maps in scenes: against the same height as real geometry, and the integrators among each other.
+ * Bump and normal maps in scenes. A bump map must look like the same height as real geometry, the y axis of a normal
+ * map must point as the file's version says, and all integrators must agree on a room in which every surface has bent
+ * normals.
  */
 #include "worker/render/render.h"
 #include "tests/support/agree.h"
