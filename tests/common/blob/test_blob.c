@@ -1,9 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The store keeps what it was given under its true name, refuses what is not it, and forgets the oldest first. */
+/*
+ * The store of files by their hash: it keeps what it was given, refuses bytes with another hash, evicts the files that
+ * were used longest ago and that nobody holds, and finds files that were damaged or removed meanwhile. What the disk
+ * does to it is in test_blob_disk.c.
+ */
 #include "common/base/disk.h"
 #include "common/blob/blob_batch.h"
 #include "common/blob/blob_check.h"
 #include "common/blob/blob_state.h"
+#include "tests/support/blob_text.h"
 #include "tests/support/folder.h"
 
 #include <stdarg.h>
@@ -21,20 +26,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-static struct blob_hash store_text(struct blob_store *s, const char *text)
-{
-	struct blob_hash h;
-	struct blob_writer *w;
-	struct error e;
-	assert_int_equal(blob_hash_bytes(text, strlen(text), &h, &e), 0);
-	assert_int_equal(blob_write_begin(&w, s, &h, strlen(text), &e), 0);
-	assert_int_equal(blob_write_add(w, text, 1, &e), 0);
-	assert_int_equal(blob_write_at(w), 1);
-	assert_int_equal(blob_write_add(w, text + 1, strlen(text) - 1, &e), 0);
-	assert_int_equal(blob_write_commit(w, &e), 0);
-	return h;
-}
-
 /* FIPS 180-2, appendix B.1. */
 static void knows_sha_256(void **state)
 {
@@ -47,20 +38,6 @@ static void knows_sha_256(void **state)
 	assert_string_equal(hex, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
 }
 
-static uint64_t bytes_of_folder(void)
-{
-	uint64_t sum = 0;
-	DIR *d = opendir(folder);
-	assert_non_null(d);
-	for (struct dirent *f; (f = readdir(d));) {
-		struct stat st;
-		if (fstatat(dirfd(d), f->d_name, &st, 0) == 0 && S_ISREG(st.st_mode))
-			sum += (uint64_t)st.st_size;
-	}
-	closedir(d);
-	return sum;
-}
-
 static void keeps_and_reads_back(void **state)
 {
 	(void)state;
@@ -69,7 +46,7 @@ static void keeps_and_reads_back(void **state)
 	uint64_t size;
 	char text[16] = "";
 	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
-	struct blob_hash h = store_text(s, "hello, farm");
+	struct blob_hash h = blob_text_store(s, "hello, farm");
 	blob_store_close(s);
 	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0); /* opened again */
 	assert_true(blob_has(s, &h, &size));
@@ -82,8 +59,8 @@ static void keeps_and_reads_back(void **state)
 	struct blob_hash other = h;
 	other.bytes[0] ^= 1;
 	assert_int_equal(blob_open(s, &other, &size, &e), -ENOENT);
-	store_text(s, "hello, farm"); /* twice is as once */
-	assert_int_equal(bytes_of_folder(), 11);
+	blob_text_store(s, "hello, farm"); /* twice is as once */
+	assert_int_equal(blob_text_bytes(folder), 11);
 	blob_store_close(s);
 }
 
@@ -117,16 +94,16 @@ static void forgets_the_oldest_that_nobody_holds(void **state)
 	struct blob_writer *w;
 	struct error e;
 	assert_int_equal(blob_store_open(&s, folder, 30, &e), 0);
-	struct blob_hash a = store_text(s, "0123456789"), b = store_text(s, "abcdefghij"),
-			 c = store_text(s, "ABCDEFGHIJ");
+	struct blob_hash a = blob_text_store(s, "0123456789"), b = blob_text_store(s, "abcdefghij"),
+			 c = blob_text_store(s, "ABCDEFGHIJ");
 	blob_release(s, &a);
 	blob_release(s, &b);
 	assert_true(blob_hold(s, &a)); /* a is now younger than b */
 	blob_release(s, &a);
-	struct blob_hash d = store_text(s, "!@#$%^&*()");
+	struct blob_hash d = blob_text_store(s, "!@#$%^&*()");
 	assert_false(blob_has(s, &b, NULL));
 	assert_true(blob_has(s, &a, NULL) && blob_has(s, &c, NULL) && blob_has(s, &d, NULL));
-	assert_int_equal(bytes_of_folder(), 30);
+	assert_int_equal(blob_text_bytes(folder), 30);
 	assert_true(blob_hold(s, &a));
 	assert_int_equal(blob_write_begin(&w, s, &b, 10, &e), -EFBIG); /* all in use */
 	assert_int_equal(blob_write_begin(&w, s, &b, 31, &e), -EMSGSIZE);
@@ -145,25 +122,17 @@ static void knows_many(void **state)
 	for (int i = 0; i < MANY; i++) {
 		char text[8];
 		snprintf(text, sizeof text, "%04d", i);
-		h[i] = store_text(s, text);
+		h[i] = blob_text_store(s, text);
 		blob_release(s, &h[i]);
 	}
 	for (int start = 0; start < 2; start++) {
 		for (int i = 0; i < MANY; i++)
 			assert_true(blob_has(s, &h[i], NULL) == (i >= MANY - FIT));
-		assert_int_equal(bytes_of_folder(), 4 * FIT);
+		assert_int_equal(blob_text_bytes(folder), 4 * FIT);
 		blob_store_close(s);
 		assert_int_equal(blob_store_open(&s, folder, 4 * FIT, &e), 0);
 	}
 	blob_store_close(s);
-}
-
-static struct blob_hash hash_of(const char *text)
-{
-	struct blob_hash h;
-	struct error e;
-	assert_int_equal(blob_hash_bytes(text, strlen(text), &h, &e), 0);
-	return h;
 }
 
 /* What two writers have brought has room below the limit together; what they only announced takes none. */
@@ -172,7 +141,7 @@ static void room_is_taken_by_what_arrives(void **state)
 	(void)state;
 	struct blob_store *s;
 	struct blob_writer *w[3];
-	struct blob_hash a = hash_of("0123456789"), b = hash_of("abcdefghij");
+	struct blob_hash a = blob_text_hash("0123456789"), b = blob_text_hash("abcdefghij");
 	struct error e;
 	assert_int_equal(blob_store_open(&s, folder, 25, &e), 0);
 	assert_int_equal(blob_write_begin(&w[0], s, &a, 26, &e), -EMSGSIZE);
@@ -186,7 +155,7 @@ static void room_is_taken_by_what_arrives(void **state)
 		assert_int_equal(blob_write_add(w[i], "0123456789", 10, &e), 0);
 		assert_int_equal(blob_write_commit(w[i], &e), 0);
 	}
-	assert_int_equal(bytes_of_folder(), 10);
+	assert_int_equal(blob_text_bytes(folder), 10);
 	assert_int_equal(blob_write_begin(&w[1], s, &b, 15, &e), 0); /* all that arrived is given back */
 	blob_write_abort(w[1]);
 	blob_store_close(s);
@@ -198,10 +167,10 @@ static void evicts_as_bytes_arrive(void **state)
 	(void)state;
 	struct blob_store *s;
 	struct blob_writer *w, *other;
-	struct blob_hash large = hash_of("a large file"), small = hash_of("small");
+	struct blob_hash large = blob_text_hash("a large file"), small = blob_text_hash("small");
 	struct error e;
 	assert_int_equal(blob_store_open(&s, folder, 30, &e), 0);
-	struct blob_hash a = store_text(s, "0123456789"), b = store_text(s, "abcdefghij");
+	struct blob_hash a = blob_text_store(s, "0123456789"), b = blob_text_store(s, "abcdefghij");
 	blob_release(s, &a);
 	blob_release(s, &b);
 	assert_int_equal(blob_write_begin(&w, s, &large, 28, &e), 0);
@@ -216,7 +185,7 @@ static void evicts_as_bytes_arrive(void **state)
 	assert_true(blob_hold(s, &b)); /* which is what is left to evict */
 	assert_int_equal(blob_write_add(w, "123456789", 9, &e), 0);
 	assert_int_equal(blob_write_add(w, "0", 1, &e), -EFBIG);
-	assert_int_equal(bytes_of_folder(), 30);
+	assert_int_equal(blob_text_bytes(folder), 30);
 	blob_write_abort(w);
 	assert_int_equal(blob_write_begin(&w, s, &large, 20, &e), 0);
 	blob_write_abort(w);
@@ -231,7 +200,7 @@ static void held_before_it_is_trimmed(void **state)
 	struct blob_store *s;
 	struct error e;
 	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
-	struct blob_hash a = store_text(s, "0123456789"), b = store_text(s, "abcdefghij");
+	struct blob_hash a = blob_text_store(s, "0123456789"), b = blob_text_store(s, "abcdefghij");
 	blob_store_close(s);
 	assert_int_equal(blob_store_open(&s, folder, 5, &e), 0);
 	assert_true(blob_hold(s, &a));
@@ -240,98 +209,7 @@ static void held_before_it_is_trimmed(void **state)
 	assert_false(blob_has(s, &b, NULL));
 	blob_release(s, &a);
 	blob_store_trim(s);
-	assert_int_equal(bytes_of_folder(), 0);
-	blob_store_close(s);
-}
-
-static int failing_stat(const char *path, struct stat *st)
-{
-	(void)path;
-	(void)st;
-	errno = EIO;
-	return -1;
-}
-
-/* A file that cannot be looked at is not one that is lost. */
-static void a_disk_that_fails(void **state)
-{
-	(void)state;
-	struct blob_store *s;
-	struct error e;
-	struct disk failing = disk_system;
-	failing.stat = failing_stat;
-	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
-	store_text(s, "hello, farm");
-	blob_store_close(s);
-	disk_use(&failing);
-	int rc = blob_store_open(&s, folder, 0, &e);
-	disk_use(NULL);
-	assert_int_equal(rc, -EIO);
-}
-
-static unsigned flushes;
-
-static int count_fsync(int fd)
-{
-	flushes++;
-	return disk_system.fsync(fd);
-}
-
-static int failing_close(int fd)
-{
-	disk_system.close(fd);
-	errno = EDQUOT;
-	return -1;
-}
-
-/* A cache flushes nothing: after a loss of power a name may be there without its bytes, and is read before it is used.
- */
-static void flushed_as_needed(void **state)
-{
-	(void)state;
-	struct disk counting = disk_system;
-	struct blob_store *s;
-	struct error e;
-	char path[4096];
-	counting.fsync = counting.fdatasync = count_fsync;
-	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
-	disk_use(&counting);
-	flushes = 0;
-	store_text(s, "kept");
-	assert_int_equal(flushes, 2);
-	blob_store_use_as_cache(s);
-	struct blob_hash h = store_text(s, "cached");
-	assert_int_equal(flushes, 2);
-	disk_use(NULL);
-	assert_int_equal(blob_check(s, &h, 60, &e), 0);
-	blob_path(s, &h, path, sizeof path);
-	blob_store_close(s);
-	assert_int_equal(truncate(path, 3), 0);
-	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
-	assert_int_equal(blob_check(s, &h, 60, &e), -EBADMSG);
-	blob_store_close(s);
-}
-
-/* As on a file system that sends what was written when the file is closed. */
-static void a_cached_file_that_cannot_be_closed(void **state)
-{
-	(void)state;
-	struct disk failing = disk_system;
-	struct blob_store *s;
-	struct blob_writer *w;
-	struct blob_hash h;
-	struct error e;
-	failing.close = failing_close;
-	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
-	blob_store_use_as_cache(s);
-	assert_int_equal(blob_hash_bytes("lost", 4, &h, &e), 0);
-	assert_int_equal(blob_write_begin(&w, s, &h, 4, &e), 0);
-	assert_int_equal(blob_write_add(w, "lost", 4, &e), 0);
-	disk_use(&failing);
-	int rc = blob_write_commit(w, &e);
-	disk_use(NULL);
-	assert_int_equal(rc, -EDQUOT);
-	assert_false(blob_has(s, &h, NULL));
+	assert_int_equal(blob_text_bytes(folder), 0);
 	blob_store_close(s);
 }
 
@@ -346,7 +224,7 @@ static void damaged_at_rest(void **state)
 	char path[4096], aside[300], hex[BLOB_HEX_SIZE];
 	uint64_t size;
 	assert_int_equal(blob_store_open(&s, folder, 1000, &e), 0);
-	struct blob_hash h = store_text(s, text), other;
+	struct blob_hash h = blob_text_store(s, text), other;
 	assert_int_equal(blob_hash_bytes("x", 1, &other, &e), 0);
 	blob_path(s, &h, path, sizeof path);
 	blob_hex(&h, hex);
@@ -367,7 +245,7 @@ static void damaged_at_rest(void **state)
 		assert_true(access(path, F_OK) != 0 && access(aside, F_OK) == 0);
 		assert_true(!blob_has(s, &h, NULL) && !blob_hold(s, &h) && blob_open(s, &h, &size, &e) == -ENOENT);
 		assert_int_equal(blob_check(s, &h, 0, &e), -ENOENT);
-		store_text(s, text);
+		blob_text_store(s, text);
 		assert_int_equal(blob_check(s, &h, 0, &e), 0);
 		assert_true(blob_has(s, &h, &size) && size == strlen(text));
 	}
@@ -375,7 +253,7 @@ static void damaged_at_rest(void **state)
 		unlink(path);
 		assert_int_equal(blob_check(s, &h, seconds, &e), -EBADMSG);
 		assert_non_null(strstr(e.text, "gone"));
-		store_text(s, text);
+		blob_text_store(s, text);
 		blob_release(s, &h);
 	}
 	unlink(path);
@@ -383,13 +261,13 @@ static void damaged_at_rest(void **state)
 	assert_int_equal(blob_expect(s, &h, &e), 0);
 	assert_int_equal(blob_expect(s, &other, &e), 0); /* never there */
 	assert_false(blob_has(s, &other, NULL));
-	store_text(s, "x");
+	blob_text_store(s, "x");
 	blob_release(s, &other);
-	store_text(s, text);
+	blob_text_store(s, text);
 	for (int i = 0; i < 40; i++) { /* more than there is room for: what is held stays */
 		char more[64];
 		snprintf(more, sizeof more, "something else of fifty bytes or so, number %d", i);
-		struct blob_hash m = store_text(s, more);
+		struct blob_hash m = blob_text_store(s, more);
 		blob_release(s, &m);
 	}
 	assert_true(blob_has(s, &h, NULL) && blob_has(s, &other, NULL));
@@ -406,14 +284,14 @@ static void a_folder_that_is_removed(void **state)
 	uint64_t size;
 	snprintf(inside, sizeof inside, "%s/inside", folder);
 	assert_int_equal(blob_store_open(&s, inside, 1000, &e), 0);
-	struct blob_hash h = store_text(s, "lost");
+	struct blob_hash h = blob_text_store(s, "lost");
 	blob_path(s, &h, path, sizeof path);
 	assert_int_equal(unlink(path), 0);
 	assert_int_equal(rmdir(inside), 0);
-	struct blob_hash other = store_text(s, "stored after that");
+	struct blob_hash other = blob_text_store(s, "stored after that");
 	assert_true(blob_has(s, &other, &size) && size == 17);
 	assert_int_equal(blob_check(s, &h, 1000, &e), -EBADMSG);
-	store_text(s, "lost");
+	blob_text_store(s, "lost");
 	assert_int_equal(blob_check(s, &h, 0, &e), 0);
 	blob_store_close(s);
 }
@@ -428,7 +306,7 @@ static void checked_in_parts(void **state)
 	char path[4096];
 	uint64_t size;
 	assert_int_equal(blob_store_open(&s, folder, 30, &e), 0);
-	struct blob_hash h = store_text(s, "bytes that are checked");
+	struct blob_hash h = blob_text_store(s, "bytes that are checked");
 	blob_release(s, &h);
 	blob_path(s, &h, path, sizeof path);
 	/* ended early: nothing is known, and nothing is lost */
@@ -440,7 +318,7 @@ static void checked_in_parts(void **state)
 	/* it is held, and given again before its check has ended */
 	assert_int_equal(blob_check_begin(&c, s, &h, BLOB_SINCE_GIVEN, &e), 1);
 	assert_true(blob_is_being_checked(s, &h));
-	struct blob_hash more = hash_of("other bytes, too many of them");
+	struct blob_hash more = blob_text_hash("other bytes, too many of them");
 	struct blob_writer *w;
 	assert_int_equal(blob_write_begin(&w, s, &more, 29, &e), -EFBIG);
 	close(blob_open(s, &h, &size, &e));
@@ -455,142 +333,10 @@ static void checked_in_parts(void **state)
 	while (blob_check_read(c) || blob_check_read(other))
 		continue;
 	assert_int_equal(blob_check_end(c, &e), -EBADMSG);
-	store_text(s, "bytes that are checked");
+	blob_text_store(s, "bytes that are checked");
 	assert_int_equal(blob_check_end(other, &e), 0);
 	assert_true(blob_has(s, &h, &size) && size == 22);
 	blob_store_close(s);
-}
-
-static struct blob_writer *write_text(struct blob_store *s, const char *text, struct blob_hash *h)
-{
-	struct blob_writer *w;
-	struct error e;
-	assert_int_equal(blob_hash_bytes(text, strlen(text), h, &e), 0);
-	assert_int_equal(blob_write_begin(&w, s, h, strlen(text), &e), 0);
-	assert_int_equal(blob_write_add(w, text, strlen(text), &e), 0);
-	return w;
-}
-
-/* What a batch has is there once it was entered, and not before; what was not is gone, and so is the room for it. */
-static void flushed_together(void **state)
-{
-	(void)state;
-	struct blob_store *s;
-	struct blob_hash h[3];
-	struct error e;
-	assert_int_equal(blob_store_open(&s, folder, 30, &e), 0);
-	struct blob_batch *b = blob_batch_new(s);
-	assert_int_equal(blob_batch_add(b, write_text(s, "0123456789", &h[0]), &e), 0);
-	assert_int_equal(blob_batch_add(b, write_text(s, "abcdefghij", &h[1]), &e), 0);
-	assert_int_equal(blob_batch_count(b), 2);
-	assert_false(blob_has(s, &h[0], NULL) || blob_hold(s, &h[1]));
-	assert_int_equal(blob_batch_flush(b, &e), 0);
-	assert_false(blob_has(s, &h[0], NULL));
-	blob_batch_enter(b);
-	assert_true(blob_has(s, &h[0], NULL) && blob_has(s, &h[1], NULL));
-	assert_true(blob_hold(s, blob_batch_hash(b, 0)));
-	blob_batch_free(b);
-	b = blob_batch_new(s); /* its ten bytes fit, and h[1] need not go for them */
-	assert_int_equal(blob_batch_add(b, write_text(s, "ABCDEFGHIJ", &h[2]), &e), 0);
-	blob_batch_free(b);
-	assert_true(blob_has(s, &h[1], NULL) && !blob_has(s, &h[2], NULL));
-	assert_int_equal(bytes_of_folder(), 20);
-	struct blob_hash other = store_text(s, "ABCDEFGHIJ");
-	assert_true(blob_hash_equal(&other, &h[2]) && blob_has(s, &h[1], NULL));
-	blob_store_close(s);
-}
-
-/* Two send the same: one of them stores it first, and neither loses it. */
-static void stored_meanwhile(void **state)
-{
-	(void)state;
-	struct blob_store *s;
-	struct blob_hash h;
-	struct error e;
-	uint64_t size;
-	assert_int_equal(blob_store_open(&s, folder, 30, &e), 0);
-	struct blob_batch *b = blob_batch_new(s);
-	assert_int_equal(blob_batch_add(b, write_text(s, "0123456789", &h), &e), 0);
-	store_text(s, "0123456789");
-	blob_release(s, &h);
-	assert_int_equal(blob_batch_flush(b, &e), 0);
-	blob_batch_enter(b);
-	blob_batch_free(b);
-	assert_true(blob_has(s, &h, &size) && size == 10);
-	struct blob_hash more = store_text(s, "twenty bytes of text"); /* which fit beside it */
-	assert_true(blob_has(s, &h, NULL) && blob_has(s, &more, NULL));
-	blob_store_close(s);
-}
-
-/* Power is lost before the flush: the next start finds nothing of it. */
-static void not_flushed(void **state)
-{
-	(void)state;
-	struct blob_store *s;
-	struct blob_hash h, awaited = hash_of("awaited");
-	struct error e;
-	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
-	assert_int_equal(blob_expect(s, &awaited, &e), 0);
-	struct blob_batch *b = blob_batch_new(s);
-	assert_int_equal(blob_batch_add(b, write_text(s, "0123456789", &h), &e), 0);
-	struct blob_store *next;
-	assert_int_equal(blob_store_open(&next, folder, 0, &e), 0);
-	assert_false(blob_has(next, &h, NULL));
-	assert_int_equal(bytes_of_folder(), 0);
-	blob_store_close(next);
-	assert_int_equal(blob_batch_flush(b, &e), -ENOENT);
-	blob_batch_free(b);
-	assert_false(blob_has(s, &h, NULL));
-	assert_int_equal(s->count, 1);
-	blob_store_close(s);
-}
-
-static int full_with; /* errno of writes, as long as some file is there */
-static char full_while[256];
-
-static ssize_t write_where_room_is(int fd, const struct iovec *parts, int count, off_t at)
-{
-	struct stat st;
-	if (lstat(full_while, &st) == 0) {
-		errno = full_with;
-		return -1;
-	}
-	return pwritev(fd, parts, count, at);
-}
-
-static bool remove_that_file(void *user)
-{
-	++*(int *)user;
-	return unlink(full_while) == 0;
-}
-
-/* A full disk, or a quota that is used up: what nobody holds goes first, then whoever has more is asked. */
-static void a_disk_that_is_full(void **state)
-{
-	(void)state;
-	static const int codes[] = {ENOSPC, EDQUOT};
-	struct disk full = disk_system;
-	full.pwritev = write_where_room_is;
-	for (size_t i = 0; i < sizeof codes / sizeof *codes; i++) {
-		struct blob_store *s;
-		struct error e;
-		int asked = 0;
-		full_with = codes[i];
-		assert_int_equal(blob_store_open(&s, folder, 1000, &e), 0);
-		struct blob_hash a = store_text(s, "nobody holds this");
-		blob_release(s, &a);
-		blob_path(s, &a, full_while, sizeof full_while);
-		disk_use(&full);
-		store_text(s, i ? "one" : "two");
-		assert_false(blob_has(s, &a, NULL));
-		blob_store_ask(s, remove_that_file, &asked);
-		snprintf(full_while, sizeof full_while, "%s/films", folder);
-		fclose(fopen(full_while, "w"));
-		store_text(s, i ? "three" : "four");
-		assert_int_equal(asked, 1);
-		disk_use(NULL);
-		blob_store_close(s);
-	}
 }
 
 int main(void)
@@ -606,13 +352,6 @@ int main(void)
 		cmocka_unit_test_setup_teardown(damaged_at_rest, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_folder_that_is_removed, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(checked_in_parts, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(a_disk_that_fails, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(a_cached_file_that_cannot_be_closed, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(flushed_as_needed, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(a_disk_that_is_full, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(flushed_together, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(stored_meanwhile, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(not_flushed, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(knows_many, folder_set_up, folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -3,6 +3,7 @@
  * never deleted. */
 #include "common/blob/blob.h"
 #include "tests/support/failing_list.h"
+#include "tests/support/blob_text.h"
 #include "tests/support/folder.h"
 
 #include <errno.h>
@@ -14,25 +15,13 @@
 
 #include <cmocka.h>
 
-static struct blob_hash store_text(struct blob_store *s, const char *text)
-{
-	struct blob_hash h;
-	struct blob_writer *w;
-	struct error e;
-	assert_int_equal(blob_hash_bytes(text, strlen(text), &h, &e), 0);
-	assert_int_equal(blob_write_begin(&w, s, &h, strlen(text), &e), 0);
-	assert_int_equal(blob_write_add(w, text, strlen(text), &e), 0);
-	assert_int_equal(blob_write_commit(w, &e), 0);
-	return h;
-}
-
 static void a_folder_that_cannot_be_listed(void **state)
 {
 	(void)state;
 	struct blob_store *s;
 	struct error e;
 	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
-	struct blob_hash one = store_text(s, "one"), two = store_text(s, "two");
+	struct blob_hash one = blob_text_store(s, "one"), two = blob_text_store(s, "two");
 	blob_store_close(s);
 	failing_list_begin(folder, 1, EIO);
 	int rc = blob_store_open(&s, folder, 0, &e);

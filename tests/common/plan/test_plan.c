@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The mixture of mutations in a plan: what is one and what is not, and the texts that it appears in. */
+/*
+ * What plan_make decides: how long rounds, bootstrap, leases and epochs are, for jobs that end by samples, time or
+ * error and with what a pilot has measured; how seeds are drawn; which numbers are refused. Texts of plans are in
+ * test_plan_text.c, mixtures of mutations in test_plan_mixture.c.
+ */
 #include "common/plan/plan.h"
 #include "common/plan/plan_text.h"
 #include "common/plan/resample.h"
@@ -18,106 +22,6 @@ static struct plan_request request(enum plan_kind kind, const char *mixture)
 		.integrator = "hslt", .kind = kind, .width = 64, .height = 32, .max_depth = 8, .spp = 16};
 	strncpy(r.mixture, mixture, sizeof r.mixture - 1);
 	return r;
-}
-
-static void a_mixture_is_kept_and_told(void **state)
-{
-	(void)state;
-	struct plan_request r = request(PLAN_CHAINS, "independent=0.05,hslt@b2c0=0.95");
-	struct plan p;
-	struct error e;
-	char text[1024];
-	assert_int_equal(plan_make(&r, &p, &e), 0);
-	assert_string_equal(p.mutations, r.mixture);
-	plan_describe(&p, text, sizeof text);
-	assert_non_null(strstr(text, "mutations independent=0.05,hslt@b2c0=0.95;"));
-	plan_options(&p, 1, text, sizeof text);
-	assert_non_null(strstr(text, " --mutations independent=0.05,hslt@b2c0=0.95 --chains"));
-	*r.mixture = 0;
-	assert_int_equal(plan_make(&r, &p, &e), 0);
-	plan_options(&p, p.rounds, text, sizeof text);
-	assert_true(strstr(text, "--mutations") == strstr(text, "--mutations 32768"));
-	plan_options(&p, 0, text, sizeof text);
-	assert_null(strstr(text, "--mutations 0"));
-}
-
-static void settings_and_effects_are_kept_and_told(void **state)
-{
-	(void)state;
-	struct plan_request r = request(PLAN_CHAINS, "hslt=1");
-	struct plan p;
-	struct error e;
-	char text[PLAN_TEXT];
-	strcpy(r.accuracy, "tolerance=1e-05");
-	strcpy(r.effects, "-dispersion,+aperture");
-	assert_int_equal(plan_make(&r, &p, &e), 0);
-	plan_options(&p, 1, text, sizeof text);
-	assert_non_null(strstr(text, " --set tolerance=1e-05 --effects=-dispersion,+aperture --chains"));
-	p.accuracy[40] = 'x'; /* something behind the end */
-	assert_int_equal(plan_check(&p, &e), -EINVAL);
-	p.accuracy[40] = 0;
-	strcpy(p.effects, "a;b");
-	assert_int_equal(plan_check(&p, &e), -EINVAL);
-	memset(p.effects, 'a', sizeof p.effects);
-	assert_int_equal(plan_check(&p, &e), -EINVAL);
-}
-
-static void other_texts_are_none(void **state)
-{
-	(void)state;
-	static const char *const bad[] = {",",
-					  "a,",
-					  ",a",
-					  "a,,b",
-					  "a b",
-					  "a\n",
-					  "a\t=1",
-					  "a\x7f",
-					  "\xc3\xa4",
-					  "=1",
-					  "a;b",
-					  "$a",
-					  "a'",
-					  "1a",
-					  "@b",
-					  "a,@b",
-					  "a,b,c,d,e,f,g,h,i"};
-	struct plan p;
-	struct error e;
-	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
-		struct plan_request r = request(PLAN_CHAINS, bad[i]);
-		assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
-		assert_non_null(strstr(e.text, "mixture"));
-	}
-	struct plan_request r = request(PLAN_CHAINS, "");
-	memset(r.mixture, 'a', sizeof r.mixture); /* no end */
-	assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
-	r.mixture[sizeof r.mixture - 1] = 0;
-	assert_int_equal(plan_make(&r, &p, &e), 0);
-	memcpy(p.mutations, "a\0b", 4); /* something behind the end */
-	assert_int_equal(plan_check(&p, &e), -EINVAL);
-	r = request(PLAN_SAMPLES, "a");
-	assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
-	r = request(PLAN_SAMPLES, "");
-	assert_int_equal(plan_make(&r, &p, &e), 0);
-}
-
-static void entries_are_counted_and_named(void **state)
-{
-	(void)state;
-	char name[8];
-	assert_int_equal(plan_strategy_count(""), 0);
-	assert_int_equal(plan_strategy_count("hslt"), 1);
-	assert_int_equal(plan_strategy_count("a,b,c,d,e,f,g,h"), 8);
-	assert_int_equal(plan_strategy_count("independent=0.1,hslt=1e-3"), 2);
-	plan_strategy_name("a=1,long@b2c0=0.5,z", 0, name, sizeof name);
-	assert_string_equal(name, "a");
-	plan_strategy_name("a=1,long@b2c0=0.5,z", 1, name, sizeof name);
-	assert_string_equal(name, "long@b2");
-	plan_strategy_name("a=1,long@b2c0=0.5,z", 2, name, sizeof name);
-	assert_string_equal(name, "z");
-	plan_strategy_name("a=1,long@b2c0=0.5,z", 3, name, sizeof name);
-	assert_string_equal(name, "");
 }
 
 /* A round is 32 mutations a pixel of the crop, but no lease above 2^18 nor below 2^13; a bound on mutations has its own
@@ -593,10 +497,6 @@ static void unseen_light_of_a_plan(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(a_mixture_is_kept_and_told),
-		cmocka_unit_test(settings_and_effects_are_kept_and_told),
-		cmocka_unit_test(other_texts_are_none),
-		cmocka_unit_test(entries_are_counted_and_named),
 		cmocka_unit_test(rounds_without_a_bound_follow_the_film),
 		cmocka_unit_test(samples_notice_time_and_error),
 		cmocka_unit_test(a_time_also_ends_what_is_counted),

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The coordinator's shell and workers that answer every lease at once with what the test wants: results counted once,
- * late, slow, useless, failed; extensions of what is done.
+ * late, useless, failed; extensions of what is done. Slow connections are in test_slow_links.c.
  */
 #include "tests/support/served.h"
 
@@ -29,15 +29,6 @@ static int set_up(void **state)
 {
 	(void)state;
 	return served_start(60, 60, 60);
-}
-
-/* Who is silent for six heartbeats, 3 s, is hung up on: a busy machine keeps us from a word for more than one. */
-#define QUICK 0.5
-
-static int set_up_quick(void **state)
-{
-	(void)state;
-	return served_start(60, QUICK, 60);
 }
 
 static void a_black_job_ends(void **state)
@@ -340,102 +331,6 @@ static void what_is_useless_does_not_wait(void **state)
 	scripted_hang_up(other);
 }
 
-/* ---- slow links ---- */
-
-/* A worker with a lease of a new job, and its result. The keys of what came stay in the lease queue. */
-static struct scripted *worker_with_result(struct scripted *client, struct lease_queue *d, unsigned char **frame,
-					   size_t *size)
-{
-	struct scripted *worker = peer_call();
-	struct plan plan;
-	struct error e;
-	struct plan_request r = peer_plan_request(NULL);
-	assert_int_equal(plan_make(&r, &plan, &e), 0);
-	assert_true(peer_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
-	peer_submit(client, NULL, "<scene/>", "s.xml", "s.xml");
-	if (peer_submit_answer(client)->n_missing) {
-		peer_send_blob(client, "<scene/>", "<scene/>");
-		peer_submit_answer(client);
-	}
-	assert_true(peer_hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
-	peer_say_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
-	while (d->count == 0)
-		peer_attend(worker, d);
-	struct batch b = black_batch(&d->keys[0], &plan, 0);
-	unsigned char *packed;
-	assert_int_equal(batch_pack(&b, &plan, &packed, size, &e), 0);
-	*frame = checksummed_frame(packed, *size, size);
-	mem_free(packed);
-	batch_fini(&b);
-	return worker;
-}
-
-static double seconds_now(void)
-{
-	struct timespec t;
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-/* false: we stood still for so long that the coordinator may hang up on the worker. */
-static bool sends_slowly(struct scripted *worker, const unsigned char *frame, size_t size)
-{
-	enum { PIECES = 24 };
-	double begun = seconds_now(), last = begun, longest = 0;
-	size_t at = 0;
-	bool sent = true;
-	for (size_t i = 1; i <= PIECES && sent; i++) {
-		usleep(150000);
-		size_t n = size * i / PIECES - at;
-		sent = send(worker->fd, frame + at, n, MSG_NOSIGNAL) == (ssize_t)n;
-		longest = fmax(longest, seconds_now() - last);
-		last = seconds_now();
-		at += n;
-	}
-	if (longest > 4 * QUICK)
-		return false;
-	struct lease_queue d = {.count = 0};
-	assert_true(sent);
-	assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
-	assert_true(worker->heartbeats >= (last - begun) / (QUICK + longest) / 2 &&
-		    worker->heartbeats <= (seconds_now() - begun) / QUICK + 2);
-	return true;
-}
-
-/* It takes longer than anybody may be silent, and the worker can say nothing else meanwhile; it is told that it is
- * heard. */
-static void a_slow_result_counts(void **state)
-{
-	(void)state;
-	for (bool done = false; !done;) {
-		unsigned char *frame;
-		size_t size;
-		struct lease_queue d = {.count = 0};
-		struct scripted *client = peer_call(), *worker = worker_with_result(client, &d, &frame, &size);
-		worker->heartbeats = 0;
-		done = sends_slowly(worker, frame, size);
-		free(frame);
-		scripted_hang_up(client);
-		scripted_hang_up(worker);
-	}
-}
-
-static void half_a_result_is_no_word(void **state)
-{
-	(void)state;
-	unsigned char *frame;
-	size_t size;
-	struct lease_queue d = {.count = 0};
-	struct scripted *client = peer_call(), *worker = worker_with_result(client, &d, &frame, &size);
-	peer_say_bytes(worker, frame, size / 2);
-	const Farm__Envelope *m;
-	while ((m = scripted_hear(worker)) && m->body_case != FARM__ENVELOPE__BODY_FAULT)
-		continue;
-	free(frame);
-	scripted_hang_up(client);
-	scripted_hang_up(worker);
-}
-
 static void say_extend(const struct scripted *p, uint64_t job, uint64_t spp, int times)
 {
 	unsigned char all[512];
@@ -613,8 +508,5 @@ int main(void)
 		cmocka_unit_test(a_failure_counts_whatever_its_text),
 		cmocka_unit_test(complaints_do_not_fill_the_log), /* of that job */
 	};
-	const struct CMUnitTest slow[] = {cmocka_unit_test(a_slow_result_counts),
-					  cmocka_unit_test(half_a_result_is_no_word)};
-	int failed = cmocka_run_group_tests(tests, set_up, served_stop);
-	return failed + cmocka_run_group_tests(slow, set_up_quick, served_stop);
+	return cmocka_run_group_tests(tests, set_up, served_stop);
 }

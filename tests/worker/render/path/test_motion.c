@@ -5,10 +5,7 @@
  * images at the middles of 32 parts of that time, of worlds that stand still, placed by transforms that this test
  * writes itself; the rule of midpoints leaves 32^-2 of what changes. The integrators make it; bdpt is what erpt begins
  * with (tests/support/agree.h: level 1e-4 over the suite, power printed and bounded). Chains take a minute each, and
- * run with FULL=1 only; test_balance has a room in which all of this moves.
- *
- * What a light brings a plane while it moves is an integral over the time: of the irradiance of a ball, which falls
- * with the square of the distance, of a polygon (Lambert 1760), of a beam, and of a projector.
+ * run with FULL=1 only; test_balance has a room in which all of this moves. Lights over a plane: test_moving_lights.c.
  */
 #include "tests/support/agree.h"
 #include "tests/support/dice.h"
@@ -422,133 +419,6 @@ static void test_glow(void **state)
 
 /* ---- lights over a plane */
 
-/* Half of the sides, or the radius, and the place at a time. */
-struct light_at {
-	double a, b, x, height;
-};
-typedef struct light_at light_fn(double t);
-
-static struct light_at moves_by(double t)
-{
-	return (struct light_at){.a = 0.2, .b = 0.2, .x = -1.5 + 3 * t, .height = 1.5};
-}
-
-static struct light_at rises(double t)
-{
-	return (struct light_at){.a = 0.1 + 0.3 * t, .b = 0.1 + 0.3 * t, .height = 1.5 + t};
-}
-
-static struct light_at is_stretched(double t)
-{
-	return (struct light_at){.a = 0.1 + 0.8 * t, .b = 0.6 - 0.4 * t, .height = 1.5 + 0.5 * t};
-}
-
-/* What each kind of light, of strength 1, brings a point (x, y, 0), which looks up. */
-typedef double irradiance_fn(const struct light_at *l, double x, double y);
-
-static double of_ball(const struct light_at *l, double x, double y)
-{
-	double d2 = (x - l->x) * (x - l->x) + y * y + l->height * l->height;
-	return M_PI * l->a * l->a * l->height / (d2 * sqrt(d2));
-}
-
-static double of_card(const struct light_at *l, double x, double y)
-{
-	const double side[4][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
-	double sum = 0;
-	for (int i = 0; i < 4; i++) {
-		const double *p = side[i], *q = side[(i + 1) % 4];
-		vec3 u = {l->x + p[0] * l->a - x, p[1] * l->b - y, l->height},
-		     v = {l->x + q[0] * l->a - x, q[1] * l->b - y, l->height}, w = vec3_cross(u, v);
-		sum += 0.5 * atan2(vec3_length(w), vec3_dot(u, v)) * w.z / vec3_length(w);
-	}
-	return sum;
-}
-
-/* Its edge is blurred evenly. */
-static double of_beam(const struct light_at *l, double x, double y)
-{
-	return fabs(x - l->x) < l->a && fabs(y) < l->b;
-}
-
-static double of_projector(const struct light_at *l, double x, double y)
-{
-	(void)x, (void)y;
-	return M_PI / (l->height * l->height);
-}
-
-static const struct over_plane {
-	const char *name;
-	light_fn *light;
-	irradiance_fn *irradiance;
-	const char *type, *inside;
-} over_plane[] = {
-	{"a ball slides", moves_by, of_ball, "sphere", SHINES("1")},
-	{"a ball rises and grows", rises, of_ball, "sphere", SHINES("1")},
-	{"a card is stretched", is_stretched, of_card, "rectangle", SHINES("1")},
-	{"a beam is stretched", is_stretched, of_beam, "rectangle",
-	 "<emitter type='directionalarea'><float name='radiance' value='1'/></emitter>"},
-	{"a projector rises", rises, of_projector, "projector", "<float name='fov' value='60'/>"},
-};
-
-/* The mean over the image of a plane of reflectance 1 that the camera sees from a height of 1, and over the time. */
-static double mean_radiance(const struct over_plane *o)
-{
-	enum { STEPS = 48, TIMES = 512 };
-	double sum = 0, half = tan(M_PI / 9);
-	for (int k = 0; k < TIMES; k++) {
-		struct light_at l = o->light((k + 0.5) / TIMES);
-		for (int i = 0; i < STEPS * STEPS; i++)
-			sum += o->irradiance(&l, half * (2 * (i % STEPS + 0.5) / STEPS - 1),
-					     half * (2 * (i / STEPS + 0.5) / STEPS - 1));
-	}
-	return sum / (M_PI * STEPS * STEPS * TIMES);
-}
-
-static void put_light(char *out, size_t size, const struct over_plane *o, double t)
-{
-	const struct light_at l = o->light(t);
-	snprintf(out, size,
-		 "<scale x='%.17g' y='%.17g' z='%.17g'/><rotate x='1' angle='180'/><translate x='%.17g' z='%.17g'/>",
-		 l.a, l.b, l.a, l.x, l.height);
-}
-
-static struct world *world_over_plane(const struct over_plane *o)
-{
-	char begin[256], end[256];
-	const char *element = o->irradiance == of_projector ? "emitter" : "shape";
-	put_light(begin, sizeof begin, o, 0);
-	put_light(end, sizeof end, o, 1);
-	return world_of(
-		"<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='2'/></integrator>"
-		"<sensor type='perspective'><float name='fov' value='40'/>" SHUTTER TO(
-			"<lookat origin='0,0,1' target='0,0,0' up='0,1,0'/>") BOX_FILM
-		"</sensor>"
-		"<shape type='rectangle'>" TO(
-			"<scale value='4'/>") "<bsdf type='diffuse'>"
-					      "<float name='reflectance' value='1'/></bsdf></shape>"
-					      "<%s type='%s'>" KEYS("%s", "%s") "%s</%s></scene>",
-		element, o->type, begin, end, o->inside, element);
-}
-
-static void test_over_a_plane(void **state)
-{
-	(void)state;
-	static const struct agree_side sides[] = {{"path", 1024, 32, 0, 0}, {"bdpt", 1536, 32, 0, 0}};
-	static struct agree_image image;
-	for (size_t k = 0; k < sizeof over_plane / sizeof *over_plane; k++) {
-		struct world *w = world_over_plane(&over_plane[k]);
-		double xyz = w->grey_xyz[0] + w->grey_xyz[1] + w->grey_xyz[2];
-		for (size_t i = 0; i < sizeof sides / sizeof *sides; i++) {
-			char test[64];
-			snprintf(test, sizeof test, "%s, %s", over_plane[k].name, sides[i].integrator);
-			agree_render(w, test, "moving", &sides[i], &image);
-			agree_expect(test, &image, xyz * mean_radiance(&over_plane[k]));
-		}
-		world_free(w);
-	}
-}
-
 /* A lamp of which all transforms are the same, and one that would move while the shutter is closed, are those that
  * stand there: equal bits. */
 static void test_at_rest(void **state)
@@ -574,9 +444,9 @@ static void test_at_rest(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_seen),   cmocka_unit_test(test_shapes),	    cmocka_unit_test(test_camera),
-		cmocka_unit_test(test_lights), cmocka_unit_test(test_lamps),	    cmocka_unit_test(test_skies),
-		cmocka_unit_test(test_glow),   cmocka_unit_test(test_over_a_plane), cmocka_unit_test(test_at_rest),
+		cmocka_unit_test(test_seen),   cmocka_unit_test(test_shapes),  cmocka_unit_test(test_camera),
+		cmocka_unit_test(test_lights), cmocka_unit_test(test_lamps),   cmocka_unit_test(test_skies),
+		cmocka_unit_test(test_glow),   cmocka_unit_test(test_at_rest),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What the reader makes of the scene language: values and spectra, transforms, defaults and parameters, includes,
- * references and aliases, both dialects (0.6 and 3.x), names of files. Unknown or ignored features are noted once, with
- * the place. Files that are refused are in test_bad_scenes.c.
+ * references and aliases, both dialects (0.6 and 3.x). Unknown or ignored features are noted once, with the place.
+ * Names of files are in test_scene_files.c, files that are refused in test_bad_scenes.c.
  */
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_parts.h"
@@ -465,22 +465,6 @@ static void test_depths_beyond_the_limit_are_noted(void **state)
 	scene_fini(&s);
 }
 
-static void test_assets_are_sorted_and_unique(void **state)
-{
-	(void)state;
-	struct scene s = read_ok(
-		"<scene version='3.0.0'>"
-		"<shape type='obj'><string name='filename' value='b.obj'/></shape>"
-		"<shape type='obj'><string name='filename' value='a.obj'/></shape>"
-		"<shape type='obj'><string name='filename' value='b.obj'/></shape>"
-		"<sensor type='perspective'><film type='hdrfilm'><string name='filename' value='out.exr'/></film></sensor>"
-		"</scene>");
-	assert_int_equal(s.asset_count, 2);
-	assert_string_equal(s.assets[0], "a.obj");
-	assert_string_equal(s.assets[1], "b.obj");
-	scene_fini(&s);
-}
-
 /* All that is wrong, each with its place, an object that is no object once. */
 static void test_every_problem_is_told(void **state)
 {
@@ -541,48 +525,6 @@ static void test_second_name(void **state)
 	assert_non_null(strstr(e.text, "has no `diffuse_reflectance`"));
 }
 
-/* However a file is named, it is one file, and its name has no "..". */
-static void test_asset_names_are_canonical(void **state)
-{
-	(void)state;
-	static const char *const names[] = {"%2e%2e/common/a.obj", "%2e%2e/common/b.ply", "inc.xml", "m/c.obj"};
-	files[1] = (struct memory_file){"inc.xml", "<scene version='3.0.0'/>", 24};
-	struct scene s = read_ok("<scene version='3.0.0'><include filename='x/../inc.xml'/>"
-				 "<shape type='obj'><string name='filename' value='../common/a.obj'/></shape>"
-				 "<shape type='obj'><string name='filename' value='m/../../common//a.obj'/></shape>"
-				 "<shape type='ply'><string name='filename' value='./../common/x/../b.ply'/></shape>"
-				 "<shape type='obj'><string name='filename' value='./m/c.obj'/></shape></scene>");
-	assert_int_equal(s.asset_count, 4);
-	for (uint32_t i = 0; i < 4; i++)
-		assert_string_equal(s.assets[i], names[i]);
-	assert_string_equal(node_string(s.objects[0], "filename", ""), names[0]);
-	assert_string_equal(node_string(s.objects[3], "filename", ""), names[3]);
-	scene_fini(&s);
-	/* a search path outside */
-	files[1] = (struct memory_file){"%2e%2e/common/a.obj", "x", 1};
-	s = read_ok("<scene version='3.0.0'><path value='m/../../common/'/>"
-		    "<shape type='obj'><string name='filename' value='a.obj'/></shape></scene>");
-	assert_int_equal(s.asset_count, 1);
-	assert_string_equal(s.assets[0], names[0]);
-	assert_int_equal(s.note_count, 0);
-	scene_fini(&s);
-	/* a name from Windows; one that is there as it is written; one that is not there at all */
-	s = read_ok("<scene version='3.0.0'><path value='m/../../common/'/>"
-		    "<shape type='obj'><string name='filename' value='..\\common\\a.obj'/></shape>"
-		    "<shape type='obj'><string name='filename' value='x\\..\\a.obj'/></shape>"
-		    "<shape type='obj'><string name='filename' value='b\\c.obj'/></shape></scene>");
-	assert_string_equal(node_string(s.objects[0], "filename", ""), names[0]);
-	assert_string_equal(node_string(s.objects[1], "filename", ""), names[0]);
-	assert_string_equal(node_string(s.objects[2], "filename", ""), "b\\c.obj");
-	scene_fini(&s);
-	files[1].name = "b\\c.obj";
-	s = read_ok(
-		"<scene version='3.0.0'><shape type='obj'><string name='filename' value='b\\c.obj'/></shape></scene>");
-	assert_string_equal(node_string(s.objects[0], "filename", ""), "b\\c.obj");
-	files[1] = (struct memory_file){0};
-	scene_fini(&s);
-}
-
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -607,8 +549,6 @@ int main(void)
 		cmocka_unit_test(test_escaped_dollar),
 		cmocka_unit_test(test_ignored_is_noted_once),
 		cmocka_unit_test(test_depths_beyond_the_limit_are_noted),
-		cmocka_unit_test(test_assets_are_sorted_and_unique),
-		cmocka_unit_test(test_asset_names_are_canonical),
 		cmocka_unit_test(test_second_name),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
