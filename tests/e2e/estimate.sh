@@ -67,7 +67,7 @@ if command -v gnuplot >/dev/null; then
 	grep -q '</svg>' "$DIR/plot.svg" || fail "the plot is no SVG"
 fi
 
-# As docs/guide.md has it: neither a bound nor an integrator.
+# As docs/errors.md has it: neither a bound nor an integrator.
 demo=$HERE/../scenes/demo/scene.xml
 plot=
 ! command -v gnuplot >/dev/null || plot="--plot $DIR/cost.svg"
