@@ -42,7 +42,7 @@ struct reader {
 	unsigned topics;
 	bool closing;
 	bool heard;    /* it has got its first snapshot, and what it says is read */
-	bool behind;   /* something changed while it had not read all lines: it gets a snapshot when it has */
+	bool behind;   /* something changed while lines were waiting for it: it gets a snapshot once it has read them */
 	size_t unread; /* bytes of answers that wait for it */
 	struct send_share share;
 	size_t line_size;

@@ -200,7 +200,7 @@ static bool is_building(const struct task *t)
 	return false;
 }
 
-/* What has begun is let go of on the way back, as by a thread. */
+/* Runs a task and hands it back, as a thread of the pool does. */
 static void run_next_task(void)
 {
 	struct thread_pool *c = now.agent->thread_pool;

@@ -47,7 +47,7 @@
 #define HOLDS(id) "<ref name='interior' id='" id "'/>"
 #define FLOOR WALL("<scale value='8'/><rotate x='1' angle='-90'/>", "<translate y='-1'/>", GREY("0.4,0.4,0.4"))
 
-/* Of the three kinds by turns, so that a run that is ended has some of each. */
+/* The three kinds in turns, so that an interrupted run has some of each. */
 const struct calibration_scene calibration_scenes[] = {
 	{"tree", "box", "box", "box.xml", NULL, "path", 25},
 	{"public", "cornell-box", "cornell-box", "scene.xml", NULL, "path", 35},

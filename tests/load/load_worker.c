@@ -249,7 +249,7 @@ static void take_grant(struct load_worker *w, const Farm__LeaseGrant *m)
 		fail_worker(w, "a lease that cannot be");
 		return;
 	}
-	if (find(w, &k)) { /* it took too long, and nobody else is there */
+	if (find(w, &k)) { /* it was overdue, and no other worker is free */
 		l->again++;
 		return;
 	}

@@ -227,7 +227,7 @@ static void compare(const struct run *r, const double *g, const double *blur, do
 {
 	for (int i = 0; i < FUNCTION_TRANSFER; i++) {
 		double d = g[i] - r->g[i];
-		/* Round the circle: nearly as many pairs of either sign from each x. */
+		/* An angle: its sine, so that about half of the pairs from each x have either sign. */
 		if (i == FUNCTION_TURN)
 			d = sin(2 * M_PI * d);
 		phi[i] = fabs(d) > blur[i] + r->blur[i] ? copysign(1, d) : 0;

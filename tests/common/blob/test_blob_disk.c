@@ -31,7 +31,7 @@ static int failing_stat(const char *path, struct stat *st)
 	return -1;
 }
 
-/* A file that cannot be looked at is not one that is lost. */
+/* An error of stat is reported, and not taken for a missing file. */
 static void a_disk_that_fails(void **state)
 {
 	(void)state;
@@ -91,7 +91,7 @@ static void flushed_as_needed(void **state)
 	blob_store_close(s);
 }
 
-/* As on a file system that sends what was written when the file is closed. */
+/* As on a network file system that writes when the file is closed. */
 static void a_cached_file_that_cannot_be_closed(void **state)
 {
 	(void)state;

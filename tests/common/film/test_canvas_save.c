@@ -269,7 +269,7 @@ static void what_is_taken_back_leaves_nothing(void **unused)
 	}
 }
 
-/* Of another plan or grid, torn, or with a bit wrong: refused, and nothing of it is used. */
+/* Films of another plan or grid, truncated ones and ones with a wrong bit are refused, and nothing of them is used. */
 static void others_are_refused(void **unused)
 {
 	(void)unused;

@@ -443,7 +443,7 @@ static void who_is_revoked_is_not(void **state)
 	pair_hang_up();
 	refuses(pair_at(pair_ours, "gone"), pair_at(pair_ours, "farm"), "revoked", "revoked");
 	accepts("node", "node", TLS_WORKER);
-	/* By serial number; and what was renewed goes on. */
+	/* Revocation is by serial number: a renewed certificate of the same name stays valid. */
 	struct authority_entry *list;
 	size_t n;
 	pair_issue(pair_ours, "twice", TLS_WORKER, 5);

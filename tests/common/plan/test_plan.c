@@ -350,8 +350,7 @@ static void leases_take_twenty_seconds(void **state)
 	assert_true(differ > 0 && differ < 25); /* log2 1.1 = 0.14 of all */
 }
 
-/* What is short stays as it was: so hslt-render and the farm agree without a pilot. An epoch that was asked for stays,
- * too. */
+/* Short jobs keep their plan, so that hslt-render and the farm agree without a pilot; so does a job with --epoch. */
 static void short_jobs_ask_for_no_pilot(void **state)
 {
 	(void)state;

@@ -134,7 +134,7 @@ static void a_third_that_leaves(void **state)
 	farm_free(f);
 }
 
-/* Who made the states goes on from them: that is no third opinion. */
+/* The worker that made the states may continue from them; its result is no third opinion. */
 static void the_maker_goes_on(void **state)
 {
 	(void)state;

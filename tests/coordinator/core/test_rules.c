@@ -233,7 +233,8 @@ static void a_late_lease_gets_a_second_worker(void **state)
 	farm_free(f);
 }
 
-/* Who was overtaken by a copy may hold half as many leases, not who had the copy. */
+/* A worker whose lease a copy overtook may hold half as many leases afterwards; the one that had the copy keeps its
+ * limit. */
 static void an_overtaken_worker_gets_half_as_many_leases(void **state)
 {
 	(void)state;

@@ -70,8 +70,8 @@ static void priority_before_shares(void **state)
 	});
 }
 
-/* Of two fingerprints that may begin a job the worker that has waited longest does, whichever of them is known longer.
- */
+/* If workers of two fingerprints could begin a job, the one that has waited longest does, whichever fingerprint was
+ * seen first. */
 static void first_to_wait(void **state)
 {
 	(void)state;

@@ -63,7 +63,7 @@ static void no_memory_for_an_image(void **state)
 	server_close(s);
 }
 
-/* Whether the allocation that was to fail has been asked for. */
+/* Whether the planned failure of an allocation has happened. */
 static bool has_failed(void)
 {
 	void *p = mem_alloc(1, 1);

@@ -296,7 +296,7 @@ static void told_to_stop(void **state)
 	end(SIGTERM, true);
 }
 
-/* Who asks for more than can wait is told so, and nobody else. */
+/* A client that asks for more than can wait gets an error; others are served. */
 static void too_much_is_asked(void **state)
 {
 	(void)state;

@@ -91,8 +91,8 @@ static bool sends_slowly(struct scripted *worker, const unsigned char *frame, si
 	return true;
 }
 
-/* It takes longer than anybody may be silent, and the worker can say nothing else meanwhile; it is told that it is
- * heard. */
+/* Sending it takes longer than a worker may be silent, and the worker can send nothing else meanwhile; the coordinator
+ * answers with heartbeats. */
 static void a_slow_result_counts(void **state)
 {
 	(void)state;

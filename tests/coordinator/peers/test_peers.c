@@ -25,7 +25,7 @@ static int set_up(void **state)
 	return served_start(60, 60, 60);
 }
 
-/* Who says nothing, or half of something, has a second. */
+/* A peer that sends nothing, or half a message, is disconnected after a second. */
 static int set_up_quick(void **state)
 {
 	(void)state;
@@ -93,7 +93,7 @@ static void crowds_are_turned_away(void **state)
 	served_works_again();
 }
 
-/* There is no memory for a connection: nobody is let in before there is, and then all are. */
+/* Without memory for a connection nobody is accepted; once there is memory, all are. */
 static void a_caller_waits_for_memory(void **state)
 {
 	(void)state;
@@ -106,7 +106,7 @@ static void a_caller_waits_for_memory(void **state)
 	served_still_works();
 }
 
-/* Who says nothing gives way to who comes after, the first of them first; who has said hello stays. */
+/* When connections run out, peers that have not said hello give way to new ones, the oldest first. */
 static void the_silent_give_way(void **state)
 {
 	(void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* As many connections as there are file descriptors for; more than that is refused with a sentence. */
+/* The server accepts as many connections as it has file descriptors for, and refuses more with a reason. */
 #include "coordinator/server/limits.h"
 
 #include <setjmp.h>

@@ -373,7 +373,7 @@ static bool hears_job(FILE *f, uint64_t id, bool ready)
 	return true;
 }
 
-/* There is always somebody who waits for a snapshot. */
+/* Some reader always waits for a snapshot. */
 static void who_calls_again_and_again_stops_no_changes(void **state)
 {
 	(void)state;

@@ -41,7 +41,7 @@ static struct buf make_piece(size_t size)
 	return b;
 }
 
-/* What is appended goes to the disk with the flush, or when it is too much of all journals to be kept in memory. */
+/* Appended records are written with the next flush, or earlier if those of all journals would take too much memory. */
 static void memory_is_bounded(void **state)
 {
 	(void)state;

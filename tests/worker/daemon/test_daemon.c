@@ -120,7 +120,7 @@ static void workers_share_a_cache_folder(void **state)
 	cache_close(&c);
 }
 
-/* In /tmp anybody can be there first, with files of the right names and wrong contents. */
+/* In /tmp another user may have created the folder first, with files of the right names and wrong contents. */
 static void a_cache_of_others_is_not_used(void **state)
 {
 	(void)state;

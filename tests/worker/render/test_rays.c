@@ -103,7 +103,7 @@ static double bootstrap_rays(const struct world *w, const struct plan *p)
 	return sum;
 }
 
-/* What a render without a pilot would have made of its time: 16,384 bootstrap samples, of 8,000 rays each with hslt. */
+/* The plan without a pilot: 16,384 bootstrap samples, of 8,000 rays each with hslt. */
 static void a_bright_room_has_a_short_bootstrap(void **state)
 {
 	(void)state;

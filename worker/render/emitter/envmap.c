@@ -196,7 +196,7 @@ static double build_density(struct envmap *m)
 	return total;
 }
 
-/* The columns of to_world, as long as keeps its volume 1, and the rows of the inverse. */
+/* The axes of to_world, scaled so that their determinant is 1, and the rows of the inverse of that matrix. */
 static int stretched_axes(const struct scene_node *n, const mat4 *to_world, struct envmap_axes *a, struct error *e)
 {
 	double longest = 0;

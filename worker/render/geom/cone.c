@@ -62,7 +62,7 @@ static bool side_roots(const struct cone *c, vec3 o, vec3 d, double root[2])
 	double d2 = vec3_dot(d, d), shift = -vec3_dot(to_middle, d) / d2, size = c->length + c->r0 + c->r1;
 	vec3 q = vec3_madd(from, shift, d);
 	struct quadratic f = side_along(c, q, d);
-	/* Not along a line that hardly leaves the cone, whose middle may be anywhere. */
+	/* Not for a line nearly along the surface: the middle of its two roots may be anywhere. */
 	if (f.a > 0 && fabs(f.b) * sqrt(d2) <= 4 * size * f.a) {
 		double more = -f.b / f.a;
 		shift += more;

@@ -180,7 +180,8 @@ static void put_light(struct path_context *c, struct sampler *s_numbers, struct 
 	v[s - 1].delta = false;
 }
 
-/* Block 0 of the camera with x's wavelength and point of the aperture, and that of the light with its time. */
+/* Random numbers whose first block is the one of path x: the camera's with its wavelength and point of the aperture,
+ * the light's with its time. The other blocks come from `under`. */
 struct pinned_sampler {
 	struct sampler base;
 	struct sampler *under;

@@ -75,8 +75,8 @@ struct path_refraction {
 	struct path_vertex v[PATH_REFRACTED_MOST]; /* the one nearest to the camera first */
 	double log_transfer;			   /* log T */
 };
-/* The last one that a path of another technique was compared with: all joints of one light sub-path ask for the same.
- */
+/* The last refraction that was computed to weigh a path of another technique: all joints of one light sub-path need the
+ * same one. */
 struct path_refraction_known {
 	bool any, found;
 	vec3 z, y;

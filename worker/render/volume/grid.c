@@ -198,7 +198,7 @@ static double crossing_of_plane(const struct cells *c, int i, double plane)
 	return (plane - c->o[i]) * c->per[i];
 }
 
-/* To what lies between two planes across an axis, for the ray o + t d; false: nothing does. */
+/* Clips the range of t to the part of the ray o + t d between two planes across an axis; false: nothing is left. */
 static bool clip(struct cells *c, double o, double d, double low, double high)
 {
 	if (d == 0)

@@ -29,7 +29,7 @@ static const double BORROWED = 4, DEFENSIVE = 0.1;
 
 /* Nodes are those of a heap: 1 is the whole scene, and 2 i and 2 i + 1 are the halves of i. */
 struct emitter_choice {
-	uint32_t first_cell; /* the first node that is not halved; as many nodes are not */
+	uint32_t first_cell; /* index of the first leaf; there are as many leaves */
 	struct cut {
 		unsigned axis;
 		double at;

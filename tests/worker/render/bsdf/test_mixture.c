@@ -180,7 +180,7 @@ static void test_two_sides_of_two_sides(void **state)
 	arena_fini(&a);
 }
 
-/* What 0.6 keeps where it is asked not to scale: more light than there is. */
+/* Weights above 1 that 0.6 keeps when told not to scale: more light is reflected than arrives. */
 static void test_more_than_all_is_refused(void **state)
 {
 	(void)state;

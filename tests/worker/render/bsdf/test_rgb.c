@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What is not said of each lane alone where the lanes are R, G and B: the indices of metals, and tints. */
+/* Parameters that are not given per channel, where paths carry R, G and B: the indices of metals, and tints. */
 #include "tests/support/memory_assets.h"
 #include "tests/worker/render/bsdf/bsdf_cases.h"
 #include "worker/render/bsdf/fresnel.h"

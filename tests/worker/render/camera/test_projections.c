@@ -203,7 +203,7 @@ static void test_telecentric(void **state)
 			assert_true(camera_project(&c, p, w, t, &px, &py) || at[k] == 0);
 			assert_true(at[k] == 0 || (fabs(px - x) < 1e-6 && fabs(py - y) < 1e-6));
 		}
-		/* What is 7 units nearer to a pinhole that is 2^20 units away. */
+		/* A point 7 units nearer to a pinhole that is 2^20 units away. */
 		double slack = 1e-5, quarter = radius * radius / 4;
 		assert_true(most < radius + slack && most > 0.99 * radius - slack);
 		assert_true(fabs(moments[0] - quarter) < 0.02 * quarter + slack * slack &&

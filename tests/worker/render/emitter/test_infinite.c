@@ -223,7 +223,7 @@ static void test_orientation(void **state)
 	assert_true(fabs(y.p.x - x.p.z) < 1e-14 && fabs(y.p.z + x.p.x) < 1e-14 && fabs(pdf / pdf_turned - 1) < 1e-9);
 }
 
-/* Of the red of p0; at the poles of 3.x all columns come together, so a hair beside them. */
+/* Directions at which the red of p0 is seen. All columns meet at the poles of 3.x, so not exactly there. */
 static void test_pixel_centres(void **state)
 {
 	struct emitter em = make_emitter(*state, "envmap filename=p0", NULL);

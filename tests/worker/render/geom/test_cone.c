@@ -133,7 +133,7 @@ static void test_rays(void **state)
 		assert_true(hits[i] > 100 * dice_count(60000) / 60000);
 }
 
-/* Of a line with an end on the surface, the other root, against all roots; outwards there is none in front. */
+/* For a line with an end on the surface: its other root, against all roots. Outwards, none is in front. */
 static void test_other_root(void **state)
 {
 	(void)state;

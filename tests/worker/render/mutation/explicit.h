@@ -58,7 +58,8 @@ static inline double explicit_log_arrive(const struct full_path *y, unsigned j)
 	return log(path_cosine(&y->v[j], y->edge[j].w) / y->edge[j].distance2);
 }
 
-/* What arriving at an event has besides: the density of its distance, of which `choice` is that of the logarithm. */
+/* The further factor of a vertex in a medium: the density of its distance; *choice: the density of the logarithm of the
+ * distance. */
 static inline double explicit_log_event(const struct full_path *x, const struct full_path *y, unsigned j,
 					double *choice)
 {

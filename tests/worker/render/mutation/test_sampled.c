@@ -25,7 +25,8 @@
 enum { MOST = 6, BITS = 3, BINS = 1 << BITS, PILOT = 4000, LOOK = 256, STARTS = 2400 };
 #define COMPARISONS 256
 #define LEVEL (1e-6 / COMPARISONS)
-/* Of the numbers in [0,1) that make points of the emitter and of the aperture, to both sides. */
+/* Derivatives with respect to the numbers in [0,1) that make points of the emitter and of the aperture, to both sides.
+ */
 #define END_STEP 0.1
 
 struct example {

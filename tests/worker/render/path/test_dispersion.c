@@ -123,7 +123,7 @@ static void test_no_coefficient_is_the_plain_scene(void **state)
 	assert_memory_equal(zero.mean, plain.mean, sizeof plain.mean);
 }
 
-/* Of the path that path_connect puts together: whether it scatters where wavelengths part. */
+/* Whether the path that path_connect joins scatters at a surface that disperses. */
 static bool meets_glass(const struct path_context *c, unsigned s, unsigned t)
 {
 	for (unsigned i = 1; i < s; i++)

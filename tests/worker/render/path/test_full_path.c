@@ -339,7 +339,8 @@ static void test_refracted(void **state)
 	/* clang-format on */
 }
 
-/* What is passed counts as edges: no path is shorter or longer than asked for, and some are as long only thereby. */
+/* Surfaces that are passed count as edges: no path is shorter or longer than requested, and some have their length only
+ * by them. */
 static void test_passed_lengths(void **state)
 {
 	(void)state;

@@ -263,7 +263,7 @@ static void test_search(void **state)
 	assert_int_equal(asset_folders_of(folder, (const char *[40]){0}, 40).count, ASSET_FOLDERS_MAX);
 }
 
-/* What is outside names the folder to give, and is called as the user wrote it. */
+/* For a file outside of the folder the error names the folder to pass, and the file as the user wrote it. */
 static void test_outside_is_said(void **state)
 {
 	(void)state;

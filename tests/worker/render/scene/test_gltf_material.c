@@ -68,7 +68,7 @@ static void assert_absorbs_only(const struct scene_node *node)
 	arena_fini(&arena);
 }
 
-/* Of white light a quarter of the red, half of the green and nearly nothing of the blue is left after 2. */
+/* After a distance of 2, a quarter of red light, half of green light and nearly no blue light is left. */
 static void test_volume(void **state)
 {
 	(void)state;

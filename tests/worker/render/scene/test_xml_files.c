@@ -89,7 +89,8 @@ static void test_path_outside(void **state)
 	expect_name((struct disk){.there = {"a/m.ply"}, .outside = {outside}}, PATHS, "m.ply", "a/m.ply", 0);
 }
 
-/* The longest end that is there; not if the whole path is, or is but may not be read. */
+/* A path that is not there is replaced by its longest end that is; a path that is there stays, also if it may not be
+ * read. */
 static void test_ends_of_paths(void **state)
 {
 	(void)state;

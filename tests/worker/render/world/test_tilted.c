@@ -213,7 +213,7 @@ static void test_sampling(void **state)
 	check_sampling(TWOSIDED(SLOPE(METAL), DENTS(CHALK)));
 }
 
-/* What Smith's model of microfacets leaves of the light from a direction, by its function Lambda. */
+/* Smith's masking of the light from a direction, by his function Lambda. */
 static double smith(const struct surface_point *x, vec3 light)
 {
 	double bent = acos(fmin(vec3_dot(x->sh.n, x->ng), 1)), angle = acos(fabs(vec3_dot(x->ng, light))),
