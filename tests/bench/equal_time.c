@@ -142,7 +142,7 @@ static void render_shot(const struct world *w, const struct method *m, uint64_t 
 	canvas_free(run.canvas);
 }
 
-/* As many samples a pixel as take about that long. */
+/* The number of samples per pixel that takes about that long. */
 static uint64_t shoot_for(const struct world *w, const struct method *m, double seconds, uint64_t seed,
 			  struct shot *out)
 {

@@ -57,7 +57,7 @@ static void path_in(const char *spool, const char *name, char path[512])
 	snprintf(path, 512, "%s/%s", spool, name);
 }
 
-/* Of the job in its bootstrap, which has no checkpoint yet. */
+/* The journal of the job in its bootstrap, which has no checkpoint yet. */
 static void journal_path(const char *spool, char path[512])
 {
 	snprintf(path, 512, "%s/jobs/j%d/journal.0", spool, FARM_BOOTSTRAP);

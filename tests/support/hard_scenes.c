@@ -241,7 +241,7 @@ static struct world *small_light(double size)
 			     0.2, 4 * size, 1 / (size * size));
 }
 
-/* As large as the sun seen from the ground, in a sky of 1. */
+/* A light as large as the sun seen from the ground, in a sky of radiance 1. */
 static struct world *sun(double radiance)
 {
 	return world_of_text(32, 32, SENSOR("0,1,5", "0,0,0") "<shape type='rectangle'>"

@@ -209,7 +209,8 @@ static bool fetch(struct farm_run *f, uint64_t id, bool *there)
 	return true;
 }
 
-/* All that were acknowledged are there, none failed, and those that were said to be done are. false: it hung up. */
+/* Checks that all acknowledged jobs are there, that none failed, and that those reported as done are done. false: the
+ * coordinator hung up. */
 static bool check_jobs(struct farm_run *f)
 {
 	bool seen[IDS_MAX] = {false}, done[IDS_MAX] = {false};

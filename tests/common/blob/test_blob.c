@@ -161,7 +161,7 @@ static void room_is_taken_by_what_arrives(void **state)
 	blob_store_close(s);
 }
 
-/* Whoever announces much and sends little costs others no more than what was sent. */
+/* A writer that announces a large file and sends little of it takes only as much room as it sent. */
 static void evicts_as_bytes_arrive(void **state)
 {
 	(void)state;

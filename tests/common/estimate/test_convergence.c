@@ -297,7 +297,7 @@ static void words_fit(void **state)
 	assert_true(strlen(small) < sizeof small);
 }
 
-/* What a reader of the file finds: the words, and in each pixel the R-hat of its tile, 0 where no chain came. */
+/* The image file holds the sentence, and in each pixel the R-hat of its tile, 0 where no chain came. */
 static void image_says_it(void **state)
 {
 	(void)state;

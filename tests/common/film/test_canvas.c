@@ -357,7 +357,8 @@ static void a_folder_that_is_not_there_is_an_error(void **unused)
 	assert_non_null(strstr(e.text, "/nonexistent/folder"));
 }
 
-/* Of a lease of chains no pixel holds more than its mutations; of samples no pixel takes an eighth of the range. */
+/* A pixel never holds more than the mutations of a lease of chains, and a lease of samples never fills an eighth of the
+ * range. */
 static void a_pixel_of_one_lease_is_bounded(void **unused)
 {
 	(void)unused;

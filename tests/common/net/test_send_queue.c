@@ -134,7 +134,7 @@ static void who_reads_stays(void **state)
 	end_one(&other);
 }
 
-/* What the far end gets, until there are so many bytes. */
+/* Reads at the other end until there are so many bytes. */
 static unsigned char *receive(size_t size)
 {
 	unsigned char *bytes = malloc(size + 1);

@@ -143,7 +143,8 @@ static FILE *file(const char *folder, const char *name, const char *mode)
 	return f;
 }
 
-/* What hslt-ca never makes, signed by our authority nevertheless: good for both purposes, with any words in it. */
+/* A certificate that hslt-ca never makes, signed by our authority all the same: valid for servers and clients, with any
+ * names. */
 static const char *forge_certificate(const char *name, const char *shown, const char *other_names)
 {
 	static char folder[256];

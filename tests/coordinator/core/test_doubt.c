@@ -248,7 +248,7 @@ static void who_has_states_that_are_given_up_loses_them(void **state)
 	farm_free(f);
 }
 
-/* Nobody holds a job up for ever by saying so again and again. */
+/* A worker that refuses states again and again does not hold up the job for ever. */
 static void after_four_times_the_chains_begin_anew(void **state)
 {
 	(void)state;

@@ -107,7 +107,8 @@ static void limit_ends(void **state)
 	farm_free(f);
 }
 
-/* Nobody says why, and nobody comes back: eight in a row on one lease, with nothing merged in between, are too many. */
+/* Workers vanish without a reason and do not return: eight in a row on one lease, with nothing merged in between, fail
+ * the job. */
 static void never_heard_again(void **state)
 {
 	(void)state;
@@ -195,7 +196,7 @@ static void racks_that_lose_power_fail_no_job(void **state)
 	farm_free(f);
 }
 
-/* Who makes up names with one certificate is not eight where the farm knows another. */
+/* Eight names with one certificate do not count as eight workers, if the farm has workers with another certificate. */
 static void one_certificate(void **state)
 {
 	(void)state;

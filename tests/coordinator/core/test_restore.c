@@ -100,8 +100,8 @@ static void before_anything(void **state)
 	farm_free(f);
 }
 
-/* What the last complete round had met is met: the end, a look at the error, the time that it took, not that in
- * between. */
+/* Bounds that the last complete round had met are met after the restart: the number of rounds, the error, and the time
+ * at that round, not what was used since. */
 static void bounds_that_were_met_stay_met(void **state)
 {
 	(void)state;

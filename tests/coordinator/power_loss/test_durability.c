@@ -325,7 +325,7 @@ static void write_file(const char *path, const unsigned char *bytes, size_t size
 	checked_file_close(&out);
 }
 
-/* As another coordinator might have written it: the submission has so many bytes more. */
+/* A submission as another coordinator may have written it, with so many bytes more. */
 static void change_row(uint64_t id, const char *version, int more)
 {
 	static unsigned char submission[FILE_MOST];

@@ -25,7 +25,7 @@
 
 enum { ENDED = 300, LISTED = 50, SUBMITTED = 40 };
 
-/* As large as a record gets in practice: 24 effects. */
+/* A record of the largest size in practice, with 24 effects. */
 static void fill_record(struct job_record *r, uint64_t id)
 {
 	json_t *effects = json_array();

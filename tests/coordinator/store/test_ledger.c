@@ -144,7 +144,7 @@ static void living_jobs(void **state)
 	ledger_close(l);
 }
 
-/* As the first version made it, with a job in it. */
+/* A database as the first version made it, with a job in it. */
 static void earlier_versions(void **state)
 {
 	(void)state;

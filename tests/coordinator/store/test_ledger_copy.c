@@ -240,7 +240,7 @@ static int deny_writes_to_copy(void *user, int what, const char *a, const char *
 	return refuse && writes && file && strcmp(file, "copy") == 0 ? SQLITE_DENY : SQLITE_OK;
 }
 
-/* What is written meanwhile is in jobs.db, and in the copy once it can be written. */
+/* Rows written meanwhile are in jobs.db, and in the copy once that can be written. */
 static void the_copy_falls_behind(void **state)
 {
 	(void)state;

@@ -186,7 +186,7 @@ static void sizes_beyond_bounds(void **state)
 	assert_refused(-EBADMSG);
 }
 
-/* Of a later version: by its digits, or by a field that is not known. */
+/* Files of a later version are recognised by the version, or by an unknown field. */
 static void of_another_version(void **state)
 {
 	(void)state;

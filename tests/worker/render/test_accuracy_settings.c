@@ -147,7 +147,7 @@ static void test_walk_limits(void **state)
 	assert_true(l.tolerance == 1e-5 && l.least_step == 0.5 && l.back == 0.25 && l.scale == 1);
 }
 
-/* As a shape's first and only material is created. */
+/* The BSDF of a world's only shape. */
 static const struct bsdf *material(const char *accuracy, const char *bsdf, struct world **w)
 {
 	worlds_accuracy = accuracy;

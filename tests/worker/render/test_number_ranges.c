@@ -52,7 +52,7 @@ static int print_value(char *out, size_t size, const struct param *p, enum value
 	}
 }
 
-/* What the property needs beside it to have a meaning. */
+/* Other properties without which this one has no meaning. */
 static const char *needed_beside(const struct plugin_decl *d, const struct param *p)
 {
 	if (strcmp(p->name, "displacement") == 0)

@@ -142,7 +142,7 @@ static void add_to_place(struct place *c, double weight, const struct sample *s,
 	c->weight += weight;
 }
 
-/* Of the finer mesh's vertex, for its texture coordinates. */
+/* Attributes of a vertex of the finer mesh, interpolated in its triangle of the coarse one. */
 static void mix_attributes(const struct displacer *w, uint32_t triangle, double b1, double b2, uint32_t vertex)
 {
 	const uint32_t *t = w->base.index[triangle];

@@ -83,7 +83,7 @@ static int blend_of(const struct scene_node *first, const struct scene_node *sec
 		    struct error *e)
 {
 	struct bend *bends = NULL;
-	/* Of 0.6: without the shadows of bumps, which look at other frames, too. */
+	/* Bumps of 0.6, without the shadowing that depends on other frames as well. */
 	const struct bsdf_build build = {.arena = a, .bends = &bends};
 	struct scene_node *n = node_make(a, PLUGIN_BSDF, "blendbsdf weight=0.3");
 	node_add_child(a, n, first);

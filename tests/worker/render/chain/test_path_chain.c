@@ -92,7 +92,7 @@ static void check_resume(struct chain *c, struct chain *d)
 	mem_free(s.bytes);
 }
 
-/* What somebody might put into a number of a state. */
+/* Numbers that a hostile or damaged state may hold. */
 static double bad_number(struct dice *dice)
 {
 	static const double bad[] = {__builtin_nans(""),

@@ -147,7 +147,8 @@ static void test_own_candidate(void **state)
 	check_own_candidate("moving");
 }
 
-/* Where lengths are drawn, each candidate weighs one over the chance that both sub-paths are as long as it needs. */
+/* Where lengths are drawn, the weight of a candidate is one over the probability that both sub-paths are long enough
+ * for it. */
 static void test_drawn_lengths(void **state)
 {
 	(void)state;

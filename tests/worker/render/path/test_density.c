@@ -218,7 +218,7 @@ static void test_delta_lights(void **state)
 	assert_true(t.with_delta > t.routes / 20);
 }
 
-/* All in fog that scatters forwards, before a near plane; of a lamp and a point. */
+/* Everything in fog that scatters forwards, behind a near plane, lit by a lamp and a point light. */
 static void check_fog(const char *name, const char *medium, const struct vol *grid, size_t walks)
 {
 	char xml[4096];

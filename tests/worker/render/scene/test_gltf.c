@@ -412,7 +412,7 @@ static void test_notes(void **state)
 	scene_fini(&s);
 }
 
-/* What the format forbids or leaves open, and readers of it let pass. */
+/* Files that the format forbids or leaves undefined, but that other readers accept. */
 static void test_loose_files(void **state)
 {
 	(void)state;

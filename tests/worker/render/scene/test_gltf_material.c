@@ -214,7 +214,7 @@ static void test_materials(void **state)
 	assert_false(scene_has_note(&s, "clear coats"));
 	scene_fini(&s);
 
-	/* What is not known is ignored, and said, even if the file does not list it. */
+	/* Unknown extensions are ignored with a note, even if the file does not list them. */
 	s = gltf_files_scene(IOR, "\"ACME_materials_fur\": {}, " IOR, false);
 	assert_true(scene_has_note(&s, "ACME_materials_fur of a material is not supported and ignored"));
 	assert_false(scene_has_note(&s, "KHR_materials_ior"));

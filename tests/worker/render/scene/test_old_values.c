@@ -279,7 +279,7 @@ static void test_unknown_names_of_all_classes(void **state)
 #undef SENSOR
 }
 
-/* What the Blender exporter of 0.5 writes into images by default. */
+/* The defaults that the Blender exporter of 0.5 writes for images. */
 static void test_labels(void **state)
 {
 	(void)state;

@@ -165,7 +165,7 @@ static void test_transforms(void **state)
 	check_transform("<lookAt origin='0,0,5' target='0,0,4' up='0 1 0'/>", (vec3){0, 0, 1}, (vec3){0, 0, 4});
 	check_transform("<look_at origin='0,0,5' target='0,0,4' up='0 1 0'/>", (vec3){0, 0, 1}, (vec3){0, 0, 4});
 	check_transform("<lookat origin='0,0,5' target='0,0,4' up='0 1 0'/>", (vec3){1, 0, 0}, (vec3){-1, 0, 5});
-	/* Where +y goes without `up`: worked out by hand of what each Mitsuba says. */
+	/* Where +y goes without `up`, computed by hand from the documentation of each Mitsuba. */
 	vec3 y = {0, 1, 0};
 	check_transform("<lookat origin='0,0,5' target='0,0,9'/>", y, (vec3){1, 0, 5});
 	check_transform("<lookat origin='0,0,0' target='3,0,4'/>", y, (vec3){0, -1, 0});
@@ -465,7 +465,7 @@ static void test_depths_beyond_the_limit_are_noted(void **state)
 	scene_fini(&s);
 }
 
-/* All that is wrong, each with its place, an object that is no object once. */
+/* All errors are listed, each with its place; an object that cannot be read is listed once. */
 static void test_every_problem_is_told(void **state)
 {
 	(void)state;

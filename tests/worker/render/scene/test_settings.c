@@ -237,7 +237,7 @@ static void test_several_sensors(void **state)
 	scene_fini(&s);
 }
 
-/* What will not be in the picture, or what will be, is said by name. */
+/* Notes name what will be missing in the image, or will be shown although Mitsuba would not. */
 static void test_notes_on_the_whole(void **state)
 {
 	(void)state;

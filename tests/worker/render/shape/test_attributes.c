@@ -150,7 +150,7 @@ static void test_ply_values(void **state)
 	assert_true(v->value[0] == 0.5F && v->value[1] == 0.25F && v->value[2] == 1);
 	assert_true(v->value[3] == 2 && v->value[4] == -1 && v->value[6] == 0);
 	assert_true(w->value[0] == 1 && near(w->value[2], srgb_to_linear(0.2)));
-	/* What is no number of an image damages only what it belongs to. */
+	/* A value that is not finite marks its own attribute as damaged, and no other. */
 	assert_true(v->damaged && heat->damaged && !c->damaged && !w->damaged);
 	assert_true(v->encoded && heat->encoded && !c->encoded && !w->encoded);
 	release(&b);

@@ -94,7 +94,7 @@ static void test_places(void **state)
 	}
 }
 
-/* Of a lamp: points that are drawn, and points that are met. */
+/* Checks an area light with a volume at points that are drawn, and at points that paths hit. */
 static void check_lamp(const char *shape, uint32_t channels)
 {
 	char inner[1024];

@@ -91,7 +91,7 @@ static void test_blend(void **state)
 		HALF("-0.5", DIFFUSE("0.8")) HALF("0.5", DIFFUSE("0.3")));
 }
 
-/* By a normal that faces away from the camera, and by one that faces it. */
+/* With a normal that faces away from the camera, and one that faces it. */
 #define BENT(opacity, y)                                                                              \
 	"<shape type='rectangle'><bsdf type='mask'><float name='opacity' value='" opacity "'/>"       \
 	"<bsdf type='twosided'><bsdf type='normalmap'><rgb name='normalmap' value='0.5 " y " 0.67'/>" \

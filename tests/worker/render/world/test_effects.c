@@ -85,7 +85,7 @@ static void test_dispersion_that_no_path_meets(void **state)
 	expect(VIEW LAMP BALL("1", ""), "dispersion", false, "no material refracts");
 }
 
-/* What is around must be closed, opaque, and the camera outside; what is within must not reach out. */
+/* An enclosure must be closed and opaque with the camera outside, and the things inside must not reach through it. */
 static void test_what_does_not_enclose(void **state)
 {
 	(void)state;
@@ -293,7 +293,8 @@ static void test_transparent_shadows(void **state)
 	world_free(w);
 }
 
-/* By what refracts exactly and lets nothing straight through; not where media scatter. */
+/* Refracted shadows: behind surfaces that refract exactly and let nothing straight through, and not where media
+ * scatter. */
 static void test_refracted_shadows(void **state)
 {
 	(void)state;

@@ -112,7 +112,8 @@ static void test_obstacles(void **state)
 	assert_true(hidden < 1e-9);
 }
 
-/* Of lamps in two closed rooms, one camera: only that of its room lights anything, however strong the other is. */
+/* Two closed rooms with a lamp each, and a camera in one: only the lamp of its room is chosen, however strong the other
+ * is. */
 static void test_rooms(void **state)
 {
 	(void)state;
