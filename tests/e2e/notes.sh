@@ -4,7 +4,7 @@
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-render hslt-compare
 
 BLACK="-D light=0 --integrator pssmlt --spp 16 --target-error 2%"
-DARK="-D light=0 --integrator path --size 16x16 --target-error 2%"
+NO_LIGHT="-D light=0 --integrator path --size 16x16 --target-error 2%"
 STUCK="--integrator pssmlt --bootstrap 16384 --epoch 2 --mutations 640"
 
 # noted FILE WORDS
@@ -142,10 +142,10 @@ for words in '<integrator type="path"> is ignored except for' '<bsdf type="irawa
 	grep -qF "$escaped" "$DIR/shown.json" && grep -qF "$escaped" "$DIR/log-fork" || fail "JSON or the log does not say '$words'"
 done
 same "$DIR/fork.exr" "$DIR/farm-fork.exr"
-for kind in black dark stuck; do # dark: it would never have the error that it is to stop at
+for kind in black no_light stuck; do # no_light: it would never have the error that it is to stop at
 	[ $kind = black ] && options=$BLACK words='image is black: none of the 16,384 bootstrap samples' ||
 		options=$STUCK words='of 320 chain epochs accepted nothing .*16 chains.*longest run: [0-9,]* rejections'
-	[ $kind != dark ] || options=$DARK words='image is black: no sample found light'
+	[ $kind != no_light ] || options=$NO_LIGHT words='image is black: no sample found light'
 	"$BIN/hslt-render" "$BOX" -o "$DIR/$kind.exr" $options --stats "$DIR/$kind.json" 2>"$DIR/render-$kind.log" ||
 		fail "hslt-render: $kind ended with $?"
 	noted "$DIR/render-$kind.log" "$words"

@@ -5,8 +5,8 @@
  */
 #include "tests/support/served.h"
 
+#include "common/base/clock.h"
 #include "common/base/mem.h"
-#include "coordinator/store/ledger.h"
 #include "tests/support/black_results.h"
 #include "tests/support/checksummed_frame.h"
 
@@ -17,12 +17,13 @@
 #include <cmocka.h>
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
-#include <time.h>
 #include <unistd.h>
 
-/* Who is silent for six heartbeats, 3 s, is hung up on: a busy machine keeps us from a word for more than one. */
+/* A worker that is silent for six heartbeats, 3 s, is disconnected: on a busy machine this test may be silent for one.
+ */
 #define QUICK 0.5
 
 static int set_up_quick(void **state)
@@ -59,26 +60,19 @@ static struct scripted *worker_with_result(struct scripted *client, struct lease
 	return worker;
 }
 
-static double seconds_now(void)
-{
-	struct timespec t;
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 /* false: we stood still for so long that the coordinator may hang up on the worker. */
 static bool sends_slowly(struct scripted *worker, const unsigned char *frame, size_t size)
 {
 	enum { PIECES = 24 };
-	double begun = seconds_now(), last = begun, longest = 0;
+	double begun = clock_seconds(), last = begun, longest = 0;
 	size_t at = 0;
 	bool sent = true;
 	for (size_t i = 1; i <= PIECES && sent; i++) {
 		usleep(150000);
 		size_t n = size * i / PIECES - at;
 		sent = send(worker->fd, frame + at, n, MSG_NOSIGNAL) == (ssize_t)n;
-		longest = fmax(longest, seconds_now() - last);
-		last = seconds_now();
+		longest = fmax(longest, clock_seconds() - last);
+		last = clock_seconds();
 		at += n;
 	}
 	if (longest > 4 * QUICK)
@@ -87,7 +81,7 @@ static bool sends_slowly(struct scripted *worker, const unsigned char *frame, si
 	assert_true(sent);
 	assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
 	assert_true(worker->heartbeats >= (last - begun) / (QUICK + longest) / 2 &&
-		    worker->heartbeats <= (seconds_now() - begun) / QUICK + 2);
+		    worker->heartbeats <= (clock_seconds() - begun) / QUICK + 2);
 	return true;
 }
 
