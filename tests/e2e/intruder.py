@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A client with a good certificate and bad manners: intruder.py PORT FOLDER ANOTHER'S prints one line an attempt, "WHAT|ANSWER", and
-fails when one of them is not hung up on or refused within a minute. With a worker at the coordinator: also scenes that reach
+fails when one of them is not disconnected or refused within a minute. With a worker at the coordinator: also scenes that reach
 for what is not in their bundle, submitted by hand so that no program of ours looks at them before."""
 import hashlib, os, re, socket, ssl, struct, sys, time
 

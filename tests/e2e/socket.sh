@@ -84,7 +84,7 @@ time.sleep(600)' "$AT" &
 	grep -q "64 others are connected" "$DIR/err.log" || fail "it says: $(cat "$DIR/err.log")"
 	kill $crowd
 	wait $crowd 2>/dev/null || :
-	# One that is told so and hung up on before it has asked for changes: it was ended by a signal, and said nothing.
+	# One that is told so and disconnected before it has asked for changes: it was ended by a signal, and said nothing.
 	"${PYTHON:-python3}" -c '
 import socket, sys
 s = socket.socket(socket.AF_UNIX)

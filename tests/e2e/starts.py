@@ -41,6 +41,6 @@ elsewhere, heard = hello(b"other", b"cd34", 1)
 nowhere, heard = hello(b"other", b"", 0)
 for what, s in (("the same start", again), ("one name, another home", elsewhere), ("one name, no home", nowhere)):
     if not is_open(s):
-        sys.exit(f"{what} is hung up on")
+        sys.exit(f"{what} is disconnected")
 expect("a home of words", hello(b"w", b"../home", 1)[1], b"out of bounds")
 expect("a home that is too long", hello(b"w", b"0" * 40, 1)[1], b"out of bounds")

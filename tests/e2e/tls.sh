@@ -121,7 +121,7 @@ import socket, sys
 s = socket.create_connection(("127.0.0.1", int(sys.argv[1])))
 s.settimeout(60)
 s.sendall(b"GET / HTTP/1.0\r\n\r\n")
-sys.exit(0 if s.recv(64)[:1] == b"\x15" and s.recv(64) == b"" else 1)' "${COORDINATOR#*:}" || fail "HTTP is not hung up on"
+sys.exit(0 if s.recv(64)[:1] == b"\x15" and s.recv(64) == b"" else 1)' "${COORDINATOR#*:}" || fail "a client that speaks HTTP is not disconnected"
 row "HTTP to the TLS port" refused "an alert, and hung up"
 
 # A good certificate and bad manners.

@@ -19,8 +19,8 @@ enum load_kind {
 	LOAD_DIES,   /* in a third of its leases: hangs up without a word, and calls again */
 	LOAD_LIES,   /* every result holds what is no number */
 	LOAD_HOARDS, /* claims 4,096 threads, takes what it gets, and says nothing but heartbeats */
-	LOAD_HANGS,  /* in a third of its leases: says nothing more, not even heartbeats; when it is hung up on it calls
-			again */
+	LOAD_HANGS,  /* in a third of its leases: says nothing more, not even heartbeats; when it is disconnected it
+			connects again */
 	LOAD_KINDS
 };
 

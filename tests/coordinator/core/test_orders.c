@@ -52,7 +52,8 @@ static void hold_and_release(void **state)
 	farm_free(f);
 }
 
-/* Leases from before the files were right again fail for want of them, whenever that is heard; later ones count. */
+/* Leases from before the files were right again fail without them, whenever the failure is reported; later ones count.
+ */
 static void damaged_files_are_nobodys_fault(void **state)
 {
 	(void)state;

@@ -60,8 +60,8 @@ static void in_a_round(void **state)
 	farm_free(f);
 }
 
-/* A result from before the restart that waited for another one: it counts when it can, without a word to anybody but
- * who has its lease. */
+/* A stored result from before the restart that waits for an earlier epoch: it counts once that is merged; only the
+ * worker that holds its lease is told. */
 static void stored_results(void **state)
 {
 	(void)state;

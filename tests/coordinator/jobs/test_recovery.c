@@ -42,7 +42,7 @@ static atomic_bool is_film[FILES]; /* by descriptor */
 
 static struct plan plan;
 static uint64_t journal_most;
-static double heartbeat; /* s; a peer that is silent for six of them is hung up on */
+static double heartbeat; /* s; a peer that is silent for six of them is disconnected */
 static pid_t pid;
 static uint16_t port;
 static char spool[100], port_file[100];

@@ -32,7 +32,7 @@ static int set_up_quick(void **state)
 	return served_start(1, 60, 1);
 }
 
-static void rubbish_is_hung_up_on(void **state)
+static void rubbish_is_disconnected(void **state)
 {
 	(void)state;
 	static const struct {
@@ -61,7 +61,7 @@ static void rubbish_is_hung_up_on(void **state)
 	served_still_works();
 }
 
-static void stragglers_are_hung_up_on(void **state)
+static void stragglers_are_disconnected(void **state)
 {
 	(void)state;
 	struct scripted *silent = peer_call(), *half = peer_call(), *client = peer_call();
@@ -216,7 +216,7 @@ static bool say_piece_gets(const struct scripted *p, const struct blob_hash *h, 
 }
 
 /* A worker may ask for what all its jobs need at once, and gets it; what it does not read does not fill our memory, and
- * when it goes on asking it is hung up on. */
+ * when it goes on asking it is disconnected. */
 static void the_deaf_cost_little(void **state)
 {
 	(void)state;
@@ -265,12 +265,12 @@ static void the_deaf_cost_little(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(rubbish_is_hung_up_on),     cmocka_unit_test(crowds_are_turned_away),
+		cmocka_unit_test(rubbish_is_disconnected),   cmocka_unit_test(crowds_are_turned_away),
 		cmocka_unit_test(a_caller_waits_for_memory), cmocka_unit_test(the_silent_give_way),
 		cmocka_unit_test(hello_is_looked_at),	     cmocka_unit_test(submissions_are_looked_at),
 		cmocka_unit_test(chains_need_memory),	     cmocka_unit_test(the_deaf_cost_little),
 	};
-	const struct CMUnitTest quick[] = {cmocka_unit_test(stragglers_are_hung_up_on)};
+	const struct CMUnitTest quick[] = {cmocka_unit_test(stragglers_are_disconnected)};
 	int failed = cmocka_run_group_tests(tests, set_up, served_stop);
 	return failed + cmocka_run_group_tests(quick, set_up_quick, served_stop);
 }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""crowd.py PORT: 2,000 connections that say nothing, until they are hung up on; meanwhile 2,000 more: 500 hellos of another version, 500 with
+"""crowd.py PORT: 2,000 connections that say nothing, until they are disconnected; meanwhile 2,000 more: 500 hellos of another version, 500 with
 a wrong bit, rubbish, half a header. Prints "idle", then "gone", then "done"."""
 import socket, sys
 from wire import VERSION, hello

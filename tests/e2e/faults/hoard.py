@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """hoard.py PORT FINGERPRINT: a worker of that fingerprint that claims 4,096 threads, takes all leases that it gets, says its heartbeats,
-and answers nothing; it comes back when it is hung up on, as it is on a machine that stands still. Prints a line for each lease."""
+and answers nothing; it comes back when it is disconnected, as it is on a machine that stands still. Prints a line for each lease."""
 import socket, sys, time
 from wire import field, frame, hello
 
 
 def hoard(s):
-    """Until it is hung up on."""
+    """Until it is disconnected."""
     s.sendall(hello(1, b"hoarder", field(4, sys.argv[2].encode()) + field(5, 4096)))
     s.sendall(frame(field(20, field(1, 4097))))
     s.settimeout(0.1)

@@ -31,7 +31,7 @@ def read(n):
     while len(got) < n:
         piece = s.recv(n - len(got))
         if not piece:
-            sys.exit(f"hung up on, after {got!r}")
+            sys.exit(f"disconnected, after {got!r}")
         got += piece
     return got
 
