@@ -13,6 +13,7 @@
 #include "worker/render/scene/lenient.h"
 #include "worker/render/scene/nesting.h"
 #include "worker/render/scene/old_values.h"
+#include "worker/render/scene/over_one.h"
 #include "worker/render/scene/param_check.h"
 #include "worker/render/scene/plugin.h"
 #include "worker/render/scene/refuse.h"
@@ -63,6 +64,10 @@ static int add_property(struct maker *m, struct draft *d, const struct xml_eleme
 			struct value v)
 {
 	int r = param_check(el, p, &v, m->error);
+	if (r == -ERANGE && over_one(d->node->cls, p, &v)) {
+		const struct error why = *m->error;
+		return error_set(m->error, ERANGE, "%s%s", why.text, OVER_ONE_HINT);
+	}
 	if (r)
 		return r;
 	const struct property *before = node_find(d->node, p->name);
@@ -150,6 +155,17 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 	return r;
 }
 
+/* What a value means where Mitsuba, or `lenient`, takes it for another one. */
+static int adjust_value(struct maker *m, const struct draft *d, const struct xml_element *owner,
+			const struct xml_element *el, const struct param *p, struct value *v)
+{
+	enum plugin_class cls = d->node->cls;
+	int r = el->snake ? old_value(&m->notes, owner, el, p, cls, m->arena, v) : 0;
+	if (!r && (p->types & VALUE_CLIPPED))
+		return clip_value(&m->notes, owner, el, p, v);
+	return !r && m->lenient ? over_one_value(&m->notes, owner, el, cls, p, m->arena, v) : r;
+}
+
 static int read_property(struct maker *m, struct draft *d, const struct xml_element *owner,
 			 const struct xml_element *el)
 {
@@ -176,10 +192,8 @@ static int read_property(struct maker *m, struct draft *d, const struct xml_elem
 		return r || !p ? r : REPORT_TOLD;
 	struct value v;
 	r = value_read(el, m->assets_from, m->arena, &v, m->error);
-	if (!r && el->snake)
-		r = old_value(&m->notes, owner, el, p, d->node->cls, m->arena, &v);
-	if (!r && (p->types & VALUE_CLIPPED))
-		r = clip_value(&m->notes, owner, el, p, &v);
+	if (!r)
+		r = adjust_value(m, d, owner, el, p, &v);
 	if (!r && v.type == VALUE_TRANSFORM)
 		v.animation = animation;
 	if (!r)
@@ -247,6 +261,8 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 	if (!r)
 		r = nesting_take(&d->nesting, d->node->cls, el, target, once, m->error);
 	if (r)
+		return r;
+	if (p && m->lenient && (r = over_one_texture(&m->notes, d->node->cls, p, m->arena, el, &child)))
 		return r;
 	if (p)
 		return add_property(m, d, el, p, (struct value){.type = VALUE_NODE, .as.node = child});
