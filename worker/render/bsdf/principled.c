@@ -487,6 +487,7 @@ const struct bsdf_ops bsdf_ops_principled = {
 		       PRINCIPLED_SHARE("anisotropic"), PRINCIPLED_SHARE("coat"), PRINCIPLED_SHARE("coat_roughness"),
 		       {.name = "specular_color", .types = VALUE_TEXTURE, .min = 0, .max = 1},
 		       {.name = "lambertian", .types = VALUE_BOOL},
+		       {.name = "thin", .status = PARAM_REFUSED}, /* what is meant is `principledthin` */
 		       {.name = "specular", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 8},
 		       {.name = "eta", .types = VALUE_FLOAT | VALUE_INT, .min = 1, .max = 10},
 		       {.name = "diffuse_reflectance_sampling_rate", .status = PARAM_IGNORED},

@@ -29,17 +29,6 @@ bool element_is_unset(const struct xml_element *el)
 	return unset;
 }
 
-bool element_is_of_scene(const struct xml_element *el)
-{
-	static const char *const names[] = {"embree_use_robust_intersection", "embree_use_robust_intersections",
-					    "allow_thread_reordering", "compact_accel", "portal_weight"};
-	const char *name = xml_attribute(el, "name");
-	for (size_t i = 0; i < sizeof names / sizeof *names && name; i++)
-		if (strcmp(name, names[i]) == 0)
-			return strcmp(el->name, "boolean") == 0 || strcmp(el->name, "float") == 0;
-	return false;
-}
-
 int xml_error(const struct xml_element *el, struct error *e, int errno_value, const char *format, ...)
 {
 	char text[768];

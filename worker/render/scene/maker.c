@@ -10,6 +10,7 @@
 #include "worker/render/scene/maker.h"
 
 #include "worker/render/scene/animation.h"
+#include "worker/render/scene/gltf.h"
 #include "worker/render/scene/lenient.h"
 #include "worker/render/scene/nesting.h"
 #include "worker/render/scene/old_values.h"
@@ -79,27 +80,42 @@ static int add_property(struct maker *m, struct draft *d, const struct xml_eleme
 	return 0;
 }
 
-/* Forks of Mitsuba add parameters. A name that resembles none in the table with an effect, and that no other plug-in of
- * the class has, is taken for one of these; other unknown names are mistakes. In 3.x sensors, films, shapes and
- * emitters alone allow it: elsewhere parameters are visible in the image, and Mitsuba 3 refuses them. 0.6 ignores
- * unknown names of all classes, and in its files an object may have the parameter of another, left there when its type
- * was changed. */
+/* Whether another plug-in of the class has it, by this name or, as in 0.6, by one with capitals. */
+static bool is_of_another(const struct maker *m, enum plugin_class cls, const char *name)
+{
+	char snake[128] = "";
+	if (strlen(name) < sizeof snake / 2)
+		snake_case(name, snake);
+	for (const struct plugin_decl *other = m->decls; other->type; other++)
+		if (other->cls == cls && (plugin_param(other, name) || plugin_param(other, snake)))
+			return true;
+	return false;
+}
+
+/* Forks of Mitsuba add parameters. A name that resembles none in the table with an effect, and in 3.x no other plug-in
+ * of the class has, is taken for one of these; other unknown names are mistakes. Materials, textures, media and filters
+ * are visible in the image, so in 3.x more is taken for a mistake there than a spelling. In files of 0.6 an object may
+ * have the parameter of another, left there when its type was changed. What glTF names is its own, and what stands in
+ * for a plug-in has other names. */
 static bool is_foreign_parameter(const struct maker *m, const struct draft *d, const struct xml_element *el,
 				 const char *name)
 {
 	enum plugin_class cls = d->node->cls;
-	struct spelling s = {.wanted = name};
 	bool hidden = cls == PLUGIN_SENSOR || cls == PLUGIN_FILM || cls == PLUGIN_SHAPE || cls == PLUGIN_EMITTER;
 	/* Shapes of Mitsuba 3 may hold textures of any name, for whoever asks for attributes. */
 	bool attribute = cls == PLUGIN_SHAPE && (strcmp(el->name, "texture") == 0 || strcmp(el->name, "ref") == 0);
-	if (!(value_is_element(el->name) || (attribute && !el->snake)) || !(el->snake || hidden))
+	if (!value_is_element(el->name) && !(attribute && !el->snake))
 		return false;
+	if (!el->snake && !hidden && (gltf_is(el->file) || d->stands_in))
+		return false;
+	struct spelling s = {.wanted = name};
 	plugin_offer_params(d->decl, &s);
-	for (const struct plugin_decl *other = m->decls; other->type && !s.best && !el->snake; other++)
-		if (other->cls == cls && plugin_param(other, name))
-			return false;
-	const struct param *meant = s.best ? plugin_param(d->decl, s.best) : NULL;
-	return !s.best || (meant && meant->status == PARAM_IGNORED);
+	const struct param *meant = s.best		  ? plugin_param(d->decl, s.best)
+				    : hidden || el->snake ? NULL
+							  : meant_parameter(d->decl, name);
+	if (!meant)
+		return el->snake || !is_of_another(m, cls, name);
+	return meant->status == PARAM_IGNORED;
 }
 
 /* Of an integrator or sampler all is ignored but a few parameters: a name that resembles one of these may be meant for
@@ -155,7 +171,8 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 	return r;
 }
 
-/* What a value means where Mitsuba, or `lenient`, takes it for another one. */
+/* What a value means where Mitsuba, or `lenient`, takes it for another one. Of what stands in for a plug-in that has
+ * the parameter in other units, the value is left out instead. */
 static int adjust_value(struct maker *m, const struct draft *d, const struct xml_element *owner,
 			const struct xml_element *el, const struct param *p, struct value *v)
 {
@@ -163,7 +180,7 @@ static int adjust_value(struct maker *m, const struct draft *d, const struct xml
 	int r = el->snake ? old_value(&m->notes, owner, el, p, cls, m->arena, v) : 0;
 	if (!r && (p->types & VALUE_CLIPPED))
 		return clip_value(&m->notes, owner, el, p, v);
-	return !r && m->lenient ? over_one_value(&m->notes, owner, el, cls, p, m->arena, v) : r;
+	return !r && m->lenient && !d->stands_in ? over_one_value(&m->notes, owner, el, cls, p, m->arena, v) : r;
 }
 
 static int read_property(struct maker *m, struct draft *d, const struct xml_element *owner,

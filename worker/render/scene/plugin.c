@@ -65,6 +65,15 @@ const struct param *plugin_param(const struct plugin_decl *d, const char *name)
 	return any;
 }
 
+bool plugin_any_has(const struct plugin_decl *decls, const char *name)
+{
+	for (; decls->type; decls++)
+		for (const struct param *p = decls->params; p && p->name; p++)
+			if (strcmp(p->name, name) == 0)
+				return true;
+	return false;
+}
+
 const char *plugin_new_name(const struct plugin_decl *d, const char *name)
 {
 	static const struct {

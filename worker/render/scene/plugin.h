@@ -17,6 +17,9 @@ void plugin_offer_classes(struct spelling *s);
 const struct plugin_decl *plugin_find(const struct plugin_decl *decls, enum plugin_class cls, const char *type);
 const struct param *plugin_param(const struct plugin_decl *d, const char *name);
 
+/* Whether any of them has a parameter of that name. */
+bool plugin_any_has(const struct plugin_decl *decls, const char *name);
+
 /* The 3.x name of what 0.5/0.6 names differently, beyond the spelling; otherwise the name itself. */
 const char *plugin_new_name(const struct plugin_decl *d, const char *name);
 

@@ -52,6 +52,14 @@ static int read_include(struct maker *m, const struct xml_element *el, const str
 	return r ? r : read_top(m, strcmp(el->first->name, "scene") == 0 ? el->first : el, objects);
 }
 
+/* A value directly in <scene>, in 3.x, that means nothing: no spectrum for others, and none of a plug-in's parameters
+ * in the wrong place. 0.6 ignores all. */
+static bool is_foreign_value(const struct maker *m, const struct xml_element *el)
+{
+	const char *name = xml_attribute(el, "name");
+	return name && !id_table_names(el) && !plugin_any_has(m->decls, name);
+}
+
 /* An element that stands directly in <scene>, or alone in a file that is included there. */
 static int read_top_element(struct maker *m, struct xml_element *el, const struct scene_node **objects)
 {
@@ -68,7 +76,7 @@ static int read_top_element(struct maker *m, struct xml_element *el, const struc
 		return element_check(el, "name|value", false, m->error);
 	if (strcmp(el->name, "path") == 0)
 		return element_check(el, "value", false, m->error);
-	if (value_is_element(el->name) && (el->snake || element_is_of_scene(el))) /* 0.6 has none and ignores all */
+	if (value_is_element(el->name) && (el->snake || is_foreign_value(m, el)))
 		return note_foreign(&m->notes, el);
 	if (el->unset)
 		return 0;
