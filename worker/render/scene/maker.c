@@ -35,6 +35,7 @@ struct draft {
 	const struct plugin_decl *decl;
 	bool stands_in; /* replaces a plug-in that is not supported */
 	bool lacks;	/* something inside it was left out, or is wrong */
+	bool flat;	/* its transform has no inverse */
 	struct property *properties;
 	const struct scene_node **children;
 	struct xml_nesting nesting;
@@ -224,8 +225,12 @@ static int read_property(struct maker *m, struct draft *d, const struct xml_elem
 		r = *v.as.string ? maker_add_asset(m, v.as.string, owner)
 				 : xml_error(el, m->error, EINVAL, "an empty file name");
 	mat4 inverse;
-	if (!r && v.type == VALUE_TRANSFORM && d->node->cls == PLUGIN_SHAPE && !mat4_invert(v.as.transform, &inverse))
-		r = xml_error(owner, m->error, EINVAL, "%s flattens the shape (it has no inverse): line %d", written,
+	bool flat = !r && v.type == VALUE_TRANSFORM && d->node->cls == PLUGIN_SHAPE &&
+		    !mat4_invert(v.as.transform, &inverse);
+	d->flat |= flat;
+	if (flat && !m->lenient)
+		r = xml_error(owner, m->error, EINVAL,
+			      "%s flattens the shape (it has no inverse): line %d; --lenient leaves it out", written,
 			      el->line);
 	const char *file = v.type == VALUE_SPECTRUM ? xml_attribute(el, "filename") : NULL;
 	return r || !file ? r : maker_add_asset(m, file, el);
@@ -483,6 +488,11 @@ int maker_node(struct maker *m, struct xml_element *el, const struct scene_node 
 	el->busy = false;
 	el->nesting = d.nesting;
 	*out = d.node;
+	if (!r && d.flat && m->lenient) {
+		if (m->flat_shapes++ == 0)
+			m->first_flat = el;
+		return REPORT_TOLD;
+	}
 	if (!r)
 		r = remarks_on_object(d.node, &m->report, m->error);
 	if (!r && m->lenient && (r = substitute_medium(&m->notes, el, d.lacks, d.node)))

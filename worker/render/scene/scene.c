@@ -150,6 +150,17 @@ static bool add_default_light(struct xml_tree *t, const struct plugin_decl *decl
 	return make_daylight(t->root, arena);
 }
 
+/* Shapes that `lenient` leaves out together. */
+static int note_flat(const struct maker *m)
+{
+	const struct xml_element *first = m->first_flat;
+	return !first ? 0
+		      : note(&m->notes, first, "", "flat",
+			     "%u shape%s that to_world flattens (it has no inverse) %s left out (lenient; first: the %.64s in %s:%d)",
+			     m->flat_shapes, m->flat_shapes == 1 ? "" : "s", m->flat_shapes == 1 ? "is" : "are",
+			     xml_attribute(first, "type"), first->file, first->line);
+}
+
 static int make_scene(struct maker *m)
 {
 	struct scene *s = m->scene;
@@ -179,6 +190,8 @@ static int make_scene(struct maker *m)
 			objects[i]->cls == PLUGIN_INTEGRATOR && integrators_without_media(objects[i]) != NULL;
 	for (uint32_t i = 0; i < m->tree->note_count && !r; i++)
 		r = note(&m->notes, m->tree->root, m->tree->notes[i], "", "%s: %s", m->name, m->tree->notes[i]);
+	if (!r)
+		r = note_flat(m);
 	if (!r && !m->tree->holes)
 		r = remarks_on_scene(objects, s->object_count, s->dialect_3, &m->report, m->error);
 	return r ? r : list_assets(m);

@@ -389,7 +389,7 @@ static int prepare(struct builder *b, const struct render_options *o)
 		rc = choose_emitters(b);
 	if (!rc) {
 		unseen_note(b->w, b->boxes);
-		dark_note(b->w);
+		dark_note(b->w, b->lost_light);
 		build_media_note(b);
 	}
 	if (!rc && !b->w->effects.colour)

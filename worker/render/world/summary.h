@@ -39,6 +39,8 @@ struct render_coincident {
 struct world_notes {
 	char scales[512];    /* a shape that is too small relative to another, by name */
 	char flat[384];	     /* how many triangles without area were left out */
+	char without[256];   /* how many meshes have none */
+	char gone[256];	     /* how many shapes are too small for the scene */
 	char materials[384]; /* how many files of shapes have materials that are not read */
 	char unseen[192];    /* that the camera sees no shape */
 	char dark[128];	     /* that the emitters give no light */
