@@ -4,6 +4,7 @@
 #include "common/base/arena.h"
 #include "worker/render/scene/value.h"
 
+#include <errno.h>
 #include <math.h>
 #include <string.h>
 
@@ -76,7 +77,32 @@ static bool is_pattern(const char *type)
 	return strcmp(type, "checkerboard") == 0 || strcmp(type, "gridtexture") == 0;
 }
 
-static int limit_pattern(const struct notes *t, struct arena *arena, const struct xml_element *el,
+/* A colour of a texture, which is refused once, however many materials have it. */
+static int refuse_colour(const struct notes *t, const struct scene_node *texture, const struct property *p, double most)
+{
+	error_set(t->error, ERANGE, "%s:%d: <texture type=\"%.64s\">: %s=%g is outside [0, 1]%s", texture->file,
+		  p->line, texture->type, p->name, most, OVER_ONE_HINT);
+	for (uint32_t i = 0; i < t->report->problem_count; i++)
+		if (strcmp(t->report->problems[i], t->error->text) == 0)
+			return REPORT_TOLD;
+	return -ERANGE;
+}
+
+/* Makes v, a colour of a texture that is above 1, 1 where it is more. */
+static int limit_colour(const struct notes *t, bool lenient, struct arena *arena, const struct xml_element *el,
+			const struct scene_node *texture, const struct property *p, struct value *v)
+{
+	double most = largest(v);
+	if (!lenient)
+		return refuse_colour(t, texture, p, most);
+	if (limit(v, arena))
+		return out_of_memory(t);
+	return note(t, el, texture->type, p->name,
+		    "%s:%d: <texture type=\"%.64s\">: %s=%g is above 1 and counts as 1 (lenient)", texture->file,
+		    p->line, texture->type, p->name, most);
+}
+
+static int limit_pattern(const struct notes *t, bool lenient, struct arena *arena, const struct xml_element *el,
 			 const struct scene_node **texture)
 {
 	static const char *const names[] = {"color0", "color1"};
@@ -85,20 +111,17 @@ static int limit_pattern(const struct notes *t, struct arena *arena, const struc
 		if (!p)
 			continue;
 		struct value v = p->value;
-		double most = largest(&v);
 		int r = 0;
 		if (v.type == VALUE_NODE && is_pattern(v.as.node->type))
-			r = limit_pattern(t, arena, el, &v.as.node);
-		else if (most > 1)
-			r = limit(&v, arena) ? out_of_memory(t)
-					     : note(t, el, (*texture)->type, names[i],
-						    "%s:%d: <texture type=\"%.64s\">: %s=%g is above 1 and counts as 1 "
-						    "(lenient)",
-						    (*texture)->file, p->line, (*texture)->type, names[i], most);
+			r = limit_pattern(t, lenient, arena, el, &v.as.node);
+		else if (largest(&v) > 1)
+			r = limit_colour(t, lenient, arena, el, *texture, p, &v);
 		else
 			continue;
 		if (r)
 			return r;
+		if (v.type == VALUE_NODE && v.as.node == p->value.as.node)
+			continue;
 		*texture = node_with(*texture, names[i], v, arena);
 		if (!*texture)
 			return out_of_memory(t);
@@ -106,8 +129,8 @@ static int limit_pattern(const struct notes *t, struct arena *arena, const struc
 	return 0;
 }
 
-int over_one_texture(const struct notes *t, enum plugin_class cls, const struct param *p, struct arena *arena,
-		     const struct xml_element *el, const struct scene_node **texture)
+int over_one_texture(const struct notes *t, enum plugin_class cls, const struct param *p, bool lenient,
+		     struct arena *arena, const struct xml_element *el, const struct scene_node **texture)
 {
-	return is_share(cls, p) && is_pattern((*texture)->type) ? limit_pattern(t, arena, el, texture) : 0;
+	return is_share(cls, p) && is_pattern((*texture)->type) ? limit_pattern(t, lenient, arena, el, texture) : 0;
 }

@@ -104,6 +104,8 @@ static void test_textures(void **state)
 		"<bsdf type='bumpmap' id='b'><ref id='t'/><bsdf type='diffuse'><ref name='reflectance' id='t'/></bsdf></bsdf>"
 		"<bsdf type='phong' id='p'><ref name='exponent' id='t'/></bsdf>";
 	for (int version = 0; version < 2; version++) {
+		refuses(version ? "3.0.0" : "0.6.0", body, false,
+			"s.xml:2: <texture type=\"checkerboard\">: color0=2 is outside [0, 1]; --lenient counts it as 1");
 		struct scene s = read_leniently(version ? "3.0.0" : "0.6.0", body);
 		assert_true(scene_has_note(
 			&s, "s.xml:2: <texture type=\"checkerboard\">: color0=2 is above 1 and counts as 1 (lenient)"));
@@ -127,6 +129,22 @@ static void test_textures(void **state)
 	}
 }
 
+static void test_a_texture_is_refused_once(void **state)
+{
+	(void)state;
+	static const char text[] =
+		"<scene version='3.0.0'><texture type='checkerboard' id='t'><float name='color0' value='2'/>"
+		"</texture><bsdf type='diffuse'><ref name='reflectance' id='t'/></bsdf>"
+		"<bsdf type='plastic'><ref name='diffuse_reflectance' id='t'/></bsdf></scene>";
+	const struct memory_file files[] = {{"s.xml", text, strlen(text)}, {0}};
+	const struct asset_source assets = memory_assets(files);
+	struct scene s;
+	struct error e;
+	assert_int_equal(scene_read_all(&s, &assets, "s.xml", render_plugins(), NULL, 0, false, &e), 0);
+	assert_int_equal(s.problem_count, 1);
+	scene_fini(&s);
+}
+
 /* Mitsuba 0.6 scales reflectances; only what it does not scale is left to leniency. */
 static void test_scaled_in_old_files(void **state)
 {
@@ -146,6 +164,7 @@ int main(void)
 		cmocka_unit_test(test_values),
 		cmocka_unit_test(test_still_refused),
 		cmocka_unit_test(test_textures),
+		cmocka_unit_test(test_a_texture_is_refused_once),
 		cmocka_unit_test(test_scaled_in_old_files),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
