@@ -101,6 +101,27 @@ static void test_without_triangles(void **state)
 	world_free(w);
 }
 
+/* glTF has no such mesh by its specification, but exporters write some: here with 0 indices. */
+static void test_without_triangles_in_gltf(void **state)
+{
+	(void)state;
+	static const char text[] =
+		"{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0,1]}],\"nodes\":[{\"mesh\""
+		":0},{\"mesh\":1}],\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0},\"indices\":"
+		"2}]},{\"primitives\":[{\"attributes\":{\"POSITION\":0},\"indices\":1}]}],\"accessors\":[{\""
+		"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\",\"min\":[0,0,0],\"max\":["
+		"1,1,0]},{\"bufferView\":1,\"componentType\":5123,\"count\":0,\"byteOffset\":0,\"type\":\"SC"
+		"ALAR\"},{\"bufferView\":1,\"componentType\":5123,\"count\":3,\"type\":\"SCALAR\"}],\"bufferV"
+		"iews\":[{\"buffer\":0,\"byteOffset\":0,\"byteLength\":36},{\"buffer\":0,\"byteOffset\":36,\""
+		"byteLength\":12}],\"buffers\":[{\"byteLength\":48,\"uri\":\"data:application/octet-strea"
+		"m;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAABAAIAAAAAAAEA\"}]}";
+	const struct memory_file files[] = {{"scene.gltf", text, strlen(text)}, {NULL, NULL, 0}};
+	struct world *w = world_of_files(8, 8, files);
+	assert_int_equal(w->shape_count, 1);
+	assert_non_null(strstr(w->notes.without, "1 mesh without triangles is left out (first: "));
+	world_free(w);
+}
+
 /* Of three shapes and four that are too small for a world with them, these go. */
 static void test_too_small(void **state)
 {
@@ -191,9 +212,8 @@ static void test_no_meshes(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_without_triangles),
-		cmocka_unit_test(test_too_small),
-		cmocka_unit_test(test_flattened),
+		cmocka_unit_test(test_without_triangles), cmocka_unit_test(test_without_triangles_in_gltf),
+		cmocka_unit_test(test_too_small),	  cmocka_unit_test(test_flattened),
 		cmocka_unit_test(test_no_meshes),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
