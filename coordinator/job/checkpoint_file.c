@@ -28,12 +28,12 @@ void checkpoint_head_of(struct checkpoint_head *h, const struct live_job *job, c
 				      .job = job->id,
 				      .generation =
 					      generation < job->generation_least ? job->generation_least : generation,
-				      .cpu_seconds = job->cpu_seconds,
+				      .cpu_seconds = job->record.cpu_seconds,
 				      .bootstrap_cpu_seconds = job->record.bootstrap_cpu_seconds,
 				      .look_written = job->look_written,
 				      .times = job->times,
 				      .lit = job->lit,
-				      .counts = job->counts,
+				      .counts = job->record.counts,
 				      .looks = *status->looks};
 	snprintf(h->fingerprint, sizeof h->fingerprint, "%s", status->fingerprint);
 }
@@ -107,7 +107,7 @@ static int read_states(struct live_job *job, struct checked_file *in, struct err
 static void take_head(struct live_job *job, const struct checkpoint_head *h)
 {
 	job->worker_count = h->worker_count;
-	job->cpu_seconds = job->record.cpu_seconds = h->cpu_seconds;
+	job->record.cpu_seconds = h->cpu_seconds;
 	job->record.bootstrap_cpu_seconds = h->bootstrap_cpu_seconds;
 	job->look_written = h->look_written;
 	job->times = h->times;
@@ -115,7 +115,7 @@ static void take_head(struct live_job *job, const struct checkpoint_head *h)
 	job->record.looks.count = 0;
 	for (uint32_t i = 0; i < h->looks.count && i < FORECAST_LOOKS; i++)
 		forecast_add_look(&job->record.looks, &h->looks.looks[i]);
-	job->counts = h->counts;
+	job->record.counts = h->counts;
 	snprintf(job->fingerprint, sizeof job->fingerprint, "%s", h->fingerprint);
 }
 

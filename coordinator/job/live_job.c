@@ -164,10 +164,9 @@ void live_job_set_states(struct live_job *job, uint32_t slot, struct chain_state
 
 int live_job_merge(struct live_job *job, struct batch *b, struct error *e)
 {
-	job->cpu_seconds += b->cpu_seconds;
-	job->record.cpu_seconds = job->cpu_seconds;
+	job->record.cpu_seconds += b->cpu_seconds;
 	if (b->key.kind == LEASE_BOOTSTRAP)
-		job->record.bootstrap_cpu_seconds = job->cpu_seconds;
+		job->record.bootstrap_cpu_seconds = job->record.cpu_seconds;
 	if (b->key.kind == LEASE_BOOTSTRAP)
 		return bootstrap_add(job->bootstrap, b, e);
 	int rc = canvas_add(job->canvas, b, e);

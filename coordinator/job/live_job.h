@@ -90,7 +90,7 @@ struct live_job {
 	uint64_t id;
 	struct envelope submit; /* owned */
 	struct plan plan;
-	struct job_record record;
+	struct job_record record;    /* its counters as last written; the core has the current ones */
 	struct job_record *earlier;  /* of its end before it was extended, whose image exists; NULL: none */
 	struct bootstrap *bootstrap; /* until the canvas exists */
 	struct canvas *canvas;	     /* from then on */
@@ -108,8 +108,7 @@ struct live_job {
 	int log; /* file descriptor of the log */
 	uint64_t log_bytes;
 	struct journal *journal;
-	bool pinned;		  /* the journal has the record of its fingerprint */
-	struct job_counts counts; /* as last written */
+	bool pinned; /* the journal has the record of its fingerprint */
 	struct live_job_times times;
 	char fingerprint[256];	   /* an image of an earlier run */
 	uint64_t checkpoint_bytes; /* of the last attempt */
@@ -132,7 +131,6 @@ struct live_job {
 	struct publishing publishing; /* valid while busy */
 	bool black;		      /* as the published image, or the bootstrap */
 	double preview_made;	      /* s of the loop's clock; 0: never */
-	double cpu_seconds;	      /* of all merged leases */
 	uint32_t worker_count;	      /* workers that had leases of it */
 	uint64_t last_workers[64];
 	struct live_job_credit *credits;

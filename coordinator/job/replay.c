@@ -167,8 +167,8 @@ static int take_record(void *user, const struct journal_item *item, struct error
 		return 0;
 	case JOURNAL_COUNTS:
 	case JOURNAL_OLD_COUNTS:
-		rc = item->kind == JOURNAL_COUNTS ? stored_unpack_counts(body, size, &job->counts, e)
-						  : stored_old_counts(body, size, &job->counts, e);
+		rc = item->kind == JOURNAL_COUNTS ? stored_unpack_counts(body, size, &job->record.counts, e)
+						  : stored_old_counts(body, size, &job->record.counts, e);
 		return rc ? strange_note(r, rc, e) : 0;
 	default:
 		return strange(r, "a record", size, e);

@@ -114,8 +114,7 @@ void rollback_take(struct live_job *job, struct rollback *b)
 	b->states = NULL;
 	job->makers[slot] = b->maker;
 	job->again[slot] = true;
-	job->cpu_seconds -= b->batch.cpu_seconds;
-	job->record.cpu_seconds = job->cpu_seconds;
+	job->record.cpu_seconds -= b->batch.cpu_seconds;
 }
 
 void rollback_fini(struct rollback *b)

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Packs what is stored of a job into messages of proto/stored.proto and unpacks it again: counters, error estimates
- * ("looks") and the head of a checkpoint. The counters come from the list JOB_COUNTS, so a new one appears here by
- * itself.
+ * ("looks") and the head of a checkpoint. The counters come from the list of a job's fields, so a new one appears here
+ * by itself.
  *
  * Failures: bytes that are not such a message, a field that this version does not know, or more groups or looks than
  * fit are -EPROTO with a sentence; -ENOMEM. Packing cannot fail: the sizes are bounded by STORED_NOTE_MOST and
@@ -38,16 +38,16 @@ _Static_assert(sizeof(struct job_counts) / sizeof(uint64_t) * 12 <= STORED_NOTE_
 static void fill_counts(const struct job_counts *c, Stored__Counts *m)
 {
 	stored__counts__init(m);
-#define X(name, key, wire) m->name = c->name;
-	JOB_COUNTS(X)
-#undef X
+#define COUNTER(member, key, wire) m->member = c->member;
+	JOB_COUNTERS(COUNTER)
+#undef COUNTER
 }
 
 static int take_counts(const Stored__Counts *m, struct job_counts *c, struct error *e)
 {
-#define X(name, key, wire) c->name = m->name;
-	JOB_COUNTS(X)
-#undef X
+#define COUNTER(member, key, wire) c->member = m->member;
+	JOB_COUNTERS(COUNTER)
+#undef COUNTER
 	return message_check_known(&m->base, e);
 }
 

@@ -8,7 +8,7 @@
 
 #include "common/base/error.h"
 #include "common/estimate/forecast.h"
-#include "coordinator/core/counts.h"
+#include "coordinator/core/job_fields.h"
 #include "coordinator/job/live_job.h"
 
 /* What a checkpoint contains besides seeds, chain states and films. */

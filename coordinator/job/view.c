@@ -15,6 +15,10 @@
 #include <stdio.h>
 #include <string.h>
 
+/* Where a field is in struct job_view. */
+#define IN_RECORD record.
+#define IN_VIEW
+
 void view_of_record(struct job_view *v, const struct job_record *r)
 {
 	memset(v, 0, sizeof *v);
@@ -49,28 +53,22 @@ void view_add_status(struct job_view *v, const struct job_status *s)
 	struct job_record *r = &v->record;
 	text_copy(r->state, sizeof r->state, job_state_name(s->state));
 	text_copy(r->reason, sizeof r->reason, s->end == END_NONE ? "" : job_end_name(s->end));
-	text_copy(r->why, sizeof r->why, s->text);
 	r->exit_code = job_state_is_end(s->state) ? (uint32_t)job_exit_code(s) : 0;
 	r->looks = *s->looks;
 	r->counts = s->counts;
 	v->halving_cpu = s->halving_cpu;
 	v->halving_seconds = s->halving_seconds;
-#define LIVE(statement) statement
-#define KEPT(statement)
-#define TEXT(member, size, key, shown, wire, core) core(text_copy(r->member, sizeof r->member, s->member);)
-#define NUMBER(kind, member, key, shown, wire, core) core(r->member = from_core_##kind(s->member);)
-#define COUNT(member, key, shown, wire, core) core(r->member = s->member;)
-	RECORD_FIELDS(TEXT, NUMBER, COUNT)
+#define BY_CORE(statement) statement;
+#define BY_JOBS(statement)
+#define TEXT(member, size, in, by, key, shown, wire) by(text_copy(v->in member, size, s->member))
+#define NUMBER(kind, member, in, by, key, shown, wire) by(v->in member = from_core_##kind(s->member))
+#define COUNT(member, by, key, shown, wire) by(r->member = s->member)
+	JOB_FIELDS(TEXT, NUMBER, COUNT, JOB_NO_FIELD)
+#undef BY_CORE
+#undef BY_JOBS
 #undef TEXT
 #undef NUMBER
 #undef COUNT
-#define TEXT(member, size, key, shown, wire, core) core(text_copy(v->member, sizeof v->member, s->member);)
-#define NUMBER(kind, member, key, shown, wire, core) core(v->member = from_core_##kind(s->member);)
-	VIEW_FIELDS(TEXT, NUMBER)
-#undef TEXT
-#undef NUMBER
-#undef LIVE
-#undef KEPT
 }
 
 void view_hide_others(struct job_view *v)
@@ -92,23 +90,17 @@ void view_to_wire(const struct job_view *v, Farm__JobStatus *out)
 #define IGNORE(x)
 #define AT(to) out->to = SEND
 #define NOWHERE IGNORE
-#define X(name, key, wire) wire(r->counts.name);
-#define TEXT(member, size, key, shown, wire, core) wire(text_borrow(r->member));
-#define NUMBER(kind, member, key, shown, wire, core) wire(r->member);
-#define COUNT(member, key, shown, wire, core) wire(r->member);
-	RECORD_FIELDS(TEXT, NUMBER, COUNT)
-	JOB_COUNTS(X)
-#undef TEXT
-#undef NUMBER
-#define TEXT(member, size, key, shown, wire, core) wire(text_borrow(v->member));
-#define NUMBER(kind, member, key, shown, wire, core) wire(v->member);
-	VIEW_FIELDS(TEXT, NUMBER)
+#define TEXT(member, size, in, by, key, shown, wire) wire(text_borrow(v->in member));
+#define NUMBER(kind, member, in, by, key, shown, wire) wire(v->in member);
+#define COUNT(member, by, key, shown, wire) wire(r->member);
+#define COUNTER(member, key, wire) wire(r->counts.member);
+	JOB_FIELDS(TEXT, NUMBER, COUNT, COUNTER)
 #undef AT
 #undef NOWHERE
-#undef X
 #undef TEXT
 #undef NUMBER
 #undef COUNT
+#undef COUNTER
 	out->why = text_borrow(why_of(v));
 	out->ended = record_is_ended(r);
 	out->halving_cpu_seconds = v->halving_cpu.middle;
@@ -167,11 +159,13 @@ static void add_details(json_t *o, const struct job_record *r)
 	json_object_set_new(o, "looks", forecast_looks_to_json(&r->looks));
 }
 
-#define TEXT(member, size, key, shown, wire, core) {FIELD_TEXT, offsetof(struct job_view, member), size, key, shown},
-#define NUMBER(kind, member, key, shown, wire, core) {FIELD_##kind, offsetof(struct job_view, member), 0, key, shown},
-static const struct field fields[] = {VIEW_FIELDS(TEXT, NUMBER)};
+#define TEXT(member, size, in, by, key, shown, wire) {FIELD_TEXT, offsetof(struct job_view, in member), size, shown},
+#define NUMBER(kind, member, in, by, key, shown, wire) {FIELD_##kind, offsetof(struct job_view, in member), 0, shown},
+#define COUNT(member, by, key, shown, wire) {FIELD_u64, offsetof(struct job_view, record.member), 0, shown},
+static const struct field fields[] = {JOB_FIELDS(TEXT, NUMBER, COUNT, JOB_NO_FIELD)};
 #undef TEXT
 #undef NUMBER
+#undef COUNT
 
 json_t *view_to_json(const struct job_view *v, bool details)
 {
@@ -179,7 +173,7 @@ json_t *view_to_json(const struct job_view *v, bool details)
 	char id[32];
 	snprintf(id, sizeof id, "j%llu", (unsigned long long)r->id);
 	json_t *o = json_pack("{s:s}", "id", id);
-	if (!o || !record_show(r, o) || !fields_show(fields, sizeof fields / sizeof *fields, v, o)) {
+	if (!o || !fields_show(fields, sizeof fields / sizeof *fields, v, o)) {
 		json_decref(o);
 		return NULL;
 	}

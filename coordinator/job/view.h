@@ -12,28 +12,15 @@
 
 #include <jansson.h>
 
-/* Fields that only a live job has, besides its record; the columns are those of record_fields.h. A share counts
- * machines by priority; `reading` is the fraction of its stored data that has been read after a restart. */
-#define VIEW_FIELDS(TEXT, NUMBER)                                                                 \
-	NUMBER(real, rate, NULL, "rate", AT(rate), LIVE)                                          \
-	NUMBER(known, eta, NULL, "eta", AT(eta), LIVE)                                            \
-	NUMBER(known, eta_low, NULL, NULL, AT(eta_low), LIVE) /* valid if eta is known */         \
-	NUMBER(known, eta_high, NULL, NULL, AT(eta_high), LIVE)                                   \
-	NUMBER(u32, leases, NULL, "leases", AT(leases), LIVE)	 /* leases at workers */          \
-	NUMBER(u32, workers, NULL, "workers", AT(workers), LIVE) /* that hold them */             \
-	NUMBER(u32, machines, NULL, "machines", NOWHERE, LIVE)	 /* that could */                 \
-	NUMBER(known, share, NULL, NULL, AT(share), LIVE)                                         \
-	TEXT(place, 160, NULL, "place", AT(place), LIVE) /* in words */                           \
-	NUMBER(known, reading, NULL, "reading", NOWHERE, KEPT)                                    \
-	TEXT(waiting, 256, NULL, "waiting", NOWHERE, LIVE) /* why nothing is being done for it */ \
-	TEXT(owners_place, 160, NULL, NULL, NOWHERE, LIVE) /* the same text for its owner */      \
-	TEXT(owners_waiting, 256, NULL, NULL, NOWHERE, LIVE)
-
 struct job_view {
 	struct job_record record;
-#define TEXT(member, size, key, shown, wire, core) char member[size];
-#define NUMBER(kind, member, key, shown, wire, core) field_##kind member;
-	VIEW_FIELDS(TEXT, NUMBER)
+#define IN_RECORD(member)
+#define IN_VIEW(member) member;
+#define TEXT(member, size, in, by, key, shown, wire) in(char member[size])
+#define NUMBER(kind, member, in, by, key, shown, wire) in(field_##kind member)
+	JOB_FIELDS(TEXT, NUMBER, JOB_NO_FIELD, JOB_NO_FIELD)
+#undef IN_RECORD
+#undef IN_VIEW
 #undef TEXT
 #undef NUMBER
 	struct forecast_range halving_cpu, halving_seconds; /* valid if there are estimates */

@@ -151,11 +151,11 @@ static int read_row(const struct jobs *jobs, uint64_t job, struct ledger_job *j,
 /* The journal's numbers are from shortly before the end: the record of the end is more accurate. */
 static void take_counts(struct job_counts *c, const struct job_record *r)
 {
-#define X(name, key, wire)            \
-	if (c->name < r->counts.name) \
-		c->name = r->counts.name;
-	JOB_COUNTS(X)
-#undef X
+#define COUNTER(member, key, wire)        \
+	if (c->member < r->counts.member) \
+		c->member = r->counts.member;
+	JOB_COUNTERS(COUNTER)
+#undef COUNTER
 }
 
 /* r: its record. */
@@ -167,7 +167,7 @@ static int begin_again(struct jobs *jobs, const struct requester *by, struct liv
 	if (rc)
 		return rc;
 	job->record.has_result = r->has_result;
-	take_counts(&job->counts, r);
+	take_counts(&job->record.counts, r);
 	job->next = jobs->live;
 	jobs->live = job;
 	ended_jobs_remove(jobs, job->id);

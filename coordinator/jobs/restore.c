@@ -86,7 +86,7 @@ int restore_tell(struct jobs *jobs, const struct live_job *job, const char *held
 				       .opened = job->times.opened,
 				       .completed = job->times.completed,
 				       .looks = &job->record.looks,
-				       .counts = job->counts}};
+				       .counts = job->record.counts}};
 	jobs_step(jobs, &ev);
 	mem_free(next);
 	mem_free(makers);

@@ -132,7 +132,7 @@ static int tear_down(void **state)
 static void assert_loaded(const struct live_job *job, double cpu_seconds)
 {
 	assert_int_equal(job->worker_count, 3);
-	assert_true(job->cpu_seconds == cpu_seconds);
+	assert_true(job->record.cpu_seconds == cpu_seconds);
 	assert_true(job->seeds[0] == 0x0102030405060708 && job->seeds[2] == UINT64_MAX && job->seeds[3] == 10);
 	assert_null(job->states[0]);
 	assert_true(job->states[1][0].size == 3 && job->states[1][1].size == 1);

@@ -23,9 +23,9 @@ static struct job_counts counts(void)
 {
 	struct job_counts c;
 	uint64_t n = UINT64_MAX;
-#define X(name, key, wire) c.name = n--;
-	JOB_COUNTS(X)
-#undef X
+#define COUNTER(member, key, wire) c.member = n--;
+	JOB_COUNTERS(COUNTER)
+#undef COUNTER
 	return c;
 }
 

@@ -185,7 +185,7 @@ static void shows_what_the_core_says(void **state)
 			       .eta_high = 13,
 			       .leases = 14,
 			       .counts = {.repeats = 15},
-			       .text = "a lease failed",
+			       .why = "a lease failed",
 			       .looks = &r.looks,
 			       .state = JOB_RUNNING};
 	struct job_view v;
