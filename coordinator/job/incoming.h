@@ -8,23 +8,24 @@
 #define COORDINATOR_JOB_INCOMING_H
 
 #include "common/base/buf.h"
+#include "common/base/error.h"
 #include "common/film/batch.h"
 #include "common/plan/plan.h"
 #include "common/wire/envelope.h"
 
 struct rollback;
 
-/* A submitted job, and the outcome. */
+/* A submitted job, and the number that it gets. */
 struct submission {
 	struct envelope *submit; /* taken over by the job if accepted */
 	const struct plan *plan;
 	const char *rule;	     /* what its epochs' length was derived from; "": it was requested */
 	const char *owner, *address; /* of the submitter; owner "": no certificate */
 	uint64_t job;		     /* the job's number; 0: refused by the core */
-	char refusal[256];	     /* why a job with a number cannot be stored; "": it is stored */
 };
 
 struct incoming {
+	struct error *refusal;	       /* set by jobs_ask; NULL: nobody asks */
 	struct submission *submission; /* EVENT_SUBMIT */
 	struct rollback *back;	       /* EVENT_LEASE_FAILED: what can be taken back; NULL: nothing */
 	/* EVENT_BATCH, EVENT_STORED */

@@ -68,7 +68,6 @@ struct jobs {
 	struct job_record *ended;	  /* at most ENDED_MAX, oldest first */
 	size_t ended_count;
 	STAILQ_HEAD(, deferred) deferred;
-	char refusal[256];	      /* why the core refused the last event */
 	struct recovering_job *found; /* sorted by id */
 	struct recovery *recovery;    /* jobs of an earlier run that are being read; NULL: none left */
 	int fault;		      /* why it stops by itself; 0: it does not */

@@ -25,9 +25,8 @@ struct peer_calls {
 	void (*acknowledge)(struct peers *user, uint64_t peer, const struct lease_key *k, enum ack ack,
 			    const char *text);
 
-	/* To any peer. refused: the core refused its request; fault: it sent something invalid and is disconnected;
-	 * dismiss: the same, and the core has forgotten it. */
-	void (*refused)(struct peers *user, uint64_t peer, const char *text);
+	/* To any peer. fault: it sent something invalid and is disconnected; dismiss: the same, and the core has
+	 * forgotten it. */
 	void (*fault)(struct peers *user, uint64_t peer, const char *text);
 	void (*dismiss)(struct peers *user, uint64_t peer, const char *text);
 	/* The answer to extend_job. refusal: the reason; NULL: done, and the text says what. */

@@ -14,6 +14,7 @@
 #include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
+#include "coordinator/job/incoming.h"
 #include "coordinator/jobs/durable.h"
 #include "coordinator/jobs/listing.h"
 #include "coordinator/jobs/restore.h"
@@ -130,8 +131,7 @@ static int extend_live(struct jobs *jobs, const struct requester *by, struct liv
 	}
 	log_extension(by, job, text, size);
 	struct event ev = {.kind = EVENT_EXTEND, .tag = by->peer, .job = job->id, .plan = &job->plan};
-	jobs_step(jobs, &ev);
-	return 0;
+	return jobs_ask(jobs, &ev, &(struct incoming){0}, e);
 }
 
 /* ---- finished jobs ---- */
@@ -171,12 +171,9 @@ static int begin_again(struct jobs *jobs, const struct requester *by, struct liv
 	job->next = jobs->live;
 	jobs->live = job;
 	ended_jobs_remove(jobs, job->id);
-	jobs->refusal[0] = 0;
 	rc = restore_tell(jobs, job, "", by->peer, e);
-	if (!rc && !*jobs->refusal)
-		return 0;
 	if (!rc)
-		rc = error_set(e, EAGAIN, "%s", jobs->refusal);
+		return 0;
 	jobs->live = job->next;
 	ended_jobs_add(jobs, r);
 	struct job_record over = *r;

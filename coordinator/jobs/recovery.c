@@ -169,7 +169,6 @@ static int finish(struct jobs *jobs, struct error *e)
 	int rc = 0;
 	for (struct recovering_job *f; !rc && (f = jobs->found);) {
 		struct ledger_job j;
-		struct job_counts known;
 		struct live_job *job = f->job;
 		uint64_t id = job->id;
 		jobs->found = f->next;
@@ -182,8 +181,6 @@ static int finish(struct jobs *jobs, struct error *e)
 			      : error_set(e, ENOENT, "its row is missing");
 		if (!rc && (job = jobs_find(jobs, id))) /* it may have ended at once */
 			files_look(jobs, job);
-		if (!rc && !farm_counts(jobs->farm, id, &known))
-			rc = error_set(e, ENOMEM, "no memory for a job");
 		if (rc)
 			rc = error_prefix(e, rc, "j%llu", (unsigned long long)id);
 	}

@@ -81,6 +81,14 @@ void jobs_step_with(struct jobs *jobs, struct event *ev, const struct incoming *
 	jobs->follow_up->stepped(jobs);
 }
 
+int jobs_ask(struct jobs *jobs, struct event *ev, struct incoming *in, struct error *e)
+{
+	*e = (struct error){""};
+	in->refusal = e;
+	jobs_step_with(jobs, ev, in);
+	return *e->text ? -EPERM : 0;
+}
+
 static void on_wake(uv_timer_t *t)
 {
 	struct event ev = {.kind = EVENT_TICK};

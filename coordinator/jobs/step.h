@@ -17,6 +17,8 @@ struct follow_up {
 void jobs_step(struct jobs *jobs, struct event *ev);
 /* The same, for an event with more data (incoming.h). Not while an update is being carried out. */
 void jobs_step_with(struct jobs *jobs, struct event *ev, const struct incoming *in);
+/* The same, for one that the core, or the disk, may refuse: -EPERM, with its reason. in: its refusal is set here. */
+int jobs_ask(struct jobs *jobs, struct event *ev, struct incoming *in, struct error *e);
 /* Later, after the current update. Copies the text. */
 void jobs_defer(struct jobs *jobs, const struct event *ev);
 void jobs_break(struct jobs *jobs, uint64_t job, const char *text); /* the job fails */

@@ -123,7 +123,7 @@ echo '    Echo echo = 60;' | inserted proto/farm.proto ' Control control = '
 echo 'message Echo { string text = 1; }' | added proto/farm.proto
 {
 	echo '	case FARM__ENVELOPE__BODY_ECHO:'
-	echo '		client_send_done(p, m->echo->text);'
+	echo '		client_send_done(p, NULL, m->echo->text);'
 	echo '		break;'
 } | inserted coordinator/peers/client.c 'switch (m->body_case) {'
 
