@@ -321,7 +321,7 @@ void waiting_batch_free(struct waiting_batch *w)
 	mem_free(w);
 }
 
-/* ---- bundle ---- */
+/* ---- scene files ---- */
 
 void live_job_release_blobs(const Farm__Submit *m, struct blob_store *s)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A running job with its data, beside the few numbers that the core (coordinator/core) keeps of it: scene bundle,
+ * A running job with its data, beside the few numbers that the core (coordinator/core) keeps of it: scene files,
  * bootstrap, canvas, seeds, the chain states of each (group, part)'s last merged epoch, its log. The loop's thread;
  * while `busy`, a thread of the pool reads the canvas and nobody adds to it.
  */
@@ -182,7 +182,7 @@ struct waiting_batch *live_job_take_failure(struct live_job *job, uint64_t peer)
 void live_jobs_drop_waiting(struct live_job *first, uint64_t peer);
 void waiting_batch_free(struct waiting_batch *w);
 
-/* Releases the bundle's blobs. */
+/* Releases the blobs of its scene files. */
 void live_job_release_blobs(const Farm__Submit *m, struct blob_store *s);
 uint64_t live_job_asset_bytes(const Farm__Submit *m); /* total size of its files, as submitted */
 

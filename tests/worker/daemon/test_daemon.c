@@ -148,7 +148,7 @@ static void a_cache_of_others_is_not_used(void **state)
 	assert_int_equal(cache_open(&c, base, 1000, &e), -EPERM);
 }
 
-/* ---- bundle ---- */
+/* ---- job cache ---- */
 
 static void set_info(struct job_cache *b, const char *texts[], size_t count)
 {
@@ -254,7 +254,7 @@ static void files_of_an_earlier_run_are_read(void **state)
 	cache_close(&cache);
 }
 
-static void a_bundle_holds_what_it_needs(void **state)
+static void a_job_cache_holds_what_it_needs(void **state)
 {
 	(void)state;
 	struct cache cache;
@@ -318,7 +318,7 @@ int main(void)
 		cmocka_unit_test(the_crew_works),
 		cmocka_unit_test_setup_teardown(workers_share_a_cache_folder, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_cache_of_others_is_not_used, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(a_bundle_holds_what_it_needs, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(a_job_cache_holds_what_it_needs, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(files_of_an_earlier_run_are_read, folder_set_up, folder_tear_down),
 		cmocka_unit_test(the_fingerprint_is_stable),
 	};
