@@ -79,7 +79,7 @@ static const struct program program = {
 	.word = take_word,
 };
 
-static FILE *reach(const char *path, struct error *e)
+static FILE *connect_socket(const char *path, struct error *e)
 {
 	struct sockaddr_un a = {.sun_family = AF_UNIX};
 	if (strlen(path) >= sizeof a.sun_path) {
@@ -252,7 +252,7 @@ static void print_strategies(const json_t *job)
 	fputs(text, stdout);
 }
 
-static void print_agreement(const json_t *job)
+static void print_convergence(const json_t *job)
 {
 	struct convergence a;
 	struct path_class_energy classes[PATH_CLASSES];
@@ -353,7 +353,7 @@ static void print_snapshot(const json_t *snapshot, const char *only)
 			print_scene_notes(job);
 			print_effects(job);
 			print_strategies(job);
-			print_agreement(job);
+			print_convergence(job);
 			print_leases(snapshot, only);
 		}
 	}
@@ -538,7 +538,7 @@ int main(int argc, char **argv)
 	struct arguments a = {0};
 	struct error e;
 	program_options(&program, argc, argv, &a);
-	FILE *f = reach(a.socket, &e);
+	FILE *f = connect_socket(a.socket, &e);
 	if (!f) {
 		fprintf(stderr, "hslt-status: %s\n", e.text);
 		return EXIT_UNREACHABLE;

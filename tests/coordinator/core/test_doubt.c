@@ -329,7 +329,7 @@ static void one_epoch_after_the_other_is_taken_back(void **state)
 }
 
 /* Whoever refuses what others can go on from is quarantined after three times. */
-static void a_liar_is_set_aside(void **state)
+static void a_liar_is_quarantined(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
@@ -384,7 +384,7 @@ int main(void)
 		cmocka_unit_test(who_has_states_that_are_given_up_loses_them),
 		cmocka_unit_test(after_four_times_the_chains_begin_anew),
 		cmocka_unit_test(one_epoch_after_the_other_is_taken_back),
-		cmocka_unit_test(a_liar_is_set_aside),
+		cmocka_unit_test(a_liar_is_quarantined),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

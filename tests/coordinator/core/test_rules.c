@@ -75,7 +75,7 @@ static void refused(void **state)
 	});
 }
 
-static void set_aside_after_faults(void **state)
+static void quarantined_after_faults(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
@@ -327,7 +327,7 @@ int main(void)
 		cmocka_unit_test(two_rounds_open),
 		cmocka_unit_test(repeats),
 		cmocka_unit_test(refused),
-		cmocka_unit_test(set_aside_after_faults),
+		cmocka_unit_test(quarantined_after_faults),
 		cmocka_unit_test(worker_gone),
 		cmocka_unit_test(read_late),
 		cmocka_unit_test(hung_up),

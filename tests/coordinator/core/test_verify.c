@@ -191,7 +191,7 @@ static void share(void **state)
 	farm_free(f);
 }
 
-static void set_aside(void **state)
+static void quarantines(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
@@ -399,7 +399,7 @@ int main(void)
 		cmocka_unit_test(agree),	   cmocka_unit_test(third_decides),
 		cmocka_unit_test(all_differ),	   cmocka_unit_test(one_worker_twice),
 		cmocka_unit_test(leaves_between),  cmocka_unit_test(restart),
-		cmocka_unit_test(share),	   cmocka_unit_test(set_aside),
+		cmocka_unit_test(share),	   cmocka_unit_test(quarantines),
 		cmocka_unit_test(notes_of_a_liar), cmocka_unit_test(remembered),
 		cmocka_unit_test(lives),	   cmocka_unit_test(odd_one_out),
 		cmocka_unit_test(straggler),	   cmocka_unit_test(names_without_end),
