@@ -247,8 +247,7 @@ static int unknown(const struct reader *x, const char *dashes, const char *name)
 	struct spelling s = {.wanted = name};
 	const struct option_row *r;
 	for (size_t i = 0; (r = option_at(x->program, i, NULL)) != NULL; i++)
-		if (!r->hidden)
-			spelling_offer(&s, r->name);
+		spelling_offer(&s, r->name);
 	return error_set(x->e, EINVAL, "unknown option '%s%s'%s%s%s", dashes, name, s.best ? "; did you mean '--" : "",
 			 s.best ? s.best : "", s.best ? "'?" : "");
 }
@@ -261,7 +260,7 @@ static const struct option_row *find(const struct reader *x, const char *name)
 	size_t n = strlen(name), count = 0;
 	for (size_t i = 0; (r = option_at(x->program, i, NULL)) != NULL; i++) {
 		bool whole = strcmp(r->name, name) == 0;
-		if (!whole && (r->hidden || n == 0 || strncmp(r->name, name, n) != 0))
+		if (!whole && (n == 0 || strncmp(r->name, name, n) != 0))
 			continue;
 		found = r;
 		if (whole)

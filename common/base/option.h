@@ -53,7 +53,6 @@ struct option_row {
 	double least, most, unit;
 	bool above, below;	 /* the bound itself is not allowed */
 	bool needed;		 /* a text: leaving it NULL is a usage error */
-	bool hidden;		 /* an old name: not shown, cannot be abbreviated */
 	const char *standard;	 /* the default, parsed like an argument; NULL: keep what the struct holds */
 	const char *environment; /* environment variable used if the option is not given; NULL: none */
 	option_values *values;	 /* the only accepted arguments; NULL: any */

@@ -65,7 +65,6 @@ static const struct option_row rows[] = {
 	{"blobs", 0, "GB", "Of the spool", OPTION_SCALED(struct arguments, bytes, 0.001, 1e6, 1e9), .standard = "100"},
 	{"kind", 'k', "NAME", "(chosen)", OPTION_TAKE(take_kind), .values = kinds, .more = more},
 	{"wait-for", 0, NULL, "A longer name", OPTION_FLAG(struct arguments, quiet)},
-	{"sort", 0, "NAME", "An old name", OPTION_TAKE(take_kind), .values = kinds, .hidden = true},
 	{0},
 };
 
@@ -233,13 +232,6 @@ static void test_mistyped(void **state)
 	refused("list a b -o x", "one word too many");
 }
 
-static void test_hidden(void **state)
-{
-	(void)state;
-	accepted("list -o x --sort path");
-	refused("list -o x --sor path", "unknown option '--sor'");
-}
-
 static void test_checks(void **state)
 {
 	(void)state;
@@ -293,7 +285,6 @@ static void test_help(void **state)
 	has(text, "\n      --completion           Print a bash completion script\n");
 	has(text, "\nExamples:\n  hslt-test list\n");
 	has(text, "\nExit codes: 0 done, 2 usage.\n");
-	assert_null(strstr(text, "--sort"));
 }
 
 static void test_man(void **state)
@@ -307,7 +298,6 @@ static void test_man(void **state)
 	has(text, "\n.SS \"When to stop\"\n");
 	has(text, "\n.TP\n\\fBHSLT_TEST_TLS\\fR\nStands in for \\fB\\-\\-tls\\fR.\n");
 	has(text, "\n.SH EXIT STATUS\n0 done, 2 usage.\n");
-	assert_null(strstr(text, "sort"));
 }
 
 static void test_completion(void **state)
@@ -321,7 +311,6 @@ static void test_completion(void **state)
 	has(text, "-W \"--output --tls --name --wait --quiet --exposure ");
 	has(text, "-W \"list fetch\" -f -- ");
 	has(text, "\ncomplete -o filenames -F _hslt_test hslt-test\n");
-	assert_null(strstr(text, "sort"));
 }
 
 int main(void)
@@ -332,7 +321,6 @@ int main(void)
 		cmocka_unit_test(test_defaults_and_environment),
 		cmocka_unit_test(test_order_and_forms),
 		cmocka_unit_test(test_mistyped),
-		cmocka_unit_test(test_hidden),
 		cmocka_unit_test(test_checks),
 		cmocka_unit_test(test_asked),
 		cmocka_unit_test(test_help),

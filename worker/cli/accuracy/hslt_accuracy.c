@@ -45,7 +45,6 @@ static const struct option_row rows[] = {
 	 "Parameters to vary, separated by commas: settings of --set (see --set help), max-depth, independent, "
 	 "mixture, preset",
 	 OPTION_TEXT(struct arguments, accuracy)},
-	{"knobs", 0, "LIST", "The old name of --parameters", OPTION_TEXT(struct arguments, accuracy), .hidden = true},
 	{"reference", 0, "FILE", "An image (OpenEXR) to measure the bias against, instead of a careful render",
 	 OPTION_TEXT(struct arguments, reference)},
 	{"quiet", 0, NULL, "Print errors only", OPTION_FLAG(struct arguments, quiet)},
