@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The fields of a job. From this list follow struct job_record and the record in the spool (coordinator/store), struct
- * job_status, struct job_view, the JSON of the status and the message JobStatus (coordinator/job), and of the counters
- * also struct job_counts, journals, checkpoints, restart and extension. Written by hand is what has parts (estimates,
- * strategies, convergence, classes), what is made of several values (view.c, record.c), and what other interfaces
- * define: submissions, the columns of the database (ledger_job.h), the files of earlier versions.
+ * job_status, struct job_view, the JSON of the status and the message JobStatus (coordinator/live_job), and of the
+ * counters also struct job_counts, journals, checkpoints, restart and extension. Written by hand is what has parts
+ * (estimates, strategies, convergence, classes), what is made of several values (view.c, record.c), and what other
+ * interfaces define: submissions, the columns of the database (ledger_job.h), the files of earlier versions.
  *
  *   TEXT(member, bytes, in, by, key, shown, wire)
  *   NUMBER(kind, member, in, by, key, shown, wire)   kind: one of field_KIND below

@@ -14,7 +14,7 @@
 #include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "coordinator/job/incoming.h"
+#include "coordinator/live_job/incoming.h"
 #include "coordinator/jobs/durable.h"
 #include "coordinator/jobs/listing.h"
 #include "coordinator/jobs/restore.h"

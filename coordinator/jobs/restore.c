@@ -14,7 +14,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/base/version.h"
-#include "coordinator/job/incoming.h"
+#include "coordinator/live_job/incoming.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/jobs/trust.h"
 

@@ -7,7 +7,7 @@
 #ifndef COORDINATOR_JOBS_RESTORE_H
 #define COORDINATOR_JOBS_RESTORE_H
 
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 /* 0: its record exists and is valid, or is missing; an error: it cannot be read at the moment. */
 int restore_record(const struct jobs *jobs, uint64_t id, struct job_record *r, bool *there, struct error *e);

@@ -12,7 +12,7 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "coordinator/job/incoming.h"
+#include "coordinator/live_job/incoming.h"
 
 #include <assert.h>
 #include <math.h>

@@ -3,7 +3,7 @@
 #ifndef COORDINATOR_JOBS_STEP_H
 #define COORDINATOR_JOBS_STEP_H
 
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 /* Functions that carry out the core's answers. A table, because they make steps themselves (start.c). */
 struct follow_up {

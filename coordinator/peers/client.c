@@ -16,7 +16,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/plan/plan_text.h"
-#include "coordinator/job/incoming.h"
+#include "coordinator/live_job/incoming.h"
 #include "coordinator/jobs/listing.h"
 #include "coordinator/jobs/room.h"
 #include "coordinator/jobs/step.h"

@@ -2,7 +2,7 @@
 #include "coordinator/peers/control.h"
 
 #include "common/base/text.h"
-#include "coordinator/job/incoming.h"
+#include "coordinator/live_job/incoming.h"
 #include "coordinator/jobs/extend.h"
 #include "coordinator/jobs/finish.h"
 #include "coordinator/jobs/listing.h"

@@ -16,7 +16,7 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "coordinator/job/incoming.h"
+#include "coordinator/live_job/incoming.h"
 #include "coordinator/jobs/extend.h"
 #include "coordinator/jobs/recovery.h"
 #include "coordinator/jobs/results.h"

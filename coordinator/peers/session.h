@@ -7,7 +7,7 @@
 #define COORDINATOR_PEERS_SESSION_H
 
 #include "common/net/conn.h"
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 enum { SESSION_BUCKETS = 4096 };
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 #include <assert.h>
 #include <string.h>

@@ -4,8 +4,8 @@
  * bootstrap, canvas, seeds, the chain states of each (group, part)'s last merged epoch, its log. The loop's thread;
  * while `busy`, a thread of the pool reads the canvas and nobody adds to it.
  */
-#ifndef COORDINATOR_JOB_LIVE_JOB_H
-#define COORDINATOR_JOB_LIVE_JOB_H
+#ifndef COORDINATOR_LIVE_JOB_LIVE_JOB_H
+#define COORDINATOR_LIVE_JOB_LIVE_JOB_H
 
 #include "common/base/log.h"
 #include "common/blob/blob.h"
@@ -13,7 +13,7 @@
 #include "common/estimate/convergence.h"
 #include "common/estimate/merge.h"
 #include "common/wire/batch_wire.h"
-#include "coordinator/job/view.h"
+#include "coordinator/live_job/view.h"
 #include "coordinator/store/journal.h"
 #include "coordinator/store/spool.h"
 

@@ -4,8 +4,8 @@
  * out the core's answer. Fields that do not belong to the event's kind are NULL. The caller keeps everything until
  * jobs_step_with returns.
  */
-#ifndef COORDINATOR_JOB_INCOMING_H
-#define COORDINATOR_JOB_INCOMING_H
+#ifndef COORDINATOR_LIVE_JOB_INCOMING_H
+#define COORDINATOR_LIVE_JOB_INCOMING_H
 
 #include "common/base/buf.h"
 #include "common/base/error.h"

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* The configuration of the coordinator, which coordinator/main.c reads from the command line. */
-#ifndef COORDINATOR_JOB_CONFIG_H
-#define COORDINATOR_JOB_CONFIG_H
+#ifndef COORDINATOR_LIVE_JOB_CONFIG_H
+#define COORDINATOR_LIVE_JOB_CONFIG_H
 
-#include "coordinator/job/quota.h"
+#include "coordinator/live_job/quota.h"
 
 #include <stdbool.h>
 

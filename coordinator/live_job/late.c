@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "coordinator/job/late.h"
+#include "coordinator/live_job/late.h"
 
 #include "common/base/list.h"
 

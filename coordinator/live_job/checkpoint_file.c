@@ -5,7 +5,7 @@
  *
  * A damaged file is -EBADMSG, one of another version -EPROTO. Sizes are checked before anything is allocated.
  */
-#include "coordinator/job/checkpoint_file.h"
+#include "coordinator/live_job/checkpoint_file.h"
 
 #include "common/base/disk.h"
 #include "common/base/mem.h"

@@ -5,10 +5,10 @@
  * result is skipped, and those that depend on it wait in the journal until it has been computed again (late.h): the
  * image is the same.
  */
-#ifndef COORDINATOR_JOB_REPLAY_H
-#define COORDINATOR_JOB_REPLAY_H
+#ifndef COORDINATOR_LIVE_JOB_REPLAY_H
+#define COORDINATOR_LIVE_JOB_REPLAY_H
 
-#include "coordinator/job/live_job.h"
+#include "coordinator/live_job/live_job.h"
 
 #include <stdatomic.h>
 

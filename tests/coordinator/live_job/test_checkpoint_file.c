@@ -2,11 +2,11 @@
 /* The file of a checkpoint has the same bytes from build to build, whatever the machine; of version 004 it is read;
  * bytes that are no checkpoint are refused, though their checksum fits, and nothing is allocated for what they claim.
  */
-#include "coordinator/job/checkpoint_file.h"
+#include "coordinator/live_job/checkpoint_file.h"
 
 #include "common/base/bytes.h"
 #include "common/base/mem.h"
-#include "coordinator/job/stored.h"
+#include "coordinator/live_job/stored.h"
 #include "common/wire/envelope.h"
 #include "tests/support/canvas_batches.h"
 #include "tests/support/folder.h"

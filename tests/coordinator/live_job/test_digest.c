@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* What decides bits is in the digest of a batch, and the time that it took is not. */
-#include "coordinator/job/digest.h"
+#include "coordinator/live_job/digest.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* A job as JSON: the counters of its strategies, and what is to be said about it. */
-#include "coordinator/job/view.h"
+#include "coordinator/live_job/view.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -4,10 +4,10 @@
  * journal and count as soon as that one has been computed again, so nothing is computed twice. The loop's thread;
  * replay.h uses it on a live job that nobody else has.
  */
-#ifndef COORDINATOR_JOB_LATE_H
-#define COORDINATOR_JOB_LATE_H
+#ifndef COORDINATOR_LIVE_JOB_LATE_H
+#define COORDINATOR_LIVE_JOB_LATE_H
 
-#include "coordinator/job/live_job.h"
+#include "coordinator/live_job/live_job.h"
 
 int late_add(struct live_job *job, const struct lease_key *k, uint64_t at, struct error *e); /* -ENOMEM */
 /* Drops those of that (group, part) from this epoch on. */

@@ -3,8 +3,8 @@
  * Limits on what one owner may use. The owner is the name in a client's certificate or, without TLS, all clients
  * together; operators are exempt. Checked when a job is submitted, before its files are sent; pure.
  */
-#ifndef COORDINATOR_JOB_QUOTA_H
-#define COORDINATOR_JOB_QUOTA_H
+#ifndef COORDINATOR_LIVE_JOB_QUOTA_H
+#define COORDINATOR_LIVE_JOB_QUOTA_H
 
 #include "common/base/error.h"
 #include "common/plan/plan.h"

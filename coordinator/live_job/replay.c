@@ -10,14 +10,14 @@
  * is -EBADMSG; an undamaged record that makes no sense was written by another version: -EPROTO. The job must then be
  * dropped. A stop requested by another thread is -ECANCELED.
  */
-#include "coordinator/job/replay.h"
+#include "coordinator/live_job/replay.h"
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "coordinator/job/rollback.h"
-#include "coordinator/job/checkpoint_file.h"
-#include "coordinator/job/late.h"
-#include "coordinator/job/stored.h"
+#include "coordinator/live_job/rollback.h"
+#include "coordinator/live_job/checkpoint_file.h"
+#include "coordinator/live_job/late.h"
+#include "coordinator/live_job/stored.h"
 #include "coordinator/store/journal_file.h"
 
 #include <string.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* What is stored of a job comes back; what another version wrote is refused; what earlier ones wrote is read. */
-#include "coordinator/job/stored.h"
+#include "coordinator/live_job/stored.h"
 
 #include "common/base/bytes.h"
 #include "tests/support/failing_memory.h"
@@ -206,5 +206,5 @@ int main(void)
 		cmocka_unit_test(heads_come_back),    cmocka_unit_test(old_notes_are_read),
 		cmocka_unit_test(old_heads_are_read),
 	};
-	return cmocka_run_group_tests_name("coordinator/job/test_stored", tests, NULL, NULL);
+	return cmocka_run_group_tests_name("coordinator/live_job/test_stored", tests, NULL, NULL);
 }

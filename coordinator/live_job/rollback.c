@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "coordinator/job/rollback.h"
+#include "coordinator/live_job/rollback.h"
 
 #include "common/base/list.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "coordinator/job/late.h"
+#include "coordinator/live_job/late.h"
 
 #include <assert.h>
 #include <string.h>

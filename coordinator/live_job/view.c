@@ -6,7 +6,7 @@
  * without the numbers of others' (view_hide_others). Unknown numbers are null in JSON and negative in messages.
  * Messages borrow the view's texts and must be sent while it exists. JSON is NULL if memory is out.
  */
-#include "coordinator/job/view.h"
+#include "coordinator/live_job/view.h"
 
 #include "common/base/text.h"
 #include "common/json/estimate_json.h"

@@ -3,8 +3,8 @@
  * A job as it is displayed: on the wire (JobStatus), on the status socket (JSON), in the spool (its record). Pure
  * except for memory; the loop's thread.
  */
-#ifndef COORDINATOR_JOB_VIEW_H
-#define COORDINATOR_JOB_VIEW_H
+#ifndef COORDINATOR_LIVE_JOB_VIEW_H
+#define COORDINATOR_LIVE_JOB_VIEW_H
 
 #include "common/wire/envelope.h"
 #include "coordinator/core/farm.h"

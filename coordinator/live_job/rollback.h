@@ -8,10 +8,10 @@
  * (group, part) as far as they fit (JOURNAL_KEPT). If one is missing, nothing can be taken back. Nothing is kept for
  * samples. The loop's thread, or any thread that owns the live job. Memory: 24 bytes per batch of the journal.
  */
-#ifndef COORDINATOR_JOB_ROLLBACK_H
-#define COORDINATOR_JOB_ROLLBACK_H
+#ifndef COORDINATOR_LIVE_JOB_ROLLBACK_H
+#define COORDINATOR_LIVE_JOB_ROLLBACK_H
 
-#include "coordinator/job/live_job.h"
+#include "coordinator/live_job/live_job.h"
 
 /* A merged batch, and the states before it (NULL: it started from seeds). */
 struct rollback {

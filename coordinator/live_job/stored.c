@@ -10,7 +10,7 @@
  *
  * The last part reads what version 004 wrote.
  */
-#include "coordinator/job/stored.h"
+#include "coordinator/live_job/stored.h"
 
 #include "common/base/bytes.h"
 #include "common/base/text.h"

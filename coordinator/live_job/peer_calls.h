@@ -3,8 +3,8 @@
  * What the jobs need from the connections: a table of functions, filled in by peers.h. Jobs know peers by number only.
  * Calls for a peer that is gone do nothing; nothing here fails. The loop's thread.
  */
-#ifndef COORDINATOR_JOB_PEER_CALLS_H
-#define COORDINATOR_JOB_PEER_CALLS_H
+#ifndef COORDINATOR_LIVE_JOB_PEER_CALLS_H
+#define COORDINATOR_LIVE_JOB_PEER_CALLS_H
 
 #include "common/blob/blob.h"
 #include "coordinator/core/farm.h"

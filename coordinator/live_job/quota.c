@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "coordinator/job/quota.h"
+#include "coordinator/live_job/quota.h"
 
 #include "common/film/canvas.h"
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "coordinator/job/digest.h"
+#include "coordinator/live_job/digest.h"
 
 #include "common/base/mem.h"
 #include "common/blob/blob.h"

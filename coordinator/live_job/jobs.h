@@ -4,15 +4,15 @@
  * the folders that work on them share. Connections are reached only through a table of functions (peer_calls.h). The
  * loop's thread, except for what a job's own header gives to the thread pool.
  */
-#ifndef COORDINATOR_JOB_JOBS_H
-#define COORDINATOR_JOB_JOBS_H
+#ifndef COORDINATOR_LIVE_JOB_JOBS_H
+#define COORDINATOR_LIVE_JOB_JOBS_H
 
 #include "common/blob/blob.h"
 #include "coordinator/core/farm.h"
-#include "coordinator/job/config.h"
-#include "coordinator/job/live_job.h"
-#include "coordinator/job/peer_calls.h"
-#include "coordinator/job/replay.h"
+#include "coordinator/live_job/config.h"
+#include "coordinator/live_job/live_job.h"
+#include "coordinator/live_job/peer_calls.h"
+#include "coordinator/live_job/replay.h"
 #include "coordinator/store/ledger.h"
 #include "coordinator/store/age_clock.h"
 #include "coordinator/store/spool.h"

@@ -2,7 +2,7 @@
 /* Quotas at their edges: what is exactly allowed passes, one more does not, and what overflows is more than anything.
  */
 #include "common/film/canvas.h"
-#include "coordinator/job/quota.h"
+#include "coordinator/live_job/quota.h"
 
 #include <stdarg.h>
 #include <stddef.h>

@@ -9,7 +9,7 @@
  * live_job_merge fails with -ENOMEM half way, after which the films must not be used, or with -ERANGE if a sum leaves
  * the grid. Errors of the log are ignored: no job fails because of it.
  */
-#include "coordinator/job/live_job.h"
+#include "coordinator/live_job/live_job.h"
 
 #include "common/base/clock.h"
 #include "common/base/disk.h"

@@ -3,13 +3,13 @@
  * Stored data of a job other than results, as messages of proto/stored.proto, and as earlier versions stored it. Any
  * thread.
  */
-#ifndef COORDINATOR_JOB_STORED_H
-#define COORDINATOR_JOB_STORED_H
+#ifndef COORDINATOR_LIVE_JOB_STORED_H
+#define COORDINATOR_LIVE_JOB_STORED_H
 
 #include "common/base/error.h"
 #include "common/estimate/forecast.h"
 #include "coordinator/core/job_fields.h"
-#include "coordinator/job/live_job.h"
+#include "coordinator/live_job/live_job.h"
 
 /* What a checkpoint contains besides seeds, chain states and films. */
 struct checkpoint_head {

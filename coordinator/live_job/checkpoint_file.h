@@ -13,11 +13,11 @@
  *
  * Any thread, while nobody changes the job.
  */
-#ifndef COORDINATOR_JOB_CHECKPOINT_FILE_H
-#define COORDINATOR_JOB_CHECKPOINT_FILE_H
+#ifndef COORDINATOR_LIVE_JOB_CHECKPOINT_FILE_H
+#define COORDINATOR_LIVE_JOB_CHECKPOINT_FILE_H
 
 #include "common/base/checked_file.h"
-#include "coordinator/job/stored.h"
+#include "coordinator/live_job/stored.h"
 
 /* Writes the job's current state, to be followed by the next journal. */
 void checkpoint_head_of(struct checkpoint_head *h, const struct live_job *job, const struct job_status *status);
