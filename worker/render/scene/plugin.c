@@ -107,7 +107,6 @@ static const struct {
 	{PLUGIN_SHAPE, "packed"},
 	{PLUGIN_BSDF, "acousticbsdf"},
 	{PLUGIN_BSDF, "dielectric_disp"},
-	{PLUGIN_BSDF, "hk"},
 	{PLUGIN_BSDF, "irawan"},
 	{PLUGIN_BSDF, "neuralbsdf"},
 	{PLUGIN_BSDF, "openpbr"},
