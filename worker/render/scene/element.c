@@ -65,20 +65,11 @@ static bool is_listed(const char *list, const char *wanted, struct spelling *s)
 	return false;
 }
 
-/* spelling_offer keeps the pointer: the names of attributes must outlive the search, those in a list do not. */
 static int refuse_attribute(const struct xml_element *el, const char *known, const char *wanted, struct error *e)
 {
-	char name[64], best[64] = "", hint[128];
+	char hint[128];
 	struct spelling s = {.wanted = wanted};
-	for (const char *list = known; (list = element_next_name(list, name, sizeof name));) {
-		const char *before = s.best;
-		size_t distance = s.distance;
-		spelling_offer(&s, name);
-		if (s.best && (s.best != before || s.distance != distance)) {
-			memcpy(best, name, sizeof best);
-			s.best = best;
-		}
-	}
+	is_listed(known, wanted, &s);
 	return xml_error(el, e, EINVAL, "has no attribute `%.64s`%s (it may have: %s)", wanted,
 			 spelling_hint(&s, hint, sizeof hint), known);
 }
