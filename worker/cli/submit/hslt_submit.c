@@ -9,6 +9,7 @@
  */
 #include "common/base/crash.h"
 #include "common/base/program.h"
+#include "common/base/target.h"
 #include "common/base/text.h"
 #include "worker/cli/base/interrupt.h"
 #include "worker/cli/render/choice.h"
@@ -39,7 +40,7 @@ struct arguments {
 
 static bool to_stdout(const struct arguments *a)
 {
-	return a->render.output && strcmp(a->render.output, "/dev/stdout") == 0;
+	return a->render.output && strcmp(a->render.output, TARGET_STDOUT) == 0;
 }
 
 static int take_priority(void *target, char *arg, struct error *e)
@@ -132,7 +133,7 @@ static void print_id(const struct arguments *a, uint64_t job, const char *plan, 
 	snprintf(id, sizeof id, "j%llu", (unsigned long long)job);
 	if (a->json) {
 		json_t *o = json_pack("{s:i s:s s:s s:s s:s s:s}", "schema", 1, "id", id, "name", a->request.name,
-				      "output", a->render.output, "plan", plan, "state", state);
+				      "output", target_arg(a->render.output), "plan", plan, "state", state);
 		json_dumpf(o, stdout, JSON_COMPACT);
 		putchar('\n');
 		json_decref(o);
@@ -151,8 +152,7 @@ static void say_at_the_end(const struct arguments *a, uint64_t job)
 	static char text[512];
 	unsigned long long id = job;
 	char fetch[256], cancel[64];
-	int width = snprintf(fetch, sizeof fetch, "hslt-job fetch j%llu -o %.200s", id,
-			     to_stdout(a) ? "-" : a->render.output);
+	int width = snprintf(fetch, sizeof fetch, "hslt-job fetch j%llu -o %.200s", id, target_arg(a->render.output));
 	snprintf(cancel, sizeof cancel, "hslt-job cancel j%llu", id);
 	snprintf(
 		text, sizeof text,
@@ -291,7 +291,7 @@ int main(int argc, char **argv)
 	char note[512], name[NAME_MOST + 1];
 	for (size_t i = 0; render_scene_note(&files.summary, i, note, sizeof note); i++)
 		place_print(stderr, "hslt-submit: note: ", a.render.scene, note);
-	a.request.output = a.estimate ? "" : last_part(a.render.output);
+	a.request.output = a.estimate || to_stdout(&a) ? "" : last_part(a.render.output);
 	a.request.name = a.name ? a.name : name_of_file(files.scene, name);
 	if ((rc = knock(&a, &e))) {
 		fprintf(stderr, "hslt-submit: %s\n", e.text);
