@@ -72,7 +72,9 @@ for p in render submit; do
 	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" -i hsl
 	grep -q 'did you mean `hslt`' "$DIR/err.log" || fail "hslt-$p -i hsl says: $(cat "$DIR/err.log")"
 	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --target-error 5
-	grep -q "500 %.*5%" "$DIR/err.log" || fail "hslt-$p --target-error 5 says: $(cat "$DIR/err.log")"
+	grep -q "500 %.*did you mean 5%?" "$DIR/err.log" || fail "hslt-$p --target-error 5 says: $(cat "$DIR/err.log")"
+	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --target-error 150%
+	grep -q "150 %.*did you mean 1.5%?" "$DIR/err.log" || fail "hslt-$p --target-error 150% says: $(cat "$DIR/err.log")"
 	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --mutations independent --integrator pssmlt --mutations 1000
 	grep -q "pssmlt has no strategies" "$DIR/err.log" || fail "hslt-$p says: $(cat "$DIR/err.log")"
 	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --integrator path --mutations hslt=0.9,independent=0.1
@@ -96,10 +98,14 @@ for p in render submit; do
 	grep -q -- '--chains 10: the integrator path has no chains' "$DIR/err.log" || fail "hslt-$p: $(cat "$DIR/err.log")"
 	code 2 "$BIN/hslt-$p" "$BOX" -o ''
 	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --size wide
-	grep -q -- '--size takes W or WxH, such as 640x360' "$DIR/err.log" || fail "hslt-$p --size wide: $(cat "$DIR/err.log")"
+	grep -q -- '--size takes W or WxH, such as 640x360 or 1.5k' "$DIR/err.log" || fail "hslt-$p --size wide: $(cat "$DIR/err.log")"
 	code 0 "$BIN/hslt-$p" --set help
 	grep -q "^tolerance=0.001 " "$DIR/out" || fail "hslt-$p --set help says: $(cat "$DIR/out")"
 done
+code 2 "$BIN/hslt-job" extend j1 --target-error 150%
+grep -q "150 %.*did you mean 1.5%?" "$DIR/err.log" || fail "hslt-job extend --target-error 150% says: $(cat "$DIR/err.log")"
+code 2 "$BIN/hslt-accuracy" "$BOX" -o "$DIR/a.html" --target-error 150%
+grep -q "150 %.*did you mean 1.5%?" "$DIR/err.log" || fail "hslt-accuracy --target-error 150% says: $(cat "$DIR/err.log")"
 code 1 "$BIN/hslt-job" fetch j1
 grep -q '^hslt-job: j1: no such job$' "$DIR/err.log" || fail "hslt-job fetch j1 says: $(cat "$DIR/err.log")"
 code 1 "$BIN/hslt-status" j99
@@ -135,7 +141,7 @@ wait $waiter || got=$?
 
 code 0 "$BIN/hslt-render" "$BOX" -o "$DIR/only.exr" --size 16x16 --target-error 100% # the pilot chooses, too
 code 4 "$BIN/hslt-submit" "$BOX" -o "$DIR/bound.exr" --integrator path --spp 16 --target-error 0.01% --wait
-code 0 "$BIN/hslt-submit" "$BOX" -o "$DIR/reached.exr" --integrator path --spp 64 --target-error 500% --wait --json
+code 0 "$BIN/hslt-submit" "$BOX" -o "$DIR/reached.exr" --integrator path --spp 64 --target-error 100% --wait --json
 grep -q '"id":"j4".*"state":"done"' "$DIR/out" || fail "--json: $(cat "$DIR/out")"
 [ -s "$DIR/reached.exr" ] || fail "no image"
 

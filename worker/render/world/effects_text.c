@@ -51,7 +51,10 @@ static int parse_item(const char *item, size_t length, struct effects_choice *ou
 		struct spelling s = {.wanted = wanted};
 		for (int i = 0; i < EFFECTS; i++)
 			spelling_offer(&s, effect_table[i].name);
-		if (s.best)
+		spelling_offer(&s, "all");
+		if (s.best && strcmp(s.best, "all") == 0)
+			spelling_hint(&s, hint, sizeof hint);
+		else if (s.best)
 			snprintf(hint, sizeof hint, "; did you mean `+%s` or `-%s`?", s.best, s.best);
 		return error_set(e, EINVAL, "takes 'all', or +NAME and -NAME separated by commas, not '%s'%s", wanted,
 				 hint);
