@@ -201,6 +201,8 @@ int build_read_shapes(struct builder *b)
 		return build_out_of_memory(b->e);
 	b->all = box_empty();
 	struct counted counted = {0};
+	for (uint32_t i = 0; i < listed; i++) /* those of one instance follow each other */
+		b->w->instance_count += list[i].instance && (i == 0 || list[i].instance != list[i - 1].instance);
 	for (uint32_t i = 0; i < listed && !rc; i++)
 		if ((rc = read_listed(b, &list[i], meshes, &counted)))
 			rc = build_go_on(b, rc);

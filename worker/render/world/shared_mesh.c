@@ -130,7 +130,7 @@ int shared_mesh_place(struct builder *b, struct shared_mesh *m, const struct sce
 	if (rc)
 		return build_out_of_memory(b->e);
 	p->first = m->first;
-	w->instance_count++;
+	w->sharing_count++;
 	if (p->mirrored && !turn_triangles(m, &w->arena))
 		return build_out_of_memory(b->e);
 	struct geom_shape *g = &w->shapes[id];

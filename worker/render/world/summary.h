@@ -54,13 +54,14 @@ struct render_summary {
 	struct effect_line lines[RENDER_EFFECTS_MAX];
 	size_t line_count;
 	uint64_t shapes, triangles; /* instances, with everything they show */
-	uint64_t instances, shared_meshes,
-		stored_triangles; /* shapes that share meshes; number of these meshes; their memory */
-	uint64_t segments;	  /* round cones of curves */
-	uint64_t memory;	  /* bytes of the world, approximately; Embree's part is estimated per triangle */
-	double brightest;	  /* see world_brightest */
-	bool beams;		  /* see world_has_beam */
-	bool rolls;		  /* see world_rolls */
+	uint64_t instances;	    /* objects of the scene that show a group of shapes somewhere */
+	uint64_t sharing, shared_meshes, stored_triangles; /* shapes that share meshes, as those of large groups do;
+							      number of these meshes; memory */
+	uint64_t segments;				   /* round cones of curves */
+	uint64_t memory;  /* bytes of the world, approximately; Embree's part is estimated per triangle */
+	double brightest; /* see world_brightest */
+	bool beams;	  /* see world_has_beam */
+	bool rolls;	  /* see world_rolls */
 	struct render_coincident coincident;
 	struct world_notes notes;
 };
