@@ -140,7 +140,7 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 {
 	const char *here = el->snake ? plugin_new_name(d->decl, name) : name;
 	const struct param *found = plugin_param(d->decl, d->stands_in ? lenient_param(d->decl->type, here) : here);
-	const char *written = element_spelling(el, name), *no_effect = "has no effect on light and is ignored";
+	const char *written = element_spelling(el, name);
 	int r = 0;
 	*p = NULL;
 	if (d->decl->status == PARAM_IGNORED) {
@@ -151,7 +151,7 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 		r = note_old_name(&m->notes, owner, el, found->name);
 	/* All BSDFs of 0.6 have it; those whose reflectances can add up to more than 1 have it in their tables. */
 	if (!found && el->snake && d->node->cls == PLUGIN_BSDF && strcmp(name, "ensure_energy_conservation") == 0)
-		return note_parameter(&m->notes, owner, el, written, no_effect);
+		return note_no_effect(&m->notes, owner, el, written);
 	if (!found && is_foreign_parameter(m, d, el, name))
 		return note_parameter(&m->notes, owner, el, written, "is not known and is ignored");
 	if (found && d->stands_in && lenient_says_again(d->decl->type, found->name, owner))
@@ -162,7 +162,7 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 	if (!found || found->status == PARAM_REFUSED)
 		return refuse_property(d->decl, d->node->type, el, name, found, m->error);
 	if (found->status == PARAM_IGNORED)
-		return note_parameter(&m->notes, owner, el, written, no_effect);
+		return note_no_effect(&m->notes, owner, el, written);
 	if ((found->types & VALUE_OF_3) && !m->tree->dialect_3)
 		return note_parameter(&m->notes, owner, el, written,
 				      "is not a parameter of Mitsuba 0.6 and is ignored, as there");

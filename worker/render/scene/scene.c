@@ -221,7 +221,7 @@ static int read_all(struct scene *s, const struct asset_source *assets, const ch
 			    .decls = decls,
 			    .error = m->error,
 			    .lenient = lenient};
-	m->notes = (struct notes){&m->report, m->error};
+	m->notes = (struct notes){.report = &m->report, .error = m->error};
 	m->tree = arena_alloc(m->arena, 1, sizeof *m->tree);
 	s->file = arena_strdup(&s->arena, name);
 	int r = m->tree && s->file ? report_init(&m->report, &s->arena, m->error) : maker_out_of_memory(m);
