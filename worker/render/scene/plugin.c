@@ -74,16 +74,29 @@ bool plugin_any_has(const struct plugin_decl *decls, const char *name)
 	return false;
 }
 
+static const struct {
+	enum plugin_class cls;
+	const char *type, *old, *now;
+} names[] = {
+	{PLUGIN_BSDF, "diffuse", "diffuse_reflectance", "reflectance"},
+	{PLUGIN_BSDF, "roughdiffuse", "diffuse_reflectance", "reflectance"},
+	{PLUGIN_MEDIUM, "heterogeneous", "density", "sigma_t"},
+};
+
+bool plugin_new_name_at(size_t i, struct renamed *out)
+{
+	if (i >= sizeof names / sizeof *names)
+		return false;
+	*out = (struct renamed){.element = class_names[names[i].cls],
+				.type = names[i].type,
+				.old = names[i].old,
+				.now = names[i].now,
+				.parameter = true};
+	return true;
+}
+
 const char *plugin_new_name(const struct plugin_decl *d, const char *name)
 {
-	static const struct {
-		enum plugin_class cls;
-		const char *type, *old, *now;
-	} names[] = {
-		{PLUGIN_BSDF, "diffuse", "diffuse_reflectance", "reflectance"},
-		{PLUGIN_BSDF, "roughdiffuse", "diffuse_reflectance", "reflectance"},
-		{PLUGIN_MEDIUM, "heterogeneous", "density", "sigma_t"},
-	};
 	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
 		if (names[i].cls == d->cls && strcmp(names[i].type, d->type) == 0 && strcmp(names[i].old, name) == 0)
 			return names[i].now;
@@ -127,6 +140,14 @@ static const struct {
 	{PLUGIN_SENSOR, "irradiancemeter"},
 	{PLUGIN_SENSOR, "microphone"},
 	{PLUGIN_SENSOR, "radiancemeter"},
+	{PLUGIN_SAMPLER, "halton"},
+	{PLUGIN_SAMPLER, "hammersley"},
+	{PLUGIN_SAMPLER, "independent"},
+	{PLUGIN_SAMPLER, "ldsampler"},
+	{PLUGIN_SAMPLER, "multijitter"},
+	{PLUGIN_SAMPLER, "orthogonal"},
+	{PLUGIN_SAMPLER, "sobol"},
+	{PLUGIN_SAMPLER, "stratified"},
 	{PLUGIN_FILM, "specfilm"},
 	{PLUGIN_FILM, "tape"},
 	{PLUGIN_MEDIUM, "heterogeneous"},

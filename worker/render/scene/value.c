@@ -142,6 +142,16 @@ void value_offer_elements(struct spelling *s)
 			spelling_offer(s, kinds[i].element);
 }
 
+const char *value_element_at(size_t i, const char **attributes)
+{
+	for (size_t k = 0; k < KINDS; k++)
+		if (kinds[k].type && i-- == 0) {
+			*attributes = kinds[k].attributes;
+			return kinds[k].element;
+		}
+	return NULL;
+}
+
 int value_read(const struct xml_element *el, const struct asset_source *assets, struct arena *arena, struct value *out,
 	       struct error *e)
 {
