@@ -148,7 +148,7 @@ static int check_name(const struct output_file *f, struct error *e)
 	const char *promised = picture_name_format(f->path), *own = f->format == OUTPUT_EXR   ? ".exr"
 								    : f->format == OUTPUT_PNG ? ".png"
 											      : NULL;
-	if (!promised || !own || strcmp(promised, own) == 0)
+	if (!promised || (own && strcmp(promised, own) == 0))
 		return 0;
 	return error_set(e, EINVAL, "%s %s: %s is written, which the name does not say%s", f->option, f->path,
 			 formats[f->format].noun, f->format == OUTPUT_EXR ? "; hslt-tonemap converts one to PNG" : "");

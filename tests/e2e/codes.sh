@@ -126,6 +126,7 @@ id=$(submit "$BOX" -o "$DIR/cancelled.exr" --integrator path --spp 1000000)
 start_worker w1
 until_true 10 is_state "$id" running || fail "$id does not run"
 code 0 "$BIN/hslt-job" cancel "$id"
+grep -qx "$id is cancelled" "$DIR/out" || fail "hslt-job cancel says: $(cat "$DIR/out")"
 until_true 5 is_state "$id" cancelled || fail "$id is not cancelled"
 code 1 "$BIN/hslt-job" fetch "$id"
 
@@ -150,6 +151,7 @@ stop $COORDINATOR_PID
 LISTEN=$COORDINATOR
 start_coordinator
 code 0 "$BIN/hslt-job" fetch j4 -o "$DIR/again.exr"
+grep -qx "j4: image in $DIR/again.exr" "$DIR/err.log" || fail "hslt-job fetch says: $(cat "$DIR/err.log")"
 cmp "$DIR/reached.exr" "$DIR/again.exr" || fail "another result after a restart"
 code 0 "$BIN/hslt-job" log j4
 untold 1 "$BIN/hslt-job" log j4
@@ -159,6 +161,8 @@ untold 1 "$BIN/hslt-status"
 untold 1 "$BIN/hslt-status" --json
 untold 1 "$BIN/hslt-status" --watch
 grep -q event=job_done "$DIR/out" || fail "the log has no end"
+code 0 "$BIN/hslt-job" extend j4 --spp +8
+grep -q "^j4 continues after [0-9]* rounds*, until [0-9]* are done" "$DIR/out" || fail "hslt-job extend says: $(cat "$DIR/out")"
 id=$(submit "$BOX" -o "$DIR/next.exr" --integrator path --spp 4 -D light=3)
 [ "$id" = j5 ] || fail "the next job is $id"
 until_true 20 is_state j5 done || fail "the worker did not come back: j5 is $(value j5 state)"

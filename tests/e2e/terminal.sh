@@ -96,6 +96,9 @@ grep -q "$ESCAPE\[" "$DIR/colors" || fail "no colours: $(cat -v "$DIR/colors")"
 NO_COLOR=1 TERM=xterm on_terminal "$DIR/none" "$BIN/hslt-status" --socket "$DIR/status" || fail "$(cat "$DIR/none")"
 ! grep -q "$ESCAPE" "$DIR/none" || fail "colours with NO_COLOR: $(cat -v "$DIR/none")"
 
+TERM=dumb on_terminal "$DIR/none" "$BIN/hslt-status" --socket "$DIR/status" || fail "$(cat "$DIR/none")"
+! grep -q "$ESCAPE" "$DIR/none" || fail "a dumb terminal gets colours: $(cat -v "$DIR/none")"
+
 "$BIN/hslt-ca" list --ca "$DIR/nothing" 2>"$DIR/ca.log" && fail "an authority that is not there has a list"
 grep -q "hslt-ca init" "$DIR/ca.log" || fail "it does not say how to make one: $(cat "$DIR/ca.log")"
 stop $COORDINATOR_PID

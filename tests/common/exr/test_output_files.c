@@ -93,7 +93,7 @@ static void test_two_outputs(void **state)
 	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
 		refuses(&(struct output_files){{{"-o", "new.exr", OUTPUT_EXR}, {"--stats", names[i], OUTPUT_JSON}}},
 			NULL, "-o and --stats are the same file");
-	accepts(&(struct output_files){{{"-o", "new.exr", OUTPUT_EXR}, {"--stats", "a/new.exr", OUTPUT_JSON}}}, NULL);
+	accepts(&(struct output_files){{{"-o", "new.exr", OUTPUT_EXR}, {"--stats", "a/new.json", OUTPUT_JSON}}}, NULL);
 	accepts(&(struct output_files){{{"-o", "/dev/null", OUTPUT_EXR}, {"--stats", "/dev/null", OUTPUT_JSON}}}, NULL);
 	assert_int_equal(access("new.exr", F_OK), -1); /* nothing is left behind */
 }
@@ -141,6 +141,10 @@ static void test_formats(void **state)
 	for (size_t i = 0; i < sizeof plots / sizeof *plots; i++)
 		refuses(&(struct output_files){{{"--plot", plots[i][0], output_format_of_plot(plots[i][0])}}}, NULL,
 			plots[i][1]);
+	refuses(&(struct output_files){{{"-o", "report.PNG", OUTPUT_HTML}}}, NULL,
+		"-o report.PNG: an HTML file is written, which the name does not say");
+	refuses(&(struct output_files){{{"--stats", "room.exr", OUTPUT_JSON}}}, NULL,
+		"a file of statistics is written, which the name does not say");
 	refuses(&(struct output_files){{{"-o", "/dev/stdout", OUTPUT_EXR}, {"--stats", "/dev/stdout", OUTPUT_JSON}}},
 		NULL, "are the same file, stdout");
 }
