@@ -34,6 +34,10 @@ grep -q "^$DIR/bad.xml: 6 problems" "$DIR/out" || fail "it does not sum up: $(ta
 code 1 "$BIN/hslt-render" "$DIR/bad.xml" -o "$DIR/bad.exr"
 grep -q "bad.xml:3.*and 5 more: hslt-scene check lists them" "$DIR/err.log" || fail "a render says: $(cat "$DIR/err.log")"
 
+sed 's|<integer name="rr_depth" value="5"/>|<boolean name="hide_emitters" value="ture"/>|' "$DIR/bad.xml" >"$DIR/ture.xml"
+code 1 "$BIN/hslt-scene" check "$DIR/ture.xml"
+grep -q '`ture` is neither true nor false; did you mean `true`?' "$DIR/out" || fail "of ture it says: $(cat "$DIR/out")"
+
 # Instances are those of the file, also where copies of their meshes are faster; an instance of two shapes is one.
 cat >"$DIR/small.xml" <<'XML'
 <scene version="3.0.0"><sensor type="perspective"/><emitter type="constant"/>

@@ -28,8 +28,14 @@ static int read_bool(const struct xml_element *el, struct value *out, struct err
 	if (r)
 		return r;
 	out->as.boolean = strcasecmp(text, "true") == 0; /* Python's exporters write True */
-	if (!out->as.boolean && strcasecmp(text, "false") != 0)
-		return xml_error(el, e, EINVAL, "`%.64s` is neither true nor false", text);
+	if (!out->as.boolean && strcasecmp(text, "false") != 0) {
+		struct spelling s = {.wanted = text};
+		char hint[32];
+		spelling_offer(&s, "true");
+		spelling_offer(&s, "false");
+		return xml_error(el, e, EINVAL, "`%.64s` is neither true nor false%s", text,
+				 spelling_hint(&s, hint, sizeof hint));
+	}
 	return 0;
 }
 
