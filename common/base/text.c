@@ -1,4 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * UTF-8 by its table of sequences (Unicode, section 3.9), numbers with units by strtod and a letter, and printing that
+ * never cuts within a character. Nothing allocates.
+ *
+ * What is malformed is false; what does not fit is cut.
+ */
 #include "common/base/text.h"
 
 #include <errno.h>

@@ -1,4 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Each output is resolved through links to a device and inode, or to a path without links; compared with the inputs and
+ * the other outputs; its name with the format; and what is there already, by its first bytes. Last, whether a file can
+ * be made there.
+ *
+ * The first of these that is wrong is the error, and nothing has been written by then.
+ */
 #include "common/exr/output_files.h"
 
 #include "common/base/picture_name.h"

@@ -1,4 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Quarantined workers are a note in the ledger, which is told to the core at the start and written again whenever the
+ * core finds one; wrong results are counted, named in the job's note and logged.
+ *
+ * A note that cannot be read is put by, and a list that cannot be written is logged: the farm stops for neither.
+ */
 #include "coordinator/jobs/trust.h"
 
 #include "common/base/list.h"

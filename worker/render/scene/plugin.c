@@ -1,4 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Look-ups in the tables of plug-ins, and two tables of its own: the names that parameters had in 0.5 and 0.6, and
+ * Mitsuba's plug-ins that the tables lack. They are lists of some dozens, searched from the beginning.
+ */
 #include "worker/render/scene/plugin.h"
 
 #include <string.h>
