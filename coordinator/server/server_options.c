@@ -86,7 +86,8 @@ const struct program server_program = {
 	.details =
 		"The spool keeps the jobs' results; only one coordinator can use a spool at a time. Every event is "
 		"logged as a line on stderr. Under systemd it says when it is ready and feeds the watchdog, and a socket unit's Unix "
-		"socket is taken as the status socket.\nSizes are also written 500M, 20G or 2T, times 90s, 5m, 2h or 3d, and counts 1.5k, 2M or 1G.",
+		"socket is taken as the status socket.\nSizes are also written 500M, 20G or 2T, times 90s, 5m, 2h or 3d, and "
+		"counts 1.5k, 2M or 1G.",
 	.exits = "0 stopped by SIGTERM or SIGINT, 1 failed, 2 usage",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 };

@@ -344,10 +344,13 @@ static void a_preview_never_takes_the_final_name(void **state)
 	} rows[] = {{"final.exr", "final.preview.exr", true},
 		    {"./final.exr", "./final.preview.exr", true},
 		    {"to-final.exr", "to-final.preview.exr", true},
+		    {"finals/final.exr", "finals/final.preview.exr", true},
 		    {"another.exr", "another.exr", false}};
 	struct error e;
 	write_text("final.exr");
 	assert_int_equal(symlink("final.exr", "to-final.exr"), 0);
+	assert_int_equal(mkdir("finals", 0700), 0);
+	assert_int_equal(symlink("../another.exr", "finals/final.exr"), 0);
 	for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
 		struct coordinator c = {.name = "/home/ann/final.exr"};
 		struct client *cl = meet(&c);

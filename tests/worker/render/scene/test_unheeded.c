@@ -56,13 +56,25 @@ static void test_notes(void **state)
 static void test_lines_of_objects(void **state)
 {
 	(void)state;
-	static const char xml[] = "<scene version='0.6.0'>\n"
-				  "<sensor type='perspective'><float name='focusDistance' value='1'/>\n"
-				  "<film type='hdrfilm'><boolean name='banner' value='false'/>\n"
-				  "<string name='pixelFormat' value='rgb'/><string name='fork' value='x'/>\n"
-				  "<string name='componentFormat' value='float16'/></film></sensor>\n"
-				  "<sensor type='perspective'><film type='hdrfilm'><string name='pixelFormat' value='rgb'/>\n"
-				  "<string name='fileFormat' value='openexr'/></film></sensor></scene>";
+	/* clang-format off */
+	static const char xml[] =
+		"<scene version='0.6.0'>\n"
+			"<sensor type='perspective'><float name='focusDistance' value='1'/>\n"
+				"<film type='hdrfilm'>"
+					"<boolean name='banner' value='false'/>\n"
+					"<string name='pixelFormat' value='rgb'/>"
+					"<string name='fork' value='x'/>\n"
+					"<string name='componentFormat' value='float16'/>"
+				"</film>"
+			"</sensor>\n"
+			"<sensor type='perspective'>"
+				"<film type='hdrfilm'>"
+					"<string name='pixelFormat' value='rgb'/>\n"
+					"<string name='fileFormat' value='openexr'/>"
+				"</film>"
+			"</sensor>"
+		"</scene>";
+	/* clang-format on */
 	static const char *const notes[] = {
 		"s.xml:2: <sensor type=\"perspective\">: `focusDistance` has no effect on light and is ignored",
 		"s.xml:3: <film type=\"hdrfilm\">: `banner`, `pixelFormat`, `componentFormat` have no effect on light and "
