@@ -185,4 +185,10 @@ id=$(cat "$DIR/out")
 grep -q "/dev/full: No space left on device. The image stays on the farm: hslt-job fetch $id -o FILE" "$DIR/err.log" ||
 	fail "a full disk: $(tail -n 1 "$DIR/err.log")"
 code 0 "$BIN/hslt-job" fetch "$id" -o "$DIR/later.exr"
+# A job for stdout has no name for its image.
+code 0 "$BIN/hslt-submit" "$BOX" -o - --integrator path --spp 1 --wait
+id=$(grep -x 'j[0-9]*' "$DIR/err.log")
+until_true 20 is_state "$id" done || fail "$id is $(value "$id" state)"
+(cd "$DIR/homeless" && code 1 "$BIN/hslt-job" fetch "$id") || exit 1
+grep -q 'give one with -o FILE' "$DIR/err.log" && [ -z "$(ls -A "$DIR/homeless")" ] || fail "fetch of a job for stdout: $(cat "$DIR/err.log")"
 echo "exit codes and restart"
