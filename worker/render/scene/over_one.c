@@ -80,7 +80,7 @@ static bool is_pattern(const char *type)
 /* A colour of a texture, which is refused once, however many materials have it. */
 static int refuse_colour(const struct notes *t, const struct scene_node *texture, const struct property *p, double most)
 {
-	error_set(t->error, ERANGE, "%s:%d: <texture type=\"%.64s\">: %s=%g is outside [0, 1]%s", texture->file,
+	error_set(t->error, ERANGE, "%s:%d: <texture type=\"%.64s\">: %s=%g is above 1, which no reflectance is%s", texture->file,
 		  p->line, texture->type, p->name, most, OVER_ONE_HINT);
 	for (uint32_t i = 0; i < t->report->problem_count; i++)
 		if (strcmp(t->report->problems[i], t->error->text) == 0)
