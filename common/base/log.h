@@ -50,6 +50,7 @@
 	X(WORKER_WRONG, "worker_wrong", WARN)              \
 	X(WORKER_QUARANTINED, "worker_quarantined", ERROR) \
 	X(WORKER_FORGIVEN, "worker_forgiven", INFO)        \
+	X(NOT_FORGIVEN, "worker_not_forgiven", WARN)       \
 	X(BATCH_REFUSED, "batch_refused", WARN)            \
 	X(BLOB_STORED, "blob_stored", DEBUG)               \
 	X(WORLD_BUILT, "world_built", INFO)                \

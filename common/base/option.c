@@ -11,6 +11,7 @@
 #include "common/base/option.h"
 
 #include "common/base/spelling.h"
+#include "common/base/target.h"
 #include "common/base/text.h"
 
 #include <float.h>
@@ -111,7 +112,7 @@ static int take_number(const struct option_row *r, void *field, const char *arg,
 	double x = strtod(arg, &end);
 	if (end == arg || *end || !is_within(r, x))
 		return out_of_range(r, "a number", "", arg, e);
-	store_number(r, field, x * r->unit);
+	store_number(r, field, x);
 	return 0;
 }
 
@@ -127,26 +128,42 @@ static int take_count(const struct option_row *r, void *field, const char *arg, 
 	return 0;
 }
 
-static int take_seconds(const struct option_row *r, void *field, const char *arg, struct error *e)
+static int take_size(const struct option_row *r, void *field, const char *arg, struct error *e)
 {
 	double x = 0;
-	if (!text_seconds(arg, &x))
-		return error_set(e, EINVAL, "--%s takes a time such as 90, 90s, 5m or 2h, not '%s'", r->name, arg);
-	if (!is_within(r, x))
-		return out_of_range(r, "a number of seconds", "", arg, e);
-	*(double *)field = x;
+	const char *unit = r->unit >= 1e9 ? "GB" : "MB";
+	if (!text_bytes(arg, r->unit, &x))
+		return error_set(e, EINVAL, "--%s takes a size in %s, or one such as 500M, 20G or 2T, not '%s'",
+				 r->name, unit, arg);
+	if (!is_within(r, x / r->unit))
+		return out_of_range(r, r->unit >= 1e9 ? "a number of GB" : "a number of MB", "", arg, e);
+	store_number(r, field, x);
 	return 0;
 }
 
-/* A plain number above 1, such as 5, means percent. */
+static int take_time(const struct option_row *r, void *field, const char *arg, struct error *e)
+{
+	double x = 0;
+	const char *unit = r->unit >= 86400 ? "days" : r->unit >= 60 ? "minutes" : "seconds";
+	char number[40];
+	text_print(number, sizeof number, "a number of %s", unit);
+	if (!text_time(arg, r->unit, &x))
+		return error_set(e, EINVAL, "--%s takes a time such as 90s, 5m, 2h or 3d, or %s, not '%s'", r->name,
+				 number, arg);
+	if (!is_within(r, x / r->unit))
+		return out_of_range(r, number, "", arg, e);
+	store_number(r, field, x);
+	return 0;
+}
+
+/* Above 1 it is asked back: 5 may mean 5 percent, and 150% may be a slip of 1.5%. */
 static int take_ratio(const struct option_row *r, void *field, const char *arg, struct error *e)
 {
 	double x = 0;
 	if (!text_ratio(arg, &x))
 		return error_set(e, EINVAL, "--%s takes something like 0.02 or 2%%, not '%s'", r->name, arg);
-	if (x > 1 && !strchr(arg, '%'))
-		return error_set(e, EINVAL, "--%s %s is %g %%; for %s percent write %s%%", r->name, arg, 100 * x, arg,
-				 arg);
+	if (x > 1 && x <= 100)
+		return error_set(e, EINVAL, "--%s: %g %% is above 100 %%; did you mean %g%%?", r->name, 100 * x, x);
 	if (!is_within(r, x))
 		return out_of_range(r, "a number", ", or percent", arg, e);
 	*(double *)field = x;
@@ -190,7 +207,7 @@ static int store_argument(const struct option_row *r, void *target, char *arg, s
 		*(const char **)field = arg;
 		return 0;
 	case OPTION_IS_OUTPUT:
-		*(const char **)field = strcmp(arg, "-") == 0 ? "/dev/stdout" : arg;
+		*(const char **)field = target_of(arg);
 		return 0;
 	case OPTION_IS_NAME:
 		return take_name(r, field, arg, e);
@@ -198,8 +215,10 @@ static int store_argument(const struct option_row *r, void *target, char *arg, s
 		return take_number(r, field, arg, e);
 	case OPTION_IS_COUNT:
 		return take_count(r, field, arg, e);
-	case OPTION_IS_SECONDS:
-		return take_seconds(r, field, arg, e);
+	case OPTION_IS_SIZE:
+		return take_size(r, field, arg, e);
+	case OPTION_IS_TIME:
+		return take_time(r, field, arg, e);
 	case OPTION_IS_RATIO:
 		return take_ratio(r, field, arg, e);
 	default:
@@ -247,8 +266,7 @@ static int refuse_unknown(const struct reader *x, const char *dashes, const char
 	struct spelling s = {.wanted = name};
 	const struct option_row *r;
 	for (size_t i = 0; (r = option_at(x->program, i, NULL)) != NULL; i++)
-		if (!r->hidden)
-			spelling_offer(&s, r->name);
+		spelling_offer(&s, r->name);
 	return error_set(x->e, EINVAL, "unknown option '%s%s'%s%s%s", dashes, name, s.best ? "; did you mean '--" : "",
 			 s.best ? s.best : "", s.best ? "'?" : "");
 }
@@ -261,7 +279,7 @@ static const struct option_row *find(const struct reader *x, const char *name)
 	size_t n = strlen(name), count = 0;
 	for (size_t i = 0; (r = option_at(x->program, i, NULL)) != NULL; i++) {
 		bool whole = strcmp(r->name, name) == 0;
-		if (!whole && (r->hidden || n == 0 || strncmp(r->name, name, n) != 0))
+		if (!whole && (n == 0 || strncmp(r->name, name, n) != 0))
 			continue;
 		found = r;
 		if (whole)

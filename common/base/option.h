@@ -18,16 +18,17 @@
 
 /* The kind of an option's argument; the last ones are the options that every program has. */
 enum option_kind {
-	OPTION_IS_END,	   /* no row: the table ends */
-	OPTION_IS_FLAG,	   /* takes none */
-	OPTION_IS_TEXT,	   /* borrowed from argv */
-	OPTION_IS_OUTPUT,  /* likewise, but "-" is /dev/stdout */
-	OPTION_IS_NAME,	   /* a text to be displayed: up to `most` bytes without control characters */
-	OPTION_IS_NUMBER,  /* from least to most, stored times unit */
-	OPTION_IS_COUNT,   /* a whole number: 4000, 1.5k */
-	OPTION_IS_SECONDS, /* 90, 90s, 5m, 2h */
-	OPTION_IS_RATIO,   /* 0.05, 5%; above 1 as percent only */
-	OPTION_IS_OTHER,   /* converted by `take` */
+	OPTION_IS_END,	  /* no row: the table ends */
+	OPTION_IS_FLAG,	  /* takes none */
+	OPTION_IS_TEXT,	  /* borrowed from argv */
+	OPTION_IS_OUTPUT, /* likewise, but "-" is /dev/stdout */
+	OPTION_IS_NAME,	  /* a text to be displayed: up to `most` bytes without control characters */
+	OPTION_IS_NUMBER, /* from least to most */
+	OPTION_IS_COUNT,  /* a whole number: 4000, 1.5k */
+	OPTION_IS_SIZE,	  /* a number of `unit` bytes, or 500k, 64M, 20G, 2T; stored in bytes */
+	OPTION_IS_TIME,	  /* a number of `unit` seconds, or 90s, 5m, 2h, 3d; stored in seconds */
+	OPTION_IS_RATIO,  /* 0.05, 5%; above 1 as percent only */
+	OPTION_IS_OTHER,  /* converted by `take` */
 	OPTION_IS_HELP,
 	OPTION_IS_USAGE,
 	OPTION_IS_VERSION,
@@ -49,14 +50,13 @@ struct option_row {
 	const char *help; /* without full stop and default */
 	enum option_kind kind;
 	enum option_store store;
-	size_t offset; /* offset in the struct that the table fills */
-	double least, most, unit;
-	bool above, below;	 /* the bound itself is not allowed */
-	bool needed;		 /* a text: leaving it NULL is a usage error */
-	bool hidden;		 /* an old name: not shown, cannot be abbreviated */
-	const char *standard;	 /* the default, parsed like an argument; NULL: keep what the struct holds */
-	const char *environment; /* environment variable used if the option is not given; NULL: none */
-	option_values *values;	 /* the only accepted arguments; NULL: any */
+	size_t offset;		  /* offset in the struct that the table fills */
+	double least, most, unit; /* the bounds are in units, for numbers 1 */
+	bool above, below;	  /* the bound itself is not allowed */
+	bool needed;		  /* a text: leaving it NULL is a usage error */
+	const char *standard;	  /* the default, parsed like an argument; NULL: keep what the struct holds */
+	const char *environment;  /* environment variable used if the option is not given; NULL: none */
+	option_values *values;	  /* the only accepted arguments; NULL: any */
 	int (*take)(void *target, char *arg, struct error *e); /* arg: from argv, may be changed; NULL without `arg` */
 	void (*more)(char *text, size_t size); /* what the help text adds as the default; NULL: nothing */
 };
@@ -76,12 +76,13 @@ struct option_row {
 #define OPTION_NAME(type, field, bytes) .kind = OPTION_IS_NAME, OPTION_STORE(type, field), .most = (bytes)
 #define OPTION_NUMBER(type, field, from, to) \
 	.kind = OPTION_IS_NUMBER, OPTION_STORE(type, field), .least = (from), .most = (to), .unit = 1
-#define OPTION_SCALED(type, field, from, to, times) \
-	.kind = OPTION_IS_NUMBER, OPTION_STORE(type, field), .least = (from), .most = (to), .unit = (times)
+#define OPTION_SIZE(type, field, from, to, bytes) \
+	.kind = OPTION_IS_SIZE, OPTION_STORE(type, field), .least = (from), .most = (to), .unit = (bytes)
 #define OPTION_COUNT(type, field, from, to) \
 	.kind = OPTION_IS_COUNT, OPTION_STORE(type, field), .least = (from), .most = (to)
-#define OPTION_SECONDS(type, field, from, to) \
-	.kind = OPTION_IS_SECONDS, OPTION_STORE(type, field), .least = (from), .most = (to)
+#define OPTION_TIME(type, field, from, to, seconds) \
+	.kind = OPTION_IS_TIME, OPTION_STORE(type, field), .least = (from), .most = (to), .unit = (seconds)
+#define OPTION_SECONDS(type, field, from, to) OPTION_TIME(type, field, from, to, 1)
 #define OPTION_RATIO(type, field, from, to) \
 	.kind = OPTION_IS_RATIO, OPTION_STORE(type, field), .least = (from), .most = (to)
 #define OPTION_TAKE(function) .kind = OPTION_IS_OTHER, .take = (function)

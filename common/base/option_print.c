@@ -122,8 +122,6 @@ static void print_help(FILE *out, const struct program *p)
 	print_forms(out, p);
 	fill_lines(out, p->summary);
 	for (size_t i = 0; (r = option_at(p, i, &group)) != NULL; i++) {
-		if (r->hidden)
-			continue;
 		if (group != last)
 			fprintf(out, "\n%s%s%s", group->title ? " " : "", group->title ? group->title : "",
 				group->title ? "\n" : "");
@@ -150,8 +148,7 @@ static void print_usage(FILE *out, const struct program *p)
 	t = (struct text){line, DESCRIPTION};
 	text_put(&t, "Usage: %s", p->name);
 	for (size_t i = 0; (r = option_at(p, i, NULL)) != NULL; i++)
-		if (!r->hidden)
-			text_put(&t, " [--%s%s%s]", r->name, r->arg ? "=" : "", r->arg ? r->arg : "");
+		text_put(&t, " [--%s%s%s]", r->name, r->arg ? "=" : "", r->arg ? r->arg : "");
 	if (p->words)
 		text_put(&t, " %.*s", (int)strcspn(p->words, "\n"), p->words);
 	print_filled(out, line, strlen(line), 0, 12);
@@ -257,8 +254,6 @@ static void print_man(FILE *out, const struct program *p)
 	}
 	fputs(".SH OPTIONS\n", out);
 	for (size_t i = 0; (r = option_at(p, i, &group)) != NULL; i++) {
-		if (r->hidden)
-			continue;
 		if (group != last && group->title) {
 			fputs(".SS \"", out);
 			roff(out, group->title, strcspn(group->title, ":"));
@@ -325,12 +320,11 @@ static void print_completion(FILE *out, const struct program *p)
 		"\tcase $option in\n",
 		p->name, p->name, function);
 	for (size_t i = 0; (r = option_at(p, i, NULL)) != NULL; i++)
-		if (r->arg && !r->hidden)
+		if (r->arg)
 			print_case(out, r);
 	fputs("\t*)\n\t\tif [[ $word == -* ]]; then\n\t\t\tmapfile -t COMPREPLY < <(compgen -W \"", out);
 	for (size_t i = 0; (r = option_at(p, i, NULL)) != NULL; i++)
-		if (!r->hidden)
-			fprintf(out, "%s--%s", i ? " " : "", r->name);
+		fprintf(out, "%s--%s", i ? " " : "", r->name);
 	fputs("\" -- \"$word\")\n\t\telse\n\t\t\tmapfile -t COMPREPLY < <(compgen -W \"", out);
 	for (size_t i = 0; p->verbs && (name = p->verbs(i)) != NULL; i++)
 		fprintf(out, "%s%s", i ? " " : "", name);

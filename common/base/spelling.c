@@ -5,8 +5,6 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { COMPARED_MAX = 48 };
-
 static char lower(char c)
 {
 	return c >= 'A' && c <= 'Z' ? (char)(c - 'A' + 'a') : c;
@@ -15,7 +13,7 @@ static char lower(char c)
 /* Insertions, deletions, replacements and transpositions (optimal string alignment). */
 static size_t edit_distance(const char *a, size_t n, const char *b, size_t m)
 {
-	size_t row[3][COMPARED_MAX + 1];
+	size_t row[3][SPELLING_MOST + 1];
 	size_t *two = row[0], *one = row[1], *now = row[2];
 	for (size_t j = 0; j <= m; j++)
 		one[j] = two[j] = j;
@@ -42,13 +40,14 @@ static size_t edit_distance(const char *a, size_t n, const char *b, size_t m)
 void spelling_offer(struct spelling *s, const char *candidate)
 {
 	size_t n = strlen(s->wanted), m = strlen(candidate);
-	if (n > COMPARED_MAX || m > COMPARED_MAX || n == 0)
+	if (n > SPELLING_MOST || m > SPELLING_MOST || n == 0)
 		return;
 	size_t d = edit_distance(s->wanted, n, candidate, m);
 	size_t longest = n > m ? n : m;
 	bool near = d <= 1 + longest / 4 && d < longest;
 	if (near && (!s->best || d < s->distance)) {
-		s->best = candidate;
+		memcpy(s->copy, candidate, m + 1);
+		s->best = s->copy;
 		s->distance = d;
 	}
 }

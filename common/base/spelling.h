@@ -5,11 +5,14 @@
 
 #include <stddef.h>
 
-/* Keeps the nearest of the offered names, if it is near enough to be a typing error. */
+enum { SPELLING_MOST = 48 }; /* longer names are not compared */
+
+/* Keeps the nearest of the offered names, if it is near enough to be a typing error. Not to be copied. */
 struct spelling {
 	const char *wanted;
-	const char *best; /* NULL: none is near enough */
+	const char *best; /* NULL: none is near enough; otherwise `copy`, so that an offered name need not last */
 	size_t distance;
+	char copy[SPELLING_MOST + 1];
 };
 void spelling_offer(struct spelling *s, const char *candidate);
 

@@ -11,6 +11,21 @@
 
 enum { LINKS_MOST = 40 };
 
+const char *target_of(const char *arg)
+{
+	return strcmp(arg, "-") == 0 ? TARGET_STDOUT : arg;
+}
+
+const char *target_arg(const char *path)
+{
+	return strcmp(path, TARGET_STDOUT) == 0 ? "-" : path;
+}
+
+const char *target_shown(const char *path)
+{
+	return strcmp(path, TARGET_STDOUT) == 0 ? "stdout" : path;
+}
+
 /* The descriptor behind /dev/fd/3, /dev/stdout and the like; reopening such a file would write from its beginning.
  * Negative: none. */
 static int own_descriptor(const char *path)
@@ -74,5 +89,5 @@ int target_open(const struct target *t, struct error *e)
 {
 	int fd = t->descriptor >= 0 ? fcntl(t->descriptor, F_DUPFD_CLOEXEC, 0)
 				    : open(t->path, O_WRONLY | O_NOCTTY | O_CLOEXEC);
-	return fd < 0 ? error_set(e, errno, "%s: cannot write there: %s", t->path, strerror(errno)) : fd;
+	return fd < 0 ? error_set(e, errno, "%s: cannot write there: %s", target_shown(t->path), strerror(errno)) : fd;
 }

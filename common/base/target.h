@@ -19,6 +19,12 @@ struct target {
 	int descriptor;		/* in that case, the program's own descriptor; otherwise negative */
 };
 
+/* The file behind "-", back again for a command line, and what messages call it; other paths stay as they are. */
+#define TARGET_STDOUT "/dev/stdout"
+const char *target_of(const char *arg);
+const char *target_arg(const char *path);
+const char *target_shown(const char *path);
+
 /* -ELOOP: a loop of links; -ENAMETOOLONG; -EISDIR. */
 int target_find(struct target *t, const char *path, struct error *e);
 

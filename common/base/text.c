@@ -1,4 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * UTF-8 by its table of sequences (Unicode, section 3.9), numbers with units by strtod and a letter, and printing that
+ * never cuts within a character. Nothing allocates.
+ *
+ * What is malformed is false; what does not fit is cut.
+ */
 #include "common/base/text.h"
 
 #include <errno.h>
@@ -158,10 +164,44 @@ bool text_count(const char *text, uint64_t *count)
 	return true;
 }
 
-bool text_seconds(const char *text, double *seconds)
+bool text_counts(const char *text, const char *separators, uint32_t *out, size_t count)
+{
+	const char *at = text;
+	for (size_t i = 0; i < count; i++) {
+		char one[32], ends[] = {i + 1 < count ? separators[i] : 0, 0};
+		size_t n = strcspn(at, ends);
+		uint64_t x;
+		if (n >= sizeof one || (*ends && !at[n]))
+			return false;
+		memcpy(one, at, n);
+		one[n] = 0;
+		if (!text_count(one, &x) || x > UINT32_MAX)
+			return false;
+		out[i] = (uint32_t)x;
+		at += n + 1;
+	}
+	return true;
+}
+
+bool text_time(const char *text, double unit, double *seconds)
 {
 	static const double units[] = {1, 60, 3600, 86400};
-	return with_unit(text, "smhd", units, seconds);
+	bool bare = text[strcspn(text, "smhd")] == 0;
+	return with_unit(text, "smhd", units, seconds) && (!bare || isfinite(*seconds *= unit));
+}
+
+bool text_bytes(const char *text, double unit, double *bytes)
+{
+	static const double units[] = {1e3, 1e3, 1e6, 1e6, 1e9, 1e9, 1e12, 1e12};
+	char plain[40];
+	size_t n = strlen(text);
+	if (n == 0 || n >= sizeof plain)
+		return false;
+	memcpy(plain, text, n + 1);
+	if (n > 1 && plain[n - 1] == 'B' && strchr("kKmMgGtT", plain[n - 2]))
+		plain[n - 1] = 0;
+	bool bare = plain[strcspn(plain, "kKmMgGtT")] == 0;
+	return with_unit(plain, "kKmMgGtT", units, bytes) && (!bare || isfinite(*bytes *= unit));
 }
 
 bool text_is_among(const char *text, const char *const *list, size_t count)

@@ -30,7 +30,12 @@ bool text_ratio(const char *text, double *ratio);
 /* A whole number with decimal units: "1000", "1.5k", "2M", "1G"; a time: "90", "90s", "5m", "2h", "1d". false:
  * malformed, not finite, negative, or not a whole number. */
 bool text_count(const char *text, uint64_t *count);
-bool text_seconds(const char *text, double *seconds);
+/* `count` counts with these separators between them: "1.5k,0,320,360". */
+bool text_counts(const char *text, const char *separators, uint32_t *out, size_t count);
+/* Without a unit of its own the number is in `unit` seconds. */
+bool text_time(const char *text, double unit, double *seconds);
+/* "500M", "20GB": powers of 1000; a plain number is in `unit` bytes. */
+bool text_bytes(const char *text, double unit, double *bytes);
 
 /* Appends to a fixed-size array. What does not fit is truncated as above, and later text is dropped. Start with
  * {array, size}. */

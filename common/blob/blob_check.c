@@ -109,14 +109,14 @@ static int check_result(struct blob_check *c, struct error *e)
 }
 
 /* Its contents are wrong, or there is none. */
-static int set_aside(struct blob_store *s, struct blob_entry *n, bool there, struct error *e)
+static int mark_gone(struct blob_store *s, struct blob_entry *n, bool there, struct error *e)
 {
-	char path[BLOB_PATH_MOST], aside[BLOB_PATH_MOST + 16], hex[BLOB_HEX_SIZE];
+	char path[BLOB_PATH_MOST], damaged[BLOB_PATH_MOST + 16], hex[BLOB_HEX_SIZE];
 	blob_hex(&n->hash, hex);
 	blob_path(s, &n->hash, path, sizeof path);
-	snprintf(aside, sizeof aside, "%s/damaged.%s", s->folder, hex);
+	snprintf(damaged, sizeof damaged, "%s/damaged.%s", s->folder, hex);
 	if (!n->gone && there)
-		disk_rename(path, aside);
+		disk_rename(path, damaged);
 	n->gone = true;
 	s->bytes -= n->size;
 	n->size = 0;
@@ -132,7 +132,7 @@ int blob_check_end(struct blob_check *c, struct error *e)
 	if (n->checked > c->begun) { /* written or checked by another one meanwhile */
 		rc = 0;
 	} else if (rc == -EBADMSG || rc == -ENOENT) {
-		rc = set_aside(s, n, rc == -EBADMSG, e);
+		rc = mark_gone(s, n, rc == -EBADMSG, e);
 	} else if (rc) {
 		n->given |= c->was_given;
 	} else {

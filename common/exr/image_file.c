@@ -85,7 +85,7 @@ int image_file_encode(const struct canvas_image *img, const struct plan *p, cons
 static int failed(struct error *e, const char *path, const char *what)
 {
 	int code = errno;
-	return error_set(e, code, "%s: cannot %s: %s", path, what, strerror(code));
+	return error_set(e, code, "%s: cannot %s: %s", target_shown(path), what, strerror(code));
 }
 
 /* Makes the new name survive a crash. Failing to open the folder is not worth an error. */

@@ -1,7 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Each output is resolved through links to a device and inode, or to a path without links; compared with the inputs and
+ * the other outputs; its name with the format; and what is there already, by its first bytes. Last, whether a file can
+ * be made there.
+ *
+ * The first of these that is wrong is the error, and nothing has been written by then.
+ */
 #include "common/exr/output_files.h"
 
 #include "common/base/picture_name.h"
+#include "common/base/spelling.h"
 #include "common/base/target.h"
 #include "common/exr/image_file.h"
 
@@ -104,6 +112,12 @@ static bool is_same(const struct place *a, const struct place *b)
 	return a->regular && b->regular && a->device == b->device && a->inode == b->inode;
 }
 
+/* A pipe that two outputs share would hold neither. */
+static bool both_stdout(const char *a, const char *b)
+{
+	return strcmp(a, TARGET_STDOUT) == 0 && strcmp(b, TARGET_STDOUT) == 0;
+}
+
 static int refuse_input(const struct output_file *f, const char *input, struct error *e)
 {
 	return error_set(e, EINVAL, "%s %s would replace %s, which is an input", f->option, f->path, input);
@@ -121,12 +135,27 @@ static int check_inputs(const struct output_file *f, const struct place *p, cons
 }
 
 /* A name that promises another format of pictures than is written. */
+static int check_plot(const char *option, const char *path, struct error *e)
+{
+	char hint[40];
+	const char *slash = strrchr(path, '/'), *dot = strrchr(slash ? slash : path, '.');
+	struct spelling s = {.wanted = dot ? dot : ""};
+	if (strcasecmp(s.wanted, ".svg") == 0)
+		return 0;
+	spelling_offer(&s, ".svg");
+	spelling_offer(&s, ".png");
+	return error_set(e, EINVAL, "%s %s: a plot is written as .svg or .png%s", option, path,
+			 spelling_hint(&s, hint, sizeof hint));
+}
+
 static int check_name(const struct output_file *f, struct error *e)
 {
+	if (f->format == OUTPUT_SVG)
+		return check_plot(f->option, f->path, e);
 	const char *promised = picture_name_format(f->path), *own = f->format == OUTPUT_EXR   ? ".exr"
 								    : f->format == OUTPUT_PNG ? ".png"
 											      : NULL;
-	if (!promised || !own || strcmp(promised, own) == 0)
+	if (!promised || (own && strcmp(promised, own) == 0))
 		return 0;
 	return error_set(e, EINVAL, "%s %s: %s is written, which the name does not say%s", f->option, f->path,
 			 formats[f->format].noun, f->format == OUTPUT_EXR ? "; hslt-tonemap converts one to PNG" : "");
@@ -161,9 +190,9 @@ int output_files_check(const struct output_files *o, const char *const *inputs, 
 		if (!rc)
 			rc = check_inputs(&f[i], &places[i], inputs, input_count, e);
 		for (size_t j = 0; !rc && j < i; j++)
-			if (f[j].path && is_same(&places[i], &places[j]))
+			if (f[j].path && (is_same(&places[i], &places[j]) || both_stdout(f[i].path, f[j].path)))
 				rc = error_set(e, EINVAL, "%s and %s are the same file, %s", f[j].option, f[i].option,
-					       f[i].path);
+					       target_shown(f[i].path));
 		if (!rc)
 			rc = check_format(&f[i], e);
 		if (!rc)

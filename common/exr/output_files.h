@@ -35,7 +35,7 @@ int output_files_check(const struct output_files *o, const char *const *inputs, 
 int output_files_check_read(const struct output_files *o, uint64_t device, uint64_t inode, const char *name,
 			    struct error *e);
 
-/* ".svg" and ".png" by the name of a plot. */
+/* By the ending of a plot's name, .svg or .png; anything else is refused by output_files_check. */
 enum output_format output_format_of_plot(const char *path);
 
 #endif

@@ -13,6 +13,7 @@
 #include "common/base/disk.h"
 #include "common/base/list.h"
 #include "common/base/mem.h"
+#include "common/base/spelling.h"
 #include "common/net/key_pair.h"
 
 #include <dirent.h>
@@ -496,6 +497,7 @@ static int for_each_issued(const char *folder,
 
 struct revocation {
 	struct authority *a;
+	struct spelling near;
 	const char *what;
 	unsigned count, before; /* certificates: that it revokes, and that were revoked already */
 };
@@ -503,6 +505,8 @@ struct revocation {
 static int revoke_one(void *user, X509 *cert, const struct tls_peer *who, struct error *e)
 {
 	struct revocation *r = user;
+	if (X509_cmp_current_time(X509_get0_notAfter(cert)) >= 0 && !is_revoked(r->a, cert))
+		spelling_offer(&r->near, who->name);
 	if ((strcmp(who->name, r->what) != 0 && strcasecmp(who->serial, r->what) != 0) ||
 	    X509_cmp_current_time(X509_get0_notAfter(cert)) < 0)
 		return 0;
@@ -529,12 +533,13 @@ int authority_revoke(const char *folder, const char *what, unsigned *count, stru
 	int rc = authority_open(&a, folder, true, e);
 	if (rc)
 		return rc;
-	struct revocation r = {.a = &a, .what = what};
+	struct revocation r = {.a = &a, .near = {.wanted = what}, .what = what};
 	struct error damage;
+	char hint[96];
 	rc = for_each_issued(folder, revoke_one, &r, &damage, e);
 	if (!rc && !r.count && !r.before)
-		rc = error_set(e, ENOENT, "no valid certificate has the name or serial number '%s'%s%s", what,
-			       *damage.text ? "; " : "", damage.text);
+		rc = error_set(e, ENOENT, "no valid certificate has the name or serial number '%s'%s%s%s", what,
+			       spelling_hint(&r.near, hint, sizeof hint), *damage.text ? "; " : "", damage.text);
 	if (!rc && r.count)
 		rc = sign_list(&a, e);
 	if (!rc) /* also if all were revoked before: the coordinators may not have been told, if that was interrupted */

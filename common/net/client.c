@@ -436,7 +436,7 @@ static int copy(int from, int to, const char *path, struct error *e)
 
 /* Received completely before a byte is written: what a pipe has taken cannot be taken back if the connection breaks. */
 static int fetch_through(struct client *cl, struct client_message *first, uint64_t job, Farm__What what,
-			 const struct target *t, struct error *e)
+			 const struct target *t, const char *name, struct error *e)
 {
 	FILE *whole = tmpfile();
 	if (!whole)
@@ -446,9 +446,9 @@ static int fetch_through(struct client *cl, struct client_message *first, uint64
 	if (!rc && fd < 0)
 		rc = client_local(fd);
 	if (!rc)
-		rc = copy(fileno(whole), fd, t->path, e);
+		rc = copy(fileno(whole), fd, name, e);
 	if (fd >= 0 && close(fd) && !rc)
-		rc = error_set(e, EIO, "%s: %s", t->path, strerror(errno));
+		rc = error_set(e, EIO, "%s: %s", name, strerror(errno));
 	fclose(whole);
 	return rc;
 }
@@ -485,7 +485,7 @@ static int fetch_file(struct client *cl, struct client_message *first, uint64_t 
 	if (found)
 		return found;
 	if (t.through)
-		return fetch_through(cl, first, job, what, &t, e);
+		return fetch_through(cl, first, job, what, &t, target_shown(path), e);
 	path = t.path;
 	int n = snprintf(temporary, sizeof temporary, "%s.XXXXXX", path);
 	if (n < 0 || (size_t)n >= sizeof temporary)
@@ -519,15 +519,51 @@ int client_fetch(struct client *cl, uint64_t job, Farm__What what, const char *p
 	return rc;
 }
 
+static const char *last_part(const char *path)
+{
+	const char *slash = strrchr(path, '/');
+	return slash ? slash + 1 : path;
+}
+
+int client_preview_name(const char *path, char *name, size_t size, struct error *e)
+{
+	const char *last = last_part(path), *dot = strrchr(last, '.');
+	int stem = (int)((dot && dot != last ? dot : last + strlen(last)) - path);
+	int n = snprintf(name, size, "%.*s.preview%s", stem, path, path + stem);
+	return n < 0 || (size_t)n >= size ? error_set(e, ENAMETOOLONG, "%s: the name is too long", path) : 0;
+}
+
+int client_fetch_preview(struct client *cl, uint64_t job, const char *path, bool *kept, struct error *e)
+{
+	char other[TARGET_PATH];
+	struct target t;
+	struct client_message first;
+	int rc = target_find(&t, path, e);
+	*kept = false;
+	if (!rc)
+		rc = fetch_chunk(cl, job, FARM__WHAT__WHAT_PREVIEW, 0, &first, e);
+	if (rc)
+		return rc;
+	const char *final = last_part(first.envelope.message->fetch_chunk->output);
+	*kept = !t.through && *final && (strcmp(last_part(path), final) == 0 || strcmp(last_part(t.path), final) == 0);
+	if (*kept)
+		rc = client_preview_name(path, other, sizeof other, e);
+	if (!rc)
+		rc = fetch_file(cl, &first, job, FARM__WHAT__WHAT_PREVIEW, *kept ? other : path, true, e);
+	client_message_fini(&first);
+	return rc;
+}
+
 /* Turns a name that somebody else chose into a safe file name: not hidden, and not like an option. That of the image
- * stays free while there is only a preview: room.exr is previewed in room.preview.exr. */
+ * stays free while there is only a preview. */
 static int take_name(const char *output, bool preview, char name[CLIENT_NAME_BYTES], struct error *e)
 {
 	struct stat st;
-	const char *slash = strrchr(output, '/'), *last = slash ? slash + 1 : output, *dot = strrchr(last, '.');
-	int stem = (int)(dot ? (size_t)(dot - last) : strlen(last)), n = 0;
+	const char *last = last_part(output);
+	int n = 0;
 	if (envelope_text_ok(last, CLIENT_NAME_BYTES - 1) && *last && *last != '.' && *last != '-')
-		n = snprintf(name, CLIENT_NAME_BYTES, "%.*s%s%s", stem, last, preview ? ".preview" : "", last + stem);
+		n = preview ? !client_preview_name(last, name, CLIENT_NAME_BYTES, e)
+			    : snprintf(name, CLIENT_NAME_BYTES, "%s", last);
 	if (n <= 0 || n >= CLIENT_NAME_BYTES)
 		return error_set(e, EEXIST, "the name of the job's image cannot be used here: give one with -o FILE");
 	return lstat(name, &st) == 0 ? error_set(e, EEXIST, "%s exists: -o FILE replaces it", name) : 0;

@@ -41,7 +41,13 @@ void client_message_fini(struct client_message *m);
  * fetch on the way, in favour of others, it begins again up to four times, and says so on stderr. -EIO: an error of the
  * local file; -EAGAIN: it was dropped each time. */
 int client_fetch(struct client *cl, uint64_t job, Farm__What what, const char *path, struct error *e);
-/* The same into the current folder, under the last part of the name that hslt-submit was given, for a preview with
+/* A preview. The name that hslt-submit was given stays free for the image: if `path` has it, or leads there by a link,
+ * the file is that of client_preview_name. *kept: whether that happened. */
+int client_fetch_preview(struct client *cl, uint64_t job, const char *path, bool *kept, struct error *e);
+/* room.preview.exr of room.exr; -ENAMETOOLONG. */
+int client_preview_name(const char *path, char *name, size_t size, struct error *e);
+/* The same as client_fetch into the current folder, under the last part of the name that hslt-submit was given, for a
+ * preview with
  * `.preview` before its extension. Because that name came over the wire, -EEXIST if a file of that name exists, or if
  * the name is unsafe (hidden, or like an option). */
 int client_fetch_here(struct client *cl, uint64_t job, Farm__What what, char name[CLIENT_NAME_BYTES], struct error *e);

@@ -9,7 +9,7 @@
 #include "common/film/batch.h"
 #include "common/estimate/forecast.h"
 #include "common/plan/plan.h"
-#include "coordinator/core/counts.h"
+#include "coordinator/core/job_fields.h"
 
 enum event_kind {
 	EVENT_TICK,	 /* only time has passed: due at update.wake at the latest */

@@ -13,7 +13,7 @@ static void quarantine_worker(struct farm *f, struct identity *who)
 {
 	if (who->quarantined)
 		return;
-	worker_registry_set_aside(f, who);
+	worker_registry_quarantine(f, who);
 	struct action *a = update_add(f, ACTION_QUARANTINE);
 	a->who = who->id;
 	a->text = who->text;

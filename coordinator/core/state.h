@@ -5,7 +5,7 @@
 
 #include "common/estimate/forecast.h"
 #include "coordinator/core/config.h"
-#include "coordinator/core/counts.h"
+#include "coordinator/core/job_fields.h"
 #include "coordinator/core/event.h"
 #include "coordinator/core/identity.h"
 #include "coordinator/core/list.h"

@@ -284,7 +284,7 @@ bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *
 	};
 	fill_counts(j, s);
 	fill_share(f, j, s);
-	memcpy(s->text, j->text, sizeof s->text);
+	memcpy(s->why, j->text, sizeof s->why);
 	fill_waiting(f, j, s);
 	fill_eta(j, now, s);
 	return true;

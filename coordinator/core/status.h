@@ -9,36 +9,33 @@
 
 struct farm;
 
+/* Fields that the core computes are from the list (job_fields.h). */
 struct job_status {
 	uint64_t id;
 	const char *owner;
-	int priority;
-	double verify;
 	const struct plan *plan;
 	enum job_state state;
 	enum job_end end;
-	const char *fingerprint;	  /* "": not pinned */
-	double submitted, started, ended; /* started: when the first lease was sent; NAN: not yet */
-	double progress;		  /* [0,1], never decreases */
-	double rate;		  /* mutations (bootstrap: samples) merged per second, over the last half minute */
-	double eta;		  /* s; NAN: unknown */
-	double eta_low, eta_high; /* its 90 % interval */
-	bool disagrees;		  /* the chains of its final image disagree */
-	double rel_error;	  /* as last estimated; NAN: none */
-	double bootstrap_seconds; /* wall-clock time from the first lease to the first round; NAN: not yet */
+	const char *fingerprint;	      /* "": not pinned */
+	double submitted, started, ended;     /* started: when the first lease was sent; NAN: not yet */
+	bool disagrees;			      /* the chains of its final image disagree */
+	double rel_error;		      /* as last estimated; NAN: none */
 	const struct forecast_history *looks; /* estimates of the error, oldest first */
 	struct forecast_range halving_cpu,
 		halving_seconds; /* the cost of halving the error; valid if there are estimates */
-	uint64_t rounds;	 /* complete rounds */
-	uint64_t bootstrap_merged, leases_merged, mutations; /* leases_merged: render leases, including open rounds */
-	uint32_t leases;				     /* at workers */
-	uint32_t workers, machines;			     /* machines that hold its leases; machines that could */
-	double share;	 /* machines it would get by its priority: coordinator/core/share.h */
-	char place[160]; /* both, and which jobs come first */
+	uint64_t bootstrap_merged;
 	struct job_counts counts;
-	char text[256];				     /* why it failed, or the last failure of a lease */
-	char waiting[256];			     /* why nothing is being done for it; "" if something is */
-	char owners_place[160], owners_waiting[256]; /* for its owner: without ids of other owners' jobs */
+#define BY_CORE(member) member;
+#define BY_JOBS(member)
+#define TEXT(member, size, in, by, key, shown, wire) by(char member[size])
+#define NUMBER(kind, member, in, by, key, shown, wire) by(field_##kind member)
+#define COUNT(member, by, key, shown, wire) by(uint64_t member)
+	JOB_FIELDS(TEXT, NUMBER, COUNT, JOB_NO_FIELD)
+#undef BY_CORE
+#undef BY_JOBS
+#undef TEXT
+#undef NUMBER
+#undef COUNT
 };
 
 struct peer_status {

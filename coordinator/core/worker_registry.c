@@ -116,7 +116,7 @@ void worker_registry_free(struct farm *f)
 
 /* Names cost nothing: at most this many quarantined entries are kept per certificate, and the one that has been away
  * longest makes room. */
-void worker_registry_set_aside(struct farm *f, struct identity *who)
+void worker_registry_quarantine(struct farm *f, struct identity *who)
 {
 	struct identity *oldest = NULL;
 	uint32_t count = 0;
@@ -140,6 +140,6 @@ void worker_registry_restore_quarantined(struct farm *f, const struct event_join
 	if (!k)
 		return;
 	text_copy(k->text, sizeof k->text, text);
-	worker_registry_set_aside(f, k);
+	worker_registry_quarantine(f, k);
 	worker_registry_drop(f, k);
 }

@@ -25,7 +25,7 @@ void worker_registry_free(struct farm *f);
 /* NULL: no worker with this home or, failing that, this name. */
 struct identity *worker_registry_find(const struct farm *f, const struct event_join *e);
 /* Marks it; quarantine.h does the rest. */
-void worker_registry_set_aside(struct farm *f, struct identity *who);
+void worker_registry_quarantine(struct farm *f, struct identity *who);
 /* Restores one from an earlier run of the coordinator. */
 void worker_registry_restore_quarantined(struct farm *f, const struct event_join *e, const char *text);
 

@@ -9,15 +9,15 @@
 
 struct arguments {
 	const char *ca, *verb, *what, *name;
-	double days; /* 0: not given */
+	double seconds; /* of validity; 0: not given */
 	bool renew;
 };
 
 static const struct option_row rows[] = {
 	{"ca", 0, "DIR", "The authority's folder, if not ~/.hslt-ca", OPTION_TEXT(struct arguments, ca),
 	 .environment = "HSLT_CA"},
-	{"days", 0, "N", "How long the certificate is valid (825; the authority: 3650)",
-	 OPTION_NUMBER(struct arguments, days, 0, 36500), .above = true},
+	{"days", 0, "N", "How long the certificate is valid (825; the authority: 3650), or a time such as 36h",
+	 OPTION_TIME(struct arguments, seconds, 0, 36500, 86400), .above = true},
 	{"renew", 0, NULL, "Replace an existing certificate and key of the same name and role",
 	 OPTION_FLAG(struct arguments, renew)},
 	{"name", 0, "NAME", "init: the authority's name", OPTION_TEXT(struct arguments, name), .standard = "hslt-farm"},
@@ -77,9 +77,14 @@ static const struct program program = {
 
 static const double own_days = 3650, other_days = 825;
 
+static double days_of(const struct arguments *a, double standard)
+{
+	return a->seconds > 0 ? a->seconds / 86400 : standard;
+}
+
 static int issue(const struct arguments *a, enum tls_role role, const char *name, struct error *e)
 {
-	int rc = authority_issue(a->ca, name, role, a->days > 0 ? a->days : other_days, a->renew, e);
+	int rc = authority_issue(a->ca, name, role, days_of(a, other_days), a->renew, e);
 	if (!rc)
 		printf("%s/%s\n", a->ca, name);
 	return rc;
@@ -88,8 +93,8 @@ static int issue(const struct arguments *a, enum tls_role role, const char *name
 static int init(const struct arguments *a, struct error *e)
 {
 	struct arguments rest = *a;
-	int rc = authority_init(a->ca, a->name, a->days > 0 ? a->days : own_days, e);
-	rest.days = 0;
+	int rc = authority_init(a->ca, a->name, days_of(a, own_days), e);
+	rest.seconds = 0;
 	return rc ? rc : issue(&rest, TLS_COORDINATOR, "coordinator", e);
 }
 

@@ -6,6 +6,7 @@
  * ends the program with an error.
  */
 #include "common/base/progress.h"
+#include "common/base/target.h"
 #include "common/exr/output_files.h"
 #include "common/net/client.h"
 #include "coordinator/ctl/job_options.h"
@@ -160,10 +161,34 @@ static int send_control(struct client *cl, const struct job_options *o, struct e
 			 o, e);
 }
 
+/* -o may name the final image, which a preview never takes: either file is checked before anything is fetched. */
+static int fetch_preview(struct client *cl, const struct job_options *o, struct error *e)
+{
+	char other[TARGET_PATH];
+	bool kept = false;
+	int rc = client_local(client_preview_name(o->output, other, sizeof other, e));
+	const struct output_files outputs = {{{"-o", o->output, OUTPUT_EXR}}}, others = {{{"-o", other, OUTPUT_EXR}}};
+	if (!rc)
+		rc = client_local(output_files_check(&outputs, NULL, 0, e));
+	if (!rc && strcmp(o->output, TARGET_STDOUT) != 0)
+		rc = client_local(output_files_check(&others, NULL, 0, e));
+	if (!rc)
+		rc = client_fetch_preview(cl, o->job, o->output, &kept, e);
+	if (!rc && kept)
+		fprintf(stderr, "j%llu: preview, the image so far, in %s; %s is for the final image\n",
+			(unsigned long long)o->job, other, o->output);
+	else if (!rc)
+		fprintf(stderr, "j%llu: preview, the image so far, in %s\n", (unsigned long long)o->job,
+			target_shown(o->output));
+	return rc;
+}
+
 static int fetch(struct client *cl, const struct job_options *o, struct error *e)
 {
 	Farm__What what = o->preview ? FARM__WHAT__WHAT_PREVIEW : FARM__WHAT__WHAT_RESULT;
 	char name[CLIENT_NAME_BYTES];
+	if (o->preview && o->output)
+		return fetch_preview(cl, o, e);
 	const struct output_files outputs = {{{"-o", o->output, OUTPUT_EXR}}};
 	int rc = client_local(output_files_check(&outputs, NULL, 0, e));
 	if (!rc)
@@ -171,7 +196,8 @@ static int fetch(struct client *cl, const struct job_options *o, struct error *e
 			       : client_fetch_here(cl, o->job, what, name, e);
 	if (!rc)
 		fprintf(stderr, "j%llu: %s in %s\n", (unsigned long long)o->job,
-			o->preview ? "preview, the image so far," : "image", o->output ? o->output : name);
+			o->preview ? "preview, the image so far," : "image",
+			o->output ? target_shown(o->output) : name);
 	return rc;
 }
 

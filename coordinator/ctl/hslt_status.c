@@ -252,7 +252,7 @@ static void print_strategies(const json_t *job)
 	fputs(text, stdout);
 }
 
-static void print_agreement(const json_t *job)
+static void print_convergence(const json_t *job)
 {
 	struct convergence a;
 	struct path_class_energy classes[PATH_CLASSES];
@@ -353,7 +353,7 @@ static void print_snapshot(const json_t *snapshot, const char *only)
 			print_scene_notes(job);
 			print_effects(job);
 			print_strategies(job);
-			print_agreement(job);
+			print_convergence(job);
 			print_leases(snapshot, only);
 		}
 	}

@@ -24,7 +24,8 @@ static const struct option_row rows[] = {
 	 "fetch: the output file; only an image is replaced (without it: into the current folder, under the last "
 	 "part of the name given to hslt-submit, never replacing a file); -: stdout",
 	 OPTION_OUTPUT(struct job_options, output)},
-	{"preview", 0, NULL, "fetch: the image so far, while the job runs; room.exr is previewed in room.preview.exr",
+	{"preview", 0, NULL,
+	 "fetch: the image so far, while the job runs; room.exr is previewed in room.preview.exr, also with -o room.exr",
 	 OPTION_FLAG(struct job_options, preview)},
 	{"json", 0, NULL, "list: one JSON array", OPTION_FLAG(struct job_options, json)},
 	{"spp", 0, "+N", "extend: additional samples per pixel", OPTION_COUNT(struct job_options, more_spp, 1, 1e15)},
@@ -34,7 +35,7 @@ static const struct option_row rows[] = {
 	 OPTION_SECONDS(struct job_options, more_seconds, 0, 1e9), .above = true},
 	{"target-error", 0, "E",
 	 "extend: until the estimated relative error is 0.02 or 2%; bounds already reached and not named here no longer apply",
-	 OPTION_RATIO(struct job_options, target_error, 0, 1e3), .above = true, .below = true},
+	 OPTION_RATIO(struct job_options, target_error, 0, 1), .above = true},
 	{"tls", 0, "DIR", "ca.pem, cert.pem, key.pem, made by hslt-ca: encryption and authentication",
 	 OPTION_TEXT(struct job_options, tls), .environment = "HSLT_TLS"},
 	{"insecure", 0, NULL, "Connect to addresses other than loopback without encryption",

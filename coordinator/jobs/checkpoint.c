@@ -16,8 +16,8 @@
 
 #include "common/base/disk.h"
 #include "common/base/mem.h"
-#include "coordinator/job/rollback.h"
-#include "coordinator/job/checkpoint_file.h"
+#include "coordinator/live_job/rollback.h"
+#include "coordinator/live_job/checkpoint_file.h"
 #include "coordinator/jobs/durable.h"
 #include "coordinator/jobs/room.h"
 #include "coordinator/jobs/step.h"

@@ -10,7 +10,7 @@
 #ifndef COORDINATOR_JOBS_CHECKPOINT_H
 #define COORDINATOR_JOBS_CHECKPOINT_H
 
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 /* Starts one for each job whose journal is long enough. Not while an update is being carried out. */
 void checkpoint_where_due(struct jobs *jobs);

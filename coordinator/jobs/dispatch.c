@@ -15,9 +15,9 @@
 #include "common/base/disk.h"
 #include "common/base/text.h"
 #include "common/plan/plan_text.h"
-#include "coordinator/job/rollback.h"
-#include "coordinator/job/incoming.h"
-#include "coordinator/job/late.h"
+#include "coordinator/live_job/rollback.h"
+#include "coordinator/live_job/incoming.h"
+#include "coordinator/live_job/late.h"
 #include "coordinator/jobs/durable.h"
 #include "coordinator/jobs/publish.h"
 #include "coordinator/jobs/room.h"
@@ -50,8 +50,9 @@ static int store_submission(struct jobs *jobs, uint64_t id, const struct submiss
 	return rc;
 }
 
-static void submitted(struct jobs *jobs, const struct action *a, struct submission *from)
+static void submitted(struct jobs *jobs, const struct action *a, const struct incoming *in)
 {
+	struct submission *from = in->submission;
 	struct live_job *job;
 	struct error e;
 	const Farm__Submit *m = from->submit->message->submit;
@@ -61,7 +62,7 @@ static void submitted(struct jobs *jobs, const struct action *a, struct submissi
 		rc = store_submission(jobs, a->job, from, &job, &e);
 	while (disk_is_full(rc) && room_make(jobs));
 	if (rc) {
-		text_copy(from->refusal, sizeof from->refusal, e.text);
+		*in->refusal = e;
 		jobs_break(jobs, a->job, e.text);
 		return;
 	}
@@ -79,10 +80,10 @@ static void submitted(struct jobs *jobs, const struct action *a, struct submissi
 			     (int)m->effects[i]->on, log_quote(m->effects[i]->why).text);
 }
 
-static void rejected(struct jobs *jobs, const struct action *a)
+static void rejected(const struct action *a, const struct incoming *in)
 {
-	text_copy(jobs->refusal, sizeof jobs->refusal, *a->text ? a->text : "refused");
-	jobs->peers.refused(jobs->peers.user, a->tag ? a->tag : a->peer, jobs->refusal);
+	if (in->refusal)
+		error_set(in->refusal, EPERM, "%s", *a->text ? a->text : "refused");
 }
 
 static void job_changed(struct jobs *jobs, const struct action *a)
@@ -233,10 +234,10 @@ void dispatch_update(struct jobs *jobs, const struct update *u, const struct inc
 		case ACTION_JOB_FORGOTTEN:
 			break;
 		case ACTION_SUBMITTED:
-			submitted(jobs, a, in->submission);
+			submitted(jobs, a, in);
 			break;
 		case ACTION_REJECTED:
-			rejected(jobs, a);
+			rejected(a, in);
 			break;
 		case ACTION_SEND_LEASE:
 			send_lease(jobs, a);

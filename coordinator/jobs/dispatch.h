@@ -3,7 +3,7 @@
 #ifndef COORDINATOR_JOBS_DISPATCH_H
 #define COORDINATOR_JOBS_DISPATCH_H
 
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 struct incoming;
 

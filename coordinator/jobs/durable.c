@@ -18,8 +18,8 @@
 #include "common/base/text.h"
 #include "common/base/version.h"
 #include "common/wire/frame.h"
-#include "coordinator/job/incoming.h"
-#include "coordinator/job/stored.h"
+#include "coordinator/live_job/incoming.h"
+#include "coordinator/live_job/stored.h"
 #include "coordinator/jobs/room.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/retention/keep.h"
@@ -428,11 +428,11 @@ static void write_counts(struct jobs *jobs, struct live_job *job)
 	struct job_counts now;
 	struct error e;
 	if (job->ended || job->busy || !farm_counts(jobs->farm, job->id, &now) ||
-	    memcmp(&now, &job->counts, sizeof now) == 0)
+	    memcmp(&now, &job->record.counts, sizeof now) == 0)
 		return;
 	unsigned char note[STORED_NOTE_MOST];
 	if (append_note(jobs, job, JOURNAL_COUNTS, job->times.elapsed, note, stored_pack_counts(&now, note), &e) == 0)
-		job->counts = now;
+		job->record.counts = now;
 }
 
 /* Answers that waited for journals which have been replaced. */

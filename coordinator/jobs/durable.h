@@ -9,7 +9,7 @@
 #ifndef COORDINATOR_JOBS_DURABLE_H
 #define COORDINATOR_JOBS_DURABLE_H
 
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 /* When this returns the job is in the ledger, with an empty journal: its number may be told to the client. */
 int durable_begin(struct jobs *jobs, struct live_job *job, struct error *e);

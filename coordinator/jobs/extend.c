@@ -14,6 +14,7 @@
 #include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
+#include "coordinator/live_job/incoming.h"
 #include "coordinator/jobs/durable.h"
 #include "coordinator/jobs/listing.h"
 #include "coordinator/jobs/restore.h"
@@ -130,8 +131,7 @@ static int extend_live(struct jobs *jobs, const struct requester *by, struct liv
 	}
 	log_extension(by, job, text, size);
 	struct event ev = {.kind = EVENT_EXTEND, .tag = by->peer, .job = job->id, .plan = &job->plan};
-	jobs_step(jobs, &ev);
-	return 0;
+	return jobs_ask(jobs, &ev, &(struct incoming){0}, e);
 }
 
 /* ---- finished jobs ---- */
@@ -151,11 +151,11 @@ static int read_row(const struct jobs *jobs, uint64_t job, struct ledger_job *j,
 /* The journal's numbers are from shortly before the end: the record of the end is more accurate. */
 static void take_counts(struct job_counts *c, const struct job_record *r)
 {
-#define X(name, key, wire)            \
-	if (c->name < r->counts.name) \
-		c->name = r->counts.name;
-	JOB_COUNTS(X)
-#undef X
+#define COUNTER(member, key, wire)        \
+	if (c->member < r->counts.member) \
+		c->member = r->counts.member;
+	JOB_COUNTERS(COUNTER)
+#undef COUNTER
 }
 
 /* r: its record. */
@@ -167,16 +167,13 @@ static int begin_again(struct jobs *jobs, const struct requester *by, struct liv
 	if (rc)
 		return rc;
 	job->record.has_result = r->has_result;
-	take_counts(&job->counts, r);
+	take_counts(&job->record.counts, r);
 	job->next = jobs->live;
 	jobs->live = job;
 	ended_jobs_remove(jobs, job->id);
-	jobs->refusal[0] = 0;
 	rc = restore_tell(jobs, job, "", by->peer, e);
-	if (!rc && !*jobs->refusal)
-		return 0;
 	if (!rc)
-		rc = error_set(e, EAGAIN, "%s", jobs->refusal);
+		return 0;
 	jobs->live = job->next;
 	ended_jobs_add(jobs, r);
 	struct job_record over = *r;

@@ -4,7 +4,7 @@
 #define COORDINATOR_JOBS_EXTEND_H
 
 #include "common/net/tls.h"
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 #include "coordinator/retention/extend_plan.h"
 
 /* Who requests it. */

@@ -7,7 +7,7 @@
 #ifndef COORDINATOR_JOBS_FILES_H
 #define COORDINATOR_JOBS_FILES_H
 
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 enum { FILES_CHECKED = 60 /* s: a file checked so recently is not read again before it is sent */ };
 

@@ -3,7 +3,7 @@
 #ifndef COORDINATOR_JOBS_FINISH_H
 #define COORDINATOR_JOBS_FINISH_H
 
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 /* Finishes all jobs that the core has ended and whose films are free: record, workers, memory. Then handles
  * extensions that waited for them. */

@@ -6,7 +6,7 @@
 #ifndef COORDINATOR_JOBS_FOLDER_H
 #define COORDINATOR_JOBS_FOLDER_H
 
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 void folder_tick(struct jobs *jobs); /* checks every second */
 

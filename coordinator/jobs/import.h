@@ -3,7 +3,7 @@
 #ifndef COORDINATOR_JOBS_IMPORT_H
 #define COORDINATOR_JOBS_IMPORT_H
 
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 /* Does nothing in a spool that has no such files. Each file is deleted once the ledger has its contents, so that a
  * start that is interrupted goes on with the next one. */

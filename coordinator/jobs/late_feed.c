@@ -2,9 +2,9 @@
 #include "coordinator/jobs/late_feed.h"
 
 #include "common/base/mem.h"
-#include "coordinator/job/digest.h"
-#include "coordinator/job/incoming.h"
-#include "coordinator/job/late.h"
+#include "coordinator/live_job/digest.h"
+#include "coordinator/live_job/incoming.h"
+#include "coordinator/live_job/late.h"
 #include "coordinator/jobs/step.h"
 
 /* It has been damaged meanwhile: its lease is open. */

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Gives results that wait in a job's journal (coordinator/job/late.h) to the core. The loop's thread. */
+/* Gives results that wait in a job's journal (coordinator/live_job/late.h) to the core. The loop's thread. */
 #ifndef COORDINATOR_JOBS_LATE_FEED_H
 #define COORDINATOR_JOBS_LATE_FEED_H
 
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 /* They are computed again instead. false: the job has ended meanwhile, and is gone. */
 bool late_drop(struct jobs *jobs, uint64_t job);

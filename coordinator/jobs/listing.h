@@ -3,7 +3,7 @@
 #ifndef COORDINATOR_JOBS_LISTING_H
 #define COORDINATOR_JOBS_LISTING_H
 
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 /* false: no such job. */
 bool jobs_view(struct jobs *jobs, uint64_t job, struct job_view *v);

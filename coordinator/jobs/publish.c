@@ -69,7 +69,7 @@ static int write_image(struct publishing *w)
 				 .effects = effects,
 				 .mixed = m->mixed,
 				 .wall_seconds = w->wall_seconds,
-				 .cpu_seconds = job->cpu_seconds,
+				 .cpu_seconds = job->record.cpu_seconds,
 				 .workers = job->worker_count,
 				 .end = w->what == PUBLISH_RESULT ? end_name(w->end) : NULL};
 	for (; x.effect_count < m->n_effects && x.effect_count < HEADER_EFFECTS_MAX; x.effect_count++) {
@@ -101,16 +101,17 @@ static void tell_error(const struct publishing *w)
 	struct jobs *jobs = w->jobs;
 	bool doubtful;
 	double upper = stated_error_upper(&w->image, &doubtful);
-	struct event ev = {.kind = EVENT_ERROR_KNOWN,
-			   .job = w->job->id,
-			   .error_known = {.job = w->job->id,
-					   .rounds = w->rounds,
-					   .rel_error = w->rc ? NAN : upper,
-					   .rel_mse = w->rc ? NAN : w->image.rel_mse,
-					   .degrees = w->rc ? NAN : w->image.rel_mse_degrees,
-					   .doubtful = !w->rc && doubtful,
-					   .cpu_seconds = w->job->cpu_seconds - w->job->record.bootstrap_cpu_seconds,
-					   .black = !w->rc && w->image.black}};
+	struct event ev = {
+		.kind = EVENT_ERROR_KNOWN,
+		.job = w->job->id,
+		.error_known = {.job = w->job->id,
+				.rounds = w->rounds,
+				.rel_error = w->rc ? NAN : upper,
+				.rel_mse = w->rc ? NAN : w->image.rel_mse,
+				.degrees = w->rc ? NAN : w->image.rel_mse_degrees,
+				.doubtful = !w->rc && doubtful,
+				.cpu_seconds = w->job->record.cpu_seconds - w->job->record.bootstrap_cpu_seconds,
+				.black = !w->rc && w->image.black}};
 	jobs_step(jobs, &ev);
 	durable_look(jobs, ev.job);
 }

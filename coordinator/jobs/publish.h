@@ -7,7 +7,7 @@
 #ifndef COORDINATOR_JOBS_PUBLISH_H
 #define COORDINATOR_JOBS_PUBLISH_H
 
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 void publish_start(struct jobs *jobs, struct live_job *job, enum publish_what what, uint64_t rounds);
 

@@ -36,7 +36,7 @@ static void log_fault(uint64_t id, const char *what)
 /* ---- lost jobs ---- */
 
 /* Its folder is kept, for somebody who knows more. */
-static int put_aside(struct looking *l, uint64_t id, const char *why, struct error *e)
+static int move_to_lost(struct looking *l, uint64_t id, const char *why, struct error *e)
 {
 	const struct spool *spool = l->jobs->spool;
 	char from[SPOOL_PATH_MAX], to[SPOOL_PATH_MAX], lost[SPOOL_PATH_MAX], jobs[SPOOL_PATH_MAX], name[64];
@@ -71,7 +71,7 @@ static int is_lost(struct looking *l, uint64_t id, const char *why, struct error
 		log_fault(id, why);
 		return 0;
 	}
-	int rc = put_aside(l, id, why, e);
+	int rc = move_to_lost(l, id, why, e);
 	text_print(text, sizeof text, "%s: given up; the rest of it is in spool/lost", why);
 	log_fault(id, text);
 	return rc;

@@ -7,7 +7,7 @@
 #ifndef COORDINATOR_JOBS_RECONCILE_H
 #define COORDINATOR_JOBS_RECONCILE_H
 
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 int reconcile(struct jobs *jobs, struct error *e); /* -EBADMSG: something is lost */
 

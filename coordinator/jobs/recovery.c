@@ -88,15 +88,15 @@ size_t recovery_views(const struct jobs *jobs, struct job_view *v)
 
 /* The stored data is damaged: the job's batches can be computed again, with the same bits. Nothing is deleted, since
  * somebody may want to look at it. -errno: some of it is where it was, and would be read again. */
-static int put_aside(struct jobs *jobs, struct live_job *job, struct error *e)
+static int keep_damaged(struct jobs *jobs, struct live_job *job, struct error *e)
 {
-	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX], aside[SPOOL_PATH_MAX];
+	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX], damaged[SPOOL_PATH_MAX];
 	spool_job_path(jobs->spool, job->id, NULL, folder);
 	spool_job_path(jobs->spool, job->id, "checkpoint", path);
-	spool_job_path(jobs->spool, job->id, "checkpoint.damaged", aside);
-	if (disk_rename(path, aside) && errno != ENOENT)
+	spool_job_path(jobs->spool, job->id, "checkpoint.damaged", damaged);
+	if (disk_rename(path, damaged) && errno != ENOENT)
 		return error_file(e, errno, path);
-	int rc = journal_put_aside(folder, e);
+	int rc = journal_keep_damaged(folder, e);
 	if (rc)
 		return rc;
 	live_job_log(job, LOG_SPOOL_FAULT,
@@ -169,7 +169,6 @@ static int finish(struct jobs *jobs, struct error *e)
 	int rc = 0;
 	for (struct recovering_job *f; !rc && (f = jobs->found);) {
 		struct ledger_job j;
-		struct job_counts known;
 		struct live_job *job = f->job;
 		uint64_t id = job->id;
 		jobs->found = f->next;
@@ -182,8 +181,6 @@ static int finish(struct jobs *jobs, struct error *e)
 			      : error_set(e, ENOENT, "its row is missing");
 		if (!rc && (job = jobs_find(jobs, id))) /* it may have ended at once */
 			files_look(jobs, job);
-		if (!rc && !farm_counts(jobs->farm, id, &known))
-			rc = error_set(e, ENOMEM, "no memory for a job");
 		if (rc)
 			rc = error_prefix(e, rc, "j%llu", (unsigned long long)id);
 	}
@@ -238,7 +235,7 @@ static int take_failure(struct jobs *jobs, struct error *e)
 	*e = r->error;
 	live_job_log(f->job, LOG_SPOOL_FAULT, "text=%s", log_quote(e->text).text);
 	bool anew = rc == -EBADMSG && !f->anew;
-	if (anew && (rc = put_aside(jobs, f->job, e)))
+	if (anew && (rc = keep_damaged(jobs, f->job, e)))
 		anew = false;
 	restore_drop(jobs, f->job);
 	f->job = NULL;

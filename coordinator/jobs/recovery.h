@@ -12,7 +12,7 @@
 #ifndef COORDINATOR_JOBS_RECOVERY_H
 #define COORDINATOR_JOBS_RECOVERY_H
 
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 int recovery_begin(struct jobs *jobs, struct error *e); /* if there are no such jobs it is complete at once */
 bool recovery_is_on(const struct jobs *jobs);

@@ -14,6 +14,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/base/version.h"
+#include "coordinator/live_job/incoming.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/jobs/trust.h"
 
@@ -86,16 +87,18 @@ int restore_tell(struct jobs *jobs, const struct live_job *job, const char *held
 				       .opened = job->times.opened,
 				       .completed = job->times.completed,
 				       .looks = &job->record.looks,
-				       .counts = job->counts}};
-	jobs_step(jobs, &ev);
+				       .counts = job->record.counts}};
+	int rc = jobs_ask(jobs, &ev, &(struct incoming){0}, e);
+	if (rc && !tag) /* there is no other reason then */
+		rc = error_set(e, ENOMEM, "no memory for a job");
 	mem_free(next);
 	mem_free(makers);
-	if (*held) {
+	if (!rc && *held) {
 		ev = (struct event){
 			.kind = EVENT_HOLD, .job = job->id, .hold = HOLD_ORDERED, .text = restore_held_by(held, text)};
 		jobs_step(jobs, &ev);
 	}
-	return 0;
+	return rc;
 }
 
 /* ---- one job */

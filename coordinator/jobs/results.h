@@ -3,7 +3,7 @@
 #ifndef COORDINATOR_JOBS_RESULTS_H
 #define COORDINATOR_JOBS_RESULTS_H
 
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 /* A LeaseResult or a LeaseFailed: now, or when the films are free and the job's files have been read. May take either.
  */

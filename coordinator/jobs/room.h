@@ -3,7 +3,7 @@
 #ifndef COORDINATOR_JOBS_ROOM_H
 #define COORDINATOR_JOBS_ROOM_H
 
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 /* The disk is full: deletes something that no job needs, first a scene file, then the films of finished jobs. false:
  * there is nothing left. */

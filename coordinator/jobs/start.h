@@ -3,7 +3,7 @@
 #ifndef COORDINATOR_JOBS_START_H
 #define COORDINATOR_JOBS_START_H
 
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 /* config, peers, stop, loop must be set. Opens spool, ledger and core, and starts to read the jobs of the last run
  * (recovery.h). After an error call jobs_stop and jobs_close. */

@@ -12,7 +12,7 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "coordinator/job/incoming.h"
+#include "coordinator/live_job/incoming.h"
 
 #include <assert.h>
 #include <math.h>
@@ -79,6 +79,14 @@ void jobs_step_with(struct jobs *jobs, struct event *ev, const struct incoming *
 	}
 	jobs->stepping = false;
 	jobs->follow_up->stepped(jobs);
+}
+
+int jobs_ask(struct jobs *jobs, struct event *ev, struct incoming *in, struct error *e)
+{
+	*e = (struct error){""};
+	in->refusal = e;
+	jobs_step_with(jobs, ev, in);
+	return *e->text ? -EPERM : 0;
 }
 
 static void on_wake(uv_timer_t *t)

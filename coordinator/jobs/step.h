@@ -3,7 +3,7 @@
 #ifndef COORDINATOR_JOBS_STEP_H
 #define COORDINATOR_JOBS_STEP_H
 
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 /* Functions that carry out the core's answers. A table, because they make steps themselves (start.c). */
 struct follow_up {
@@ -17,6 +17,8 @@ struct follow_up {
 void jobs_step(struct jobs *jobs, struct event *ev);
 /* The same, for an event with more data (incoming.h). Not while an update is being carried out. */
 void jobs_step_with(struct jobs *jobs, struct event *ev, const struct incoming *in);
+/* The same, for one that the core, or the disk, may refuse: -EPERM, with its reason. in: its refusal is set here. */
+int jobs_ask(struct jobs *jobs, struct event *ev, struct incoming *in, struct error *e);
 /* Later, after the current update. Copies the text. */
 void jobs_defer(struct jobs *jobs, const struct event *ev);
 void jobs_break(struct jobs *jobs, uint64_t job, const char *text); /* the job fails */

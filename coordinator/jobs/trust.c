@@ -1,8 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Quarantined workers are a note in the ledger, which is told to the core at the start and written again whenever the
+ * core finds one; wrong results are counted, named in the job's note and logged.
+ *
+ * A note that cannot be read is put by, and a list that cannot be written is logged: the farm stops for neither.
+ */
 #include "coordinator/jobs/trust.h"
 
 #include "common/base/list.h"
 #include "common/base/mem.h"
+#include "common/base/spelling.h"
 #include "common/base/text.h"
 #include "coordinator/jobs/step.h"
 
@@ -67,6 +74,24 @@ static void tell_core(struct jobs *jobs, const json_t *w)
 	jobs_step(jobs, &ev);
 }
 
+/* A start with the same option as before is no mistake, but a typing error would leave the worker where it is. */
+static void tell_unforgiven(const struct jobs *jobs, const json_t *list)
+{
+	const char *name = jobs->config.forgive;
+	struct spelling near = {.wanted = name ? name : ""};
+	char hint[96], text[160];
+	for (size_t i = 0; name && i < json_array_size(list); i++) {
+		const char *other = text_of(json_array_get(list, i), "name");
+		if (strcmp(other, name) == 0)
+			return;
+		spelling_offer(&near, other);
+	}
+	if (!name)
+		return;
+	text_print(text, sizeof text, "nobody of that name is quarantined%s", spelling_hint(&near, hint, sizeof hint));
+	log_event(LOG_NOT_FORGIVEN, "name=%s text=%s", log_quote(name).text, log_quote(text).text);
+}
+
 static const char empty[] = "{\"schema\": 1, \"workers\": []}";
 
 /* The farm does not stop for it: a worker that gives wrong results will do so again, and be found again. */
@@ -88,6 +113,8 @@ int trust_open(struct jobs *jobs, struct error *e)
 		log_event(LOG_SPOOL_FAULT, "text=%s action=\"nobody in it is quarantined\"", log_quote(e->text).text);
 		return ledger_set(jobs->ledger, note, empty, e);
 	}
+	if (rc == -ENOENT)
+		tell_unforgiven(jobs, NULL);
 	if (rc)
 		return rc == -ENOENT ? 0 : rc;
 	json_t *o = json_loads(text, JSON_REJECT_DUPLICATES, NULL);
@@ -96,6 +123,8 @@ int trust_open(struct jobs *jobs, struct error *e)
 		rc = put_by(jobs, text, e);
 	for (size_t i = 0; i < json_array_size(list); i++)
 		tell_core(jobs, json_array_get(list, i));
+	if (!rc)
+		tell_unforgiven(jobs, list);
 	json_decref(o);
 	mem_free(text);
 	if (!rc && jobs->config.forgive)

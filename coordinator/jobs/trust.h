@@ -8,7 +8,7 @@
 #ifndef COORDINATOR_JOBS_TRUST_H
 #define COORDINATOR_JOBS_TRUST_H
 
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 /* Tells the core who is quarantined, except for workers that the configuration forgives. A damaged list is kept as
  * quarantined-damaged, and the log says so. */

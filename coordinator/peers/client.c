@@ -16,7 +16,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/plan/plan_text.h"
-#include "coordinator/job/incoming.h"
+#include "coordinator/live_job/incoming.h"
 #include "coordinator/jobs/listing.h"
 #include "coordinator/jobs/room.h"
 #include "coordinator/jobs/step.h"
@@ -127,11 +127,8 @@ static void submit(struct session *p)
 				  .rule = p->upload->rule,
 				  .owner = p->who.name,
 				  .address = p->address};
-	p->rejected[0] = 0;
-	jobs_step_with(p->jobs, &ev, &(struct incoming){.submission = &from});
-	if (*from.refusal)
-		text_copy(p->rejected, sizeof p->rejected, from.refusal);
-	answer_submit(p, *p->rejected ? 0 : from.job, p->rejected, *p->rejected ? NULL : p->upload);
+	int rc = jobs_ask(p->jobs, &ev, &(struct incoming){.submission = &from}, &e);
+	answer_submit(p, rc ? 0 : from.job, e.text, rc ? NULL : p->upload);
 	client_upload_abort(p);
 }
 

@@ -20,11 +20,11 @@ bool client_finds_job(const struct session *p, uint64_t job, struct job_view *v)
 	return jobs_view(p->jobs, job, v) && client_may_see(p, v);
 }
 
-void client_send_done(struct session *p, const char *text)
+void client_send_done(struct session *p, const char *refusal, const char *text)
 {
 	char said[256];
-	text_copy(said, sizeof said, *p->rejected ? p->rejected : text);
-	conn_send(p->conn, ENVELOPE(DONE, done, .ok = !*p->rejected, .text = said), NULL, 0);
+	text_copy(said, sizeof said, refusal ? refusal : text);
+	conn_send(p->conn, ENVELOPE(DONE, done, .ok = !refusal, .text = said), NULL, 0);
 }
 
 uint64_t client_uploading(const struct session *p)

@@ -10,7 +10,8 @@
 bool client_may_see(const struct session *p, struct job_view *v);
 /* false: no such job for this client. */
 bool client_finds_job(const struct session *p, uint64_t job, struct job_view *v);
-void client_send_done(struct session *p, const char *text); /* p->rejected is the reason; text: what was done, or "" */
+/* refusal: the reason; NULL: it is done. text: what was done, or "". */
+void client_send_done(struct session *p, const char *refusal, const char *text);
 /* Bytes of scenes that other connections of the same owner are sending. */
 uint64_t client_uploading(const struct session *p);
 

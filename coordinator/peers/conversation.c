@@ -16,6 +16,7 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
+#include "coordinator/live_job/incoming.h"
 #include "coordinator/jobs/extend.h"
 #include "coordinator/jobs/recovery.h"
 #include "coordinator/jobs/results.h"
@@ -72,6 +73,7 @@ static const char *what_to_know(const struct session *p, char *text, size_t size
 static void join(struct session *p, const Farm__Hello *h)
 {
 	char text[256];
+	struct error e;
 	struct event ev = {.kind = EVENT_JOINED,
 			   .peer = p->id,
 			   .join = {.peer = p->id,
@@ -81,12 +83,10 @@ static void join(struct session *p, const Farm__Hello *h)
 				    .certificate = p->who.name,
 				    .home = h->home,
 				    .restarts = h->restarts}};
-	p->rejected[0] = 0;
 	p->joined = true;
-	jobs_step(p->jobs, &ev);
-	if (*p->rejected) {
+	if (jobs_ask(p->jobs, &ev, &(struct incoming){0}, &e)) {
 		p->joined = false;
-		answer_hello(p, false, false, p->rejected);
+		answer_hello(p, false, false, e.text);
 		return;
 	}
 	p->state = SESSION_WORKER;

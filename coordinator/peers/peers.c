@@ -109,13 +109,6 @@ static const char *name(struct peers *s, uint64_t peer)
 	return p ? p->name : NULL;
 }
 
-static void refused(struct peers *s, uint64_t peer, const char *text)
-{
-	struct session *p = peers_find(s, peer);
-	if (p)
-		text_copy(p->rejected, sizeof p->rejected, text);
-}
-
 static void fault(struct peers *s, uint64_t peer, const char *text)
 {
 	struct session *p = peers_find(s, peer);
@@ -135,10 +128,8 @@ static void dismiss(struct peers *s, uint64_t peer, const char *text)
 static void extended(struct peers *s, uint64_t peer, const char *refusal, const char *text)
 {
 	struct session *p = peers_find(s, peer);
-	if (!p)
-		return;
-	text_copy(p->rejected, sizeof p->rejected, refusal ? refusal : "");
-	client_send_done(p, text);
+	if (p)
+		client_send_done(p, refusal, text);
 }
 
 static void job_ended(struct peers *s, uint64_t job)
@@ -180,7 +171,6 @@ void peers_init(struct peers *s)
 					     .send_lease = worker_send_lease,
 					     .revoke = worker_send_revoke,
 					     .acknowledge = worker_send_ack,
-					     .refused = refused,
 					     .fault = fault,
 					     .dismiss = dismiss,
 					     .extended = extended,

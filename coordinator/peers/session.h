@@ -7,7 +7,7 @@
 #define COORDINATOR_PEERS_SESSION_H
 
 #include "common/net/conn.h"
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 enum { SESSION_BUCKETS = 4096 };
 
@@ -60,9 +60,8 @@ struct session {
 	struct job_view *shown;	  /* what was last sent to the watcher */
 	STAILQ_HEAD(, held) held; /* requests that wait until the jobs are read */
 	size_t held_bytes;
-	uint64_t turn;	    /* number of its last request, of those of all */
-	double told;	    /* s of the loop's clock: the last heartbeat sent meanwhile */
-	char rejected[256]; /* why the core refused; "": it did not */
+	uint64_t turn; /* number of its last request, of those of all */
+	double told;   /* s of the loop's clock: the last heartbeat sent meanwhile */
 };
 
 /* All sessions, and their common limits. */

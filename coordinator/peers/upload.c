@@ -2,8 +2,8 @@
 /*
  * A submission on its way from its message to the core.
  *
- * upload_new checks it: names and texts, that paths stay inside the bundle, sizes against the limits, and the plan.
- * upload_look holds the files that the spool has, each once it has been read and is right. The client is told the
+ * upload_new checks it: names and texts, that paths stay inside the scene's folder, sizes against the limits, and the
+ * plan. upload_look holds the files that the spool has, each once it has been read and is right. The client is told the
  * hashes of the others and sends these, each in order, and upload_add writes them. The pool flushes what has arrived
  * while more arrives: a scene may have thousands of small files. What is flushed is stored under its hash and held.
  * When none is missing any more, the job can be submitted.
@@ -26,7 +26,7 @@ enum { LOOKS_AT_ONCE = 64 /* a millisecond, on a disk that answers at once */ };
 /* Mutations or samples of a lease whose length was asked for: some minutes of a thread in usual scenes, an hour where
  * each is 30 us. Without that a mistyped --epoch takes a farm from all others for days. */
 enum { LEASE_MOST = 1 << 27 };
-static const uint64_t job_cache_max = 1ull << 34; /* 16 GiB */
+static const uint64_t scene_bytes_max = 1ull << 34; /* 16 GiB */
 
 struct upload_flush {
 	uv_work_t work;
@@ -58,18 +58,18 @@ static int check_files(const Farm__Submit *m, struct error *e)
 	uint64_t total = 0;
 	bool scene = false;
 	if (m->n_files == 0 || m->n_files > FILES_MAX)
-		return error_set(e, EINVAL, "a bundle has 1 to %d files, not %zu", FILES_MAX, m->n_files);
+		return error_set(e, EINVAL, "a scene has 1 to %d files, not %zu", FILES_MAX, m->n_files);
 	for (size_t i = 0; i < m->n_files; i++) {
 		const Farm__File *f = m->files[i];
 		if (!name_ok(f->name) || f->hash.len != BLOB_HASH_SIZE)
-			return error_set(e, EINVAL, "file %zu of the bundle has no valid name or hash", i);
-		if (f->size > job_cache_max - total)
-			return error_set(e, EINVAL, "the bundle is larger than %llu bytes",
-					 (unsigned long long)job_cache_max);
+			return error_set(e, EINVAL, "file %zu of the scene has no valid name or hash", i);
+		if (f->size > scene_bytes_max - total)
+			return error_set(e, EINVAL, "the scene's files are larger than %llu bytes",
+					 (unsigned long long)scene_bytes_max);
 		total += f->size;
 		scene = scene || strcmp(f->name, m->scene) == 0;
 	}
-	return scene ? 0 : error_set(e, EINVAL, "the scene file is not in the bundle");
+	return scene ? 0 : error_set(e, EINVAL, "the scene file is not among the scene's files");
 }
 
 static int compare_names(const void *x, const void *y)
@@ -89,7 +89,7 @@ static int check_names(const Farm__Submit *m, struct error *e)
 	qsort(sorted, m->n_files, sizeof *sorted, compare_names);
 	for (size_t i = 1; !rc && i < m->n_files; i++)
 		if (compare_names(&sorted[i - 1], &sorted[i]) == 0)
-			rc = error_set(e, EINVAL, "%.256s: the bundle has two files of that name", sorted[i]->name);
+			rc = error_set(e, EINVAL, "%.256s: the scene has two files of that name", sorted[i]->name);
 	mem_free(sorted);
 	return rc;
 }

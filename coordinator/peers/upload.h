@@ -9,7 +9,7 @@
 #include "common/blob/blob_batch.h"
 #include "common/plan/plan.h"
 #include "common/wire/envelope.h"
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 #include <uv.h>
 

@@ -6,7 +6,7 @@
 #ifndef COORDINATOR_RETENTION_AGES_H
 #define COORDINATOR_RETENTION_AGES_H
 
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 /* If the note is missing or damaged, observed time starts again: finished jobs then count as new. Never fails. */
 void ages_open(struct jobs *jobs);

@@ -9,7 +9,7 @@
 #ifndef COORDINATOR_RETENTION_CLEAR_H
 #define COORDINATOR_RETENTION_CLEAR_H
 
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 void clear_tick(struct jobs *jobs);
 void clear_soon(struct jobs *jobs);  /* a job has ended */

@@ -7,7 +7,7 @@
 #ifndef COORDINATOR_RETENTION_KEEP_H
 #define COORDINATOR_RETENTION_KEEP_H
 
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 /* For a job that has just ended. false: it cannot be extended, and nothing need be kept. */
 bool keep_films(const struct jobs *jobs, const struct live_job *job, const struct job_record *r);

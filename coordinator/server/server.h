@@ -6,7 +6,7 @@
 #ifndef COORDINATOR_SERVER_SERVER_H
 #define COORDINATOR_SERVER_SERVER_H
 
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 #include "coordinator/peers/peers.h"
 
 int server_run(const struct server_config *c, struct error *e);

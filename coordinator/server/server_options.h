@@ -4,7 +4,7 @@
 #define COORDINATOR_SERVER_SERVER_OPTIONS_H
 
 #include "common/base/option.h"
-#include "coordinator/job/config.h"
+#include "coordinator/live_job/config.h"
 
 extern const struct program server_program;
 

@@ -3,7 +3,7 @@
 #ifndef COORDINATOR_STATUS_LINES_H
 #define COORDINATOR_STATUS_LINES_H
 
-#include "coordinator/job/jobs.h"
+#include "coordinator/live_job/jobs.h"
 
 #include <jansson.h>
 

@@ -53,7 +53,7 @@ int fields_store(const struct field *f, size_t count, const void *from, json_t *
 bool fields_show(const struct field *f, size_t count, const void *from, json_t *o)
 {
 	for (size_t i = 0; i < count; i++)
-		if (f[i].shown && json_object_set_new(o, f[i].shown, field_to_shown(&f[i], from)))
+		if (f[i].key && json_object_set_new(o, f[i].key, field_to_shown(&f[i], from)))
 			return false;
 	return true;
 }

@@ -28,7 +28,7 @@
 enum journal_kind {
 	JOURNAL_BATCH = 1,	/* a frame as received: prefix, header, payload */
 	JOURNAL_PINNED = 2,	/* the fingerprint that the job is pinned to */
-	JOURNAL_OLD_LOOK = 3,	/* by earlier versions (coordinator/job/stored.h) */
+	JOURNAL_OLD_LOOK = 3,	/* by earlier versions (coordinator/live_job/stored.h) */
 	JOURNAL_OLD_COUNTS = 4, /* the same */
 	JOURNAL_AGAIN = 5,  /* as JOURNAL_BATCH, but replaces the last one of that lease, which is taken back with all
 			       later ones of its (group, part) */

@@ -314,7 +314,7 @@ void journal_clear(const char *folder, uint64_t keep)
 			  log_quote(e.text).text);
 }
 
-int journal_put_aside(const char *folder, struct error *e)
+int journal_keep_damaged(const char *folder, struct error *e)
 {
 	char from[PATH_MOST], to[PATH_MOST + 16];
 	uint64_t generation;

@@ -117,6 +117,6 @@ int journal_read_at(int fd, void *bytes, size_t size, uint64_t at);
  * its end, some may be left, and that is logged. */
 void journal_clear(const char *folder, uint64_t keep);
 /* Renames all of them to journal.G.damaged. -errno: the folder could not be listed to its end. */
-int journal_put_aside(const char *folder, struct error *e);
+int journal_keep_damaged(const char *folder, struct error *e);
 
 #endif

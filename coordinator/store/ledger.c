@@ -167,7 +167,7 @@ static int prepare_file(const char *path, int side, struct error *e)
 		return rc;
 	log_event(LOG_SPOOL_FAULT, "text=%s action=\"it is kept as %s.damaged, and restored from %s\"",
 		  log_quote(e->text).text, names[side], names[!side]);
-	rc = ledger_file_put_aside(path, e);
+	rc = ledger_file_keep_damaged(path, e);
 	return rc ? rc : ledger_file_prepare(path, e);
 }
 

@@ -118,7 +118,7 @@ int ledger_file_prepare(const char *path, struct error *e)
 	return rc ? error_prefix(e, rc, "%s", path) : 0;
 }
 
-int ledger_file_put_aside(const char *path, struct error *e)
+int ledger_file_keep_damaged(const char *path, struct error *e)
 {
 	static const char *const ends[] = {"", "-wal", "-shm"};
 	char from[PATH_MOST], to[PATH_MOST];

@@ -11,7 +11,7 @@
  * version; -ENOSPC, -ENOMEM, -EIO. */
 int ledger_file_prepare(const char *path, struct error *e);
 /* Renames it to PATH.damaged, with its WAL. */
-int ledger_file_put_aside(const char *path, struct error *e);
+int ledger_file_keep_damaged(const char *path, struct error *e);
 /* Opens it; *db is to be closed also after an error. */
 int ledger_file_open(const char *path, sqlite3 **db, struct error *e);
 int ledger_file_attach(sqlite3 *db, const char *path, const char *schema, struct error *e);

@@ -3,8 +3,8 @@
  * A job's record as JSON, with a checksum.
  *
  * record_to_json writes everything that is kept of a job, record_from_json reads it back; a missing key, because an
- * older version wrote the file, is zero, unknown or "". Plain fields are generated from the list in record_fields.h,
- * counters from that in coordinator/core/counts.h. The checksum is over the content with sorted keys, so that
+ * older version wrote the file, is zero, unknown or "". Plain fields and counters are generated from the list in
+ * coordinator/core/job_fields.h. The checksum is over the content with sorted keys, so that
  * formatting does not matter.
  *
  * A text that is not UTF-8 is -EINVAL, and the record is not written. A damaged file is -EBADMSG, one of another schema
@@ -23,22 +23,22 @@
 
 enum { SCHEMA = 1 };
 
-#define TEXT(member, size, key, shown, wire, core) {FIELD_TEXT, offsetof(struct job_record, member), size, key, shown},
-#define NUMBER(kind, member, key, shown, wire, core) {FIELD_##kind, offsetof(struct job_record, member), 0, key, shown},
-#define COUNT(member, key, shown, wire, core) {FIELD_u64, offsetof(struct job_record, member), 0, NULL, shown},
-static const struct field fields[] = {RECORD_FIELDS(TEXT, NUMBER, COUNT)};
+#define IN_RECORD(...) {__VA_ARGS__},
+#define IN_VIEW(...)
+#define TEXT(member, size, in, by, key, shown, wire) in(FIELD_TEXT, offsetof(struct job_record, member), size, key)
+#define NUMBER(kind, member, in, by, key, shown, wire) in(FIELD_##kind, offsetof(struct job_record, member), 0, key)
+static const struct field fields[] = {JOB_FIELDS(TEXT, NUMBER, JOB_NO_FIELD, JOB_NO_FIELD)};
+#undef IN_RECORD
+#undef IN_VIEW
 #undef TEXT
 #undef NUMBER
-#undef COUNT
 
 /* Members of the object "counts". */
-#define OTHER(...)
-#define COUNT(member, key, shown, wire, core) {FIELD_u64, offsetof(struct job_record, member), 0, key, NULL},
-#define X(name, key, wire) {FIELD_u64, offsetof(struct job_record, counts.name), 0, key, NULL},
-static const struct field counts[] = {RECORD_FIELDS(OTHER, OTHER, COUNT) JOB_COUNTS(X)};
-#undef OTHER
+#define COUNT(member, by, key, shown, wire) {FIELD_u64, offsetof(struct job_record, member), 0, key},
+#define COUNTER(member, key, wire) {FIELD_u64, offsetof(struct job_record, counts.member), 0, key},
+static const struct field counts[] = {JOB_FIELDS(JOB_NO_FIELD, JOB_NO_FIELD, COUNT, COUNTER)};
 #undef COUNT
-#undef X
+#undef COUNTER
 
 enum { FIELD_COUNT = sizeof fields / sizeof *fields, COUNTS_COUNT = sizeof counts / sizeof *counts };
 
@@ -123,11 +123,6 @@ static void take_strategies(const json_t *o, struct job_record *r)
 		memset(r->mixture, 0, sizeof r->mixture);
 	strategy_from_json(json_object_get(o, "strategies"), &n);
 	memcpy(r->strategy, n.strategy, sizeof r->strategy);
-}
-
-bool record_show(const struct job_record *r, json_t *o)
-{
-	return fields_show(fields, FIELD_COUNT, r, o);
 }
 
 json_t *record_counts(const struct job_record *r)

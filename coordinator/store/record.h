@@ -12,9 +12,8 @@
 #include "common/estimate/stated_error.h"
 #include "common/estimate/strategy.h"
 #include "common/exr/header.h"
-#include "coordinator/core/counts.h"
+#include "coordinator/core/job_fields.h"
 #include "coordinator/store/fields.h"
-#include "coordinator/store/record_fields.h"
 
 #include <jansson.h>
 #include <stdbool.h>
@@ -24,10 +23,14 @@
 enum { RECORD_EFFECTS = 12288 };
 
 struct job_record {
-#define TEXT(member, size, key, shown, wire, core) char member[size];
-#define NUMBER(kind, member, key, shown, wire, core) field_##kind member;
-#define COUNT(member, key, shown, wire, core) uint64_t member;
-	RECORD_FIELDS(TEXT, NUMBER, COUNT)
+#define IN_RECORD(member) member;
+#define IN_VIEW(member)
+#define TEXT(member, size, in, by, key, shown, wire) in(char member[size])
+#define NUMBER(kind, member, in, by, key, shown, wire) in(field_##kind member)
+#define COUNT(member, by, key, shown, wire) uint64_t member;
+	JOB_FIELDS(TEXT, NUMBER, COUNT, JOB_NO_FIELD)
+#undef IN_RECORD
+#undef IN_VIEW
 #undef TEXT
 #undef NUMBER
 #undef COUNT
@@ -50,7 +53,6 @@ void record_begin(struct job_record *r, uint64_t id, const char *name, const cha
 void record_take_error(struct job_record *r, const struct canvas_image *img); /* of an image with an estimate */
 void record_take_effects(struct job_record *r, json_t *list);		      /* takes the reference; NULL: none */
 json_t *record_effects(const struct job_record *r);			      /* an array */
-bool record_show(const struct job_record *r, json_t *o);		      /* its plain fields: fields_show */
 json_t *record_counts(const struct job_record *r);			      /* an object of its counts */
 json_t *record_strategies(const struct job_record *r);			      /* an array: strategy_to_json */
 int record_to_json(const struct job_record *r, char **text,

@@ -20,6 +20,7 @@ grep -qi example "$DIR/out" || fail "--help has no examples"
 code 2 "$A" "$BOX"
 code 2 "$A" "$BOX" -o "$DIR/a.html" --spp 4
 code 2 "$A" "$BOX" -o "$DIR/a.html" --budget soon
+code 2 "$A" "$BOX" -o "$DIR/a.html" --knobs max-depth
 code 2 "$A" "$BOX" -o "$DIR/a.html" --parameters depth --quiet
 grep -q "max-depth, independent" "$DIR/run.log" || fail "it does not say which parameters there are: $(cat "$DIR/run.log")"
 code 1 "$A" "$DIR/none.xml" -o "$DIR/a.html"

@@ -72,7 +72,9 @@ for p in render submit; do
 	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" -i hsl
 	grep -q 'did you mean `hslt`' "$DIR/err.log" || fail "hslt-$p -i hsl says: $(cat "$DIR/err.log")"
 	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --target-error 5
-	grep -q "500 %.*5%" "$DIR/err.log" || fail "hslt-$p --target-error 5 says: $(cat "$DIR/err.log")"
+	grep -q "500 %.*did you mean 5%?" "$DIR/err.log" || fail "hslt-$p --target-error 5 says: $(cat "$DIR/err.log")"
+	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --target-error 150%
+	grep -q "150 %.*did you mean 1.5%?" "$DIR/err.log" || fail "hslt-$p --target-error 150% says: $(cat "$DIR/err.log")"
 	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --mutations independent --integrator pssmlt --mutations 1000
 	grep -q "pssmlt has no strategies" "$DIR/err.log" || fail "hslt-$p says: $(cat "$DIR/err.log")"
 	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --integrator path --mutations hslt=0.9,independent=0.1
@@ -96,10 +98,14 @@ for p in render submit; do
 	grep -q -- '--chains 10: the integrator path has no chains' "$DIR/err.log" || fail "hslt-$p: $(cat "$DIR/err.log")"
 	code 2 "$BIN/hslt-$p" "$BOX" -o ''
 	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --size wide
-	grep -q -- '--size takes W or WxH, such as 640x360' "$DIR/err.log" || fail "hslt-$p --size wide: $(cat "$DIR/err.log")"
+	grep -q -- '--size takes W or WxH, such as 640x360 or 1.5k' "$DIR/err.log" || fail "hslt-$p --size wide: $(cat "$DIR/err.log")"
 	code 0 "$BIN/hslt-$p" --set help
 	grep -q "^tolerance=0.001 " "$DIR/out" || fail "hslt-$p --set help says: $(cat "$DIR/out")"
 done
+code 2 "$BIN/hslt-job" extend j1 --target-error 150%
+grep -q "150 %.*did you mean 1.5%?" "$DIR/err.log" || fail "hslt-job extend --target-error 150% says: $(cat "$DIR/err.log")"
+code 2 "$BIN/hslt-accuracy" "$BOX" -o "$DIR/a.html" --target-error 150%
+grep -q "150 %.*did you mean 1.5%?" "$DIR/err.log" || fail "hslt-accuracy --target-error 150% says: $(cat "$DIR/err.log")"
 code 1 "$BIN/hslt-job" fetch j1
 grep -q '^hslt-job: j1: no such job$' "$DIR/err.log" || fail "hslt-job fetch j1 says: $(cat "$DIR/err.log")"
 code 1 "$BIN/hslt-status" j99
@@ -120,6 +126,7 @@ id=$(submit "$BOX" -o "$DIR/cancelled.exr" --integrator path --spp 1000000)
 start_worker w1
 until_true 10 is_state "$id" running || fail "$id does not run"
 code 0 "$BIN/hslt-job" cancel "$id"
+grep -qx "$id is cancelled" "$DIR/out" || fail "hslt-job cancel says: $(cat "$DIR/out")"
 until_true 5 is_state "$id" cancelled || fail "$id is not cancelled"
 code 1 "$BIN/hslt-job" fetch "$id"
 
@@ -135,7 +142,7 @@ wait $waiter || got=$?
 
 code 0 "$BIN/hslt-render" "$BOX" -o "$DIR/only.exr" --size 16x16 --target-error 100% # the pilot chooses, too
 code 4 "$BIN/hslt-submit" "$BOX" -o "$DIR/bound.exr" --integrator path --spp 16 --target-error 0.01% --wait
-code 0 "$BIN/hslt-submit" "$BOX" -o "$DIR/reached.exr" --integrator path --spp 64 --target-error 500% --wait --json
+code 0 "$BIN/hslt-submit" "$BOX" -o "$DIR/reached.exr" --integrator path --spp 64 --target-error 100% --wait --json
 grep -q '"id":"j4".*"state":"done"' "$DIR/out" || fail "--json: $(cat "$DIR/out")"
 [ -s "$DIR/reached.exr" ] || fail "no image"
 
@@ -144,6 +151,7 @@ stop $COORDINATOR_PID
 LISTEN=$COORDINATOR
 start_coordinator
 code 0 "$BIN/hslt-job" fetch j4 -o "$DIR/again.exr"
+grep -qx "j4: image in $DIR/again.exr" "$DIR/err.log" || fail "hslt-job fetch says: $(cat "$DIR/err.log")"
 cmp "$DIR/reached.exr" "$DIR/again.exr" || fail "another result after a restart"
 code 0 "$BIN/hslt-job" log j4
 untold 1 "$BIN/hslt-job" log j4
@@ -153,6 +161,8 @@ untold 1 "$BIN/hslt-status"
 untold 1 "$BIN/hslt-status" --json
 untold 1 "$BIN/hslt-status" --watch
 grep -q event=job_done "$DIR/out" || fail "the log has no end"
+code 0 "$BIN/hslt-job" extend j4 --spp +8
+grep -q "^j4 continues after [0-9]* rounds*, until [0-9]* are done" "$DIR/out" || fail "hslt-job extend says: $(cat "$DIR/out")"
 id=$(submit "$BOX" -o "$DIR/next.exr" --integrator path --spp 4 -D light=3)
 [ "$id" = j5 ] || fail "the next job is $id"
 until_true 20 is_state j5 done || fail "the worker did not come back: j5 is $(value j5 state)"
@@ -175,4 +185,10 @@ id=$(cat "$DIR/out")
 grep -q "/dev/full: No space left on device. The image stays on the farm: hslt-job fetch $id -o FILE" "$DIR/err.log" ||
 	fail "a full disk: $(tail -n 1 "$DIR/err.log")"
 code 0 "$BIN/hslt-job" fetch "$id" -o "$DIR/later.exr"
+# A job for stdout has no name for its image.
+code 0 "$BIN/hslt-submit" "$BOX" -o - --integrator path --spp 1 --wait
+id=$(grep -x 'j[0-9]*' "$DIR/err.log")
+until_true 20 is_state "$id" done || fail "$id is $(value "$id" state)"
+(cd "$DIR/homeless" && code 1 "$BIN/hslt-job" fetch "$id") || exit 1
+grep -q 'give one with -o FILE' "$DIR/err.log" && [ -z "$(ls -A "$DIR/homeless")" ] || fail "fetch of a job for stdout: $(cat "$DIR/err.log")"
 echo "exit codes and restart"

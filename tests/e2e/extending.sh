@@ -123,14 +123,19 @@ echo '    Echo echo = 60;' | inserted proto/farm.proto ' Control control = '
 echo 'message Echo { string text = 1; }' | added proto/farm.proto
 {
 	echo '	case FARM__ENVELOPE__BODY_ECHO:'
-	echo '		client_send_done(p, m->echo->text);'
+	echo '		client_send_done(p, NULL, m->echo->text);'
 	echo '		break;'
 } | inserted coordinator/peers/client.c 'switch (m->body_case) {'
 
 # A counter of a job: a line of the list, its number in stored messages, and where it counts.
-printf '	X(unique, "unique", NOWHERE) \\\n' | inserted coordinator/core/counts.h '#define JOB_COUNTS(X)'
+printf '	COUNTER(unique, "unique", NOWHERE) \\\n' | inserted coordinator/core/job_fields.h '#define JOB_FIELDS('
 echo '  uint64 unique = 99;' | inserted proto/stored.proto '^message Counts'
 echo '		j->counts.unique += v == REPEAT;' | inserted coordinator/core/answer.c 'j->counts.repeats +='
+
+# A field of a job: a line of the list, where the core computes it, and its number in messages to clients.
+printf '	NUMBER(u32, slots, IN_RECORD, BY_CORE, "slots", "slots", AT(slots)) \\\n' | inserted coordinator/core/job_fields.h '#define JOB_FIELDS('
+echo '		.slots = j->plan.groups * j->plan.parts,' | inserted coordinator/core/status.c '\.priority = j->priority'
+echo '  uint32 slots = 99;' | inserted proto/farm.proto '^message JobStatus'
 
 # lines KIND FILES LINES PATHS...: existing files that differ, and their new lines
 lines() {
@@ -147,9 +152,9 @@ lines "a mutation" 1 1 worker/render/mutation
 lines "an option" 1 2 coordinator/ctl
 (cd "$DIR" && diff -rqx build before/worker/render tree/worker/render | grep -c '^Only in tree') >"$DIR/new" || :
 [ "$(cat "$DIR/new")" = 3 ] || fail "$(cat "$DIR/new") new files, not 3"
-lines "a counter, in the coordinator" 2 2 coordinator/core
+lines "a counter and a field of a job, in the coordinator" 3 4 coordinator/core
 lines "a message, in the coordinator" 1 3 coordinator/peers
-lines "a message, on the wire" 1 2 proto/farm.proto
+lines "a message and a field, on the wire" 1 3 proto/farm.proto
 lines "a counter, in stored messages" 1 1 proto/stored.proto
 
 # Without optimisation: what is compiled anew has to run, not to be fast.
@@ -171,17 +176,20 @@ grep -q '"again"' "$DIR/new.json" || fail "the mutation is not counted"
 start_coordinator
 start_worker w1
 job=$("$BIN/hslt-submit" "$BOX" -o "$DIR/box.exr" --integrator path --size 16x16 --spp 1 --wait 2>"$DIR/submit.log") || fail "$(tail -n 1 "$DIR/submit.log")"
-"$BIN/hslt-status" --json "$job" | grep -q '"unique": *0' || fail "the counter is not in the status"
-PYTHONPATH=$HERE/faults "$PYTHON" - "${COORDINATOR#*:}" <<'TEXT' || fail "the message has no answer"
+"$BIN/hslt-status" --json "$job" >"$DIR/status.json"
+grep -q '"unique": *0' "$DIR/status.json" || fail "the counter is not in the status"
+slots=$(sed -n 's/.*"slots": *\([1-9][0-9]*\).*/\1/p' "$DIR/status.json")
+[ "$slots" ] || fail "the field is not in the status of a job that has ended"
+PYTHONPATH=$HERE/faults "$PYTHON" - "${COORDINATOR#*:}" "$slots" <<'TEXT' || fail "the message has no answer, or the field is not on the wire"
 import socket, sys
 from wire import field, frame, hello
 with socket.create_connection(("127.0.0.1", int(sys.argv[1])), 60) as s:
-    s.sendall(hello(2, b"echo") + frame(field(60, field(1, b"hello there"))))
+    s.sendall(hello(2, b"echo") + frame(field(60, field(1, b"hello there"))) + frame(field(42, b"")))
     got = b""
-    while b"hello there" not in got:
+    while b"hello there" not in got or field(99, int(sys.argv[2])) not in got:
         more = s.recv(4096)
         if not more:
             sys.exit("the coordinator hung up: %r" % got)
         got += more
 TEXT
-echo "a BSDF, a shape, a mutation, an option, a message and a counter cost what is said"
+echo "a BSDF, a shape, a mutation, an option, a message, a counter and a field cost what is said"

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A client with a good certificate and bad manners: intruder.py PORT FOLDER ANOTHER'S prints one line an attempt, "WHAT|ANSWER", and
 fails when one of them is not disconnected or refused within a minute. With a worker at the coordinator: also scenes that reach
-for what is not in their bundle, submitted by hand so that no program of ours looks at them before."""
+for what is not among their files, submitted by hand so that no program of ours looks at them before."""
 import hashlib, os, re, socket, ssl, struct, sys, time
 
 sys.dont_write_bytecode = True
@@ -41,7 +41,7 @@ def say(s, words, until):
 
 def ask(words):
     with call(60) as s:
-        return say(s, words, b"bundle")
+        return say(s, words, b"scene")
 
 
 def submit(*names, scene=None):
@@ -73,9 +73,9 @@ def mesh(name):
 
 def smuggle(scene, files=(), sentence=b""):
     """Submits scene and files (name, content) by hand; all that is said until the job has failed."""
-    bundle = [(b"box.xml", scene), (b"meshes/wedge.obj", wedge), *files]
-    hashed = {hashlib.sha256(c).digest(): c for _, c in bundle}
-    named = b"".join(field(8, field(1, n) + field(2, hashlib.sha256(c).digest()) + field(3, len(c))) for n, c in bundle)
+    sent = [(b"box.xml", scene), (b"meshes/wedge.obj", wedge), *files]
+    hashed = {hashlib.sha256(c).digest(): c for _, c in sent}
+    named = b"".join(field(8, field(1, n) + field(2, hashlib.sha256(c).digest()) + field(3, len(c))) for n, c in sent)
     words = hello + frame(field(40, field(1, b"smuggled") + field(2, b"box.xml") + field(6, plan) + named))
     for h, c in hashed.items():
         if h in known:
@@ -123,10 +123,10 @@ attempts = [
     ("path tricks: control characters", hello + submit(b"a\nb", scene=b"a"), b"no valid name"),
     ("path tricks: no UTF-8", hello + submit(b"a", b"\xc0\xae\xc0\xae/b"), b""),
     ("path tricks: a name of 2,000 bytes", hello + submit(b"a", b"x" * 2000), b"no valid name"),
-    ("no proper bundle: two files of one name", hello + submit(b"a", b"b", b"a"), b"two files of that name"),
-    ("no proper bundle: a scene of another case than its file", hello + submit(b"A.xml", scene=b"a.xml"), b"not in the bundle"),
-    ("no proper bundle: 10,001 files", hello + submit(*[b"%d" % i for i in range(10001)]), b"files, not 10001"),
-    ("no proper bundle: 10^6 files", hello + submit(*[b"%d" % i for i in range(10 ** 6)]), b""),
+    ("invalid scene files: two files of one name", hello + submit(b"a", b"b", b"a"), b"two files of that name"),
+    ("invalid scene files: a scene of another case than its file", hello + submit(b"A.xml", scene=b"a.xml"), b"not among the scene's files"),
+    ("invalid scene files: 10,001 files", hello + submit(*[b"%d" % i for i in range(10001)]), b"files, not 10001"),
+    ("invalid scene files: 10^6 files", hello + submit(*[b"%d" % i for i in range(10 ** 6)]), b""),
 ]
 # Files that a worker could open, if names led anywhere: by their whole name, and from where it was started.
 at = os.getcwd().encode()
@@ -149,7 +149,7 @@ scenes = [
     unsent("a scene sent past the client: names a file by its whole name", at + b"/beside.obj"),
     unsent("a scene sent past the client: names a file where the worker was started", b"LICENSE"),
     unsent("a scene sent past the client: names a pipe", at + b"/pipe.obj"),
-    ("a scene sent past the client: names a file of its bundle in another case", mesh(b"A.obj"), ((b"a.obj", b"v 0 0 0\n"),),
+    ("a scene sent past the client: names one of its files in another case", mesh(b"A.obj"), ((b"a.obj", b"v 0 0 0\n"),),
      b"A.obj: the file was not sent with the job"),
     unsent("a scene sent past the client: names another job's file by its hash", hashlib.sha256(here_box).hexdigest().encode()),
     ("a scene sent past the client: includes /etc/passwd", box(b'<include filename="/etc/passwd"/>'), (), b"/etc/passwd: the file was not sent"),

@@ -98,11 +98,40 @@ cat "$TREE"/README.md "$TREE"/docs/*.md "$TREE"/deploy/*.md "$TREE"/worker/rende
 wrong=$(grep -vxFf "$DIR/all" "$DIR/mentioned" || :)
 [ -z "$wrong" ] || fail "the documents mention options that no program has: $wrong"
 
-# answered NAME COMMAND...: a usage error whose answer is that name
+# Numbers with units, in each program: counts, sizes of films, times, sizes in bytes.
+picture() {
+	code 0 "$BIN/hslt-render" "$BOX" -o "$DIR/units.exr" -i path --quiet --bootstrap .25k --seed 1k "$@"
+}
+picture --size .04kx.03k --crop 0,0,.02k,.01k --spp .004k --time 1h
+code 0 "$BIN/hslt-tonemap" "$DIR/units.exr" "$DIR/units.png" && [ "$(od -An -tx1 -j16 -N8 "$DIR/units.png" | tr -d ' ')" = 000000140000000a ] ||
+	fail "--crop 0,0,.02k,.01k gives $(od -An -tx1 -j16 -N8 "$DIR/units.png")"
+picture --size .04k --mutations 1.2k # 40x33: the aspect of 48x40
+code 0 "$BIN/hslt-tonemap" "$DIR/units.exr" "$DIR/units.png" && [ "$(od -An -tx1 -j16 -N8 "$DIR/units.png" | tr -d ' ')" = 0000002800000021 ] ||
+	fail "--size .04k gives $(od -An -tx1 -j16 -N8 "$DIR/units.png")"
+code 2 "$BIN/hslt-render" "$BOX" -o "$DIR/a.exr" --size 1.0001kx2
+code 0 "$BIN/hslt-compare" "$DIR/units.exr" "$DIR/units.exr" --size .02kx.011k --trim 0.1%
+HSLT_CA=$DIR/units.ca code 0 "$BIN/hslt-ca" init --days 36h
+# These end before they do anything, at the last option.
+code 2 "$BIN/hslt-coordinator" --spool "$DIR/none" --blobs 20G --journal 64MB --film-memory 2g --keep-films 500M --keep-days 36h \
+	--keep-gb 1.5T --worker-bandwidth 500k --quota-jobs 1k --quota-assets 10G --quota-film 2G --quota-mutations 1.5G --heartbeat 1m \
+	--tls-check 5m --connections 2k --max-faults .1k --stop
+grep -q "unknown option '--stop'" "$DIR/err.log" || fail "units of hslt-coordinator: $(cat "$DIR/err.log")"
+code 2 "$BIN/hslt-worker" --threads .002k --cache-size 500M --grace 1m --idle-exit 2h --stall 5m --stop
+grep -q "unknown option '--stop'" "$DIR/err.log" || fail "units of hslt-worker: $(cat "$DIR/err.log")"
+code 2 "$BIN/hslt-accuracy" --budget 2h --seconds 1.5m --rounds .1k --stop
+grep -q "unknown option '--stop'" "$DIR/err.log" || fail "units of hslt-accuracy: $(cat "$DIR/err.log")"
+code 2 "$BIN/hslt-job" extend j1 --spp +1.5k --mutations +2M --time +5m --stop
+grep -q "unknown option '--stop'" "$DIR/err.log" || fail "units of hslt-job: $(cat "$DIR/err.log")"
+code 2 "$BIN/hslt-submit" --patience 5m --pilot 1m --chains 1k --groups .016k --parts .004k --epoch 1k --bootstrap 1M --min-depth .002k --stop
+grep -q "unknown option '--stop'" "$DIR/err.log" || fail "units of hslt-submit: $(cat "$DIR/err.log")"
+
+# answered NAME COMMAND...: an error whose answer is that name
 answered() {
 	meant=$1
 	shift
-	code 2 "$@"
+	got=0
+	"$@" >"$DIR/out" 2>"$DIR/err.log" || got=$?
+	[ $got = 1 ] || [ $got = 2 ] || fail "$* ended with $got"
 	grep -q "; did you mean [\`']$meant[\`']?" "$DIR/err.log" || fail "$*: $(cat "$DIR/err.log")"
 }
 answered --exposure "$BIN/hslt-tonemap" --exposrue 1 a.exr b.png
@@ -113,5 +142,21 @@ answered bidirectional "$BIN/hslt-render" "$BOX" -o "$DIR/a.exr" --mutations bid
 answered dispersion "$BIN/hslt-render" "$BOX" -o "$DIR/a.exr" --effects -disperson
 answered '+dispersion` or `-dispersion' "$BIN/hslt-render" "$BOX" -o "$DIR/a.exr" --effects disperson
 answered tolerance "$BIN/hslt-accuracy" "$BOX" -o "$DIR/a.html" --parameters tolerence
+render="$BIN/hslt-render $BOX -o $DIR/a.exr"
+answered double $render --set precision=doubel
+answered spectral $render --set colour=spectrl
+answered place $render --set emitter-choice=plcae
+answered auto $render --set backs=atuo
+answered shown $render --set media=shwon
+answered yes $render --set lenient=yse
+answered help $render --set hepl
+answered precision $render --set precison
+answered all $render --effects al
+answered hslt $render --integrator hstl
+answered '.png' "$BIN/hslt-render" "$BOX" --estimate --pilot 1 --plot "$DIR/cost.pgn"
+answered precision "$BIN/hslt-accuracy" "$BOX" -o "$DIR/a.html" --parameters precison
+answered box.xml "$BIN/hslt-scene" show "${BOX%box.xml}bxo.xml"
+HSLT_CA=$DIR/units.ca code 0 "$BIN/hslt-ca" worker node1
+HSLT_CA=$DIR/units.ca answered node1 "$BIN/hslt-ca" revoke ndoe1
 answered --stall "$BIN/hslt-worker" --stal1 5
 echo "options of $(echo $PROGRAMS | wc -w) programs: help, manual pages, completions"

@@ -34,6 +34,28 @@ grep -q "^$DIR/bad.xml: 6 problems" "$DIR/out" || fail "it does not sum up: $(ta
 code 1 "$BIN/hslt-render" "$DIR/bad.xml" -o "$DIR/bad.exr"
 grep -q "bad.xml:3.*and 5 more: hslt-scene check lists them" "$DIR/err.log" || fail "a render says: $(cat "$DIR/err.log")"
 
+sed 's|<integer name="rr_depth" value="5"/>|<boolean name="hide_emitters" value="ture"/>|' "$DIR/bad.xml" >"$DIR/ture.xml"
+code 1 "$BIN/hslt-scene" check "$DIR/ture.xml"
+grep -q '`ture` is neither true nor false; did you mean `true`?' "$DIR/out" || fail "of ture it says: $(cat "$DIR/out")"
+
+# Instances are those of the file, also where copies of their meshes are faster; an instance of two shapes is one.
+cat >"$DIR/small.xml" <<'XML'
+<scene version="3.0.0"><sensor type="perspective"/><emitter type="constant"/>
+<shape type="shapegroup" id="g"><shape type="cube"/><shape type="rectangle"/></shape>
+<shape type="instance"><ref id="g"/></shape>
+<shape type="instance"><ref id="g"/><transform name="to_world"><translate x="3"/></transform></shape>
+<shape type="instance"><ref id="g"/><transform name="to_world"><translate x="6"/></transform></shape>
+</scene>
+XML
+code 0 "$BIN/hslt-scene" show --json "$DIR/small.xml"
+grep -q '"shapes":6,.*"instances":3,"sharingShapes":0,"sharedMeshes":0,' "$DIR/out" || fail "three instances: $(cat "$DIR/out")"
+code 0 "$BIN/hslt-scene" show "$DIR/small.xml"
+grep -q '^6 shapes (3 instances), 42 triangles, ' "$DIR/out" || fail "three instances: $(cat "$DIR/out")"
+awk 'BEGIN { for (i = 0; i < 9; i++) print "v", i % 3, int(i / 3), i % 2; for (i = 0; i < 40; i++) { a = i % 2 + 3 * int(i / 2 % 2) + 1; print "f", a, a + 1, a + 3 } }' >"$DIR/many.obj"
+sed 's|<shape type="cube"/>|<shape type="obj"><string name="filename" value="many.obj"/></shape>|' "$DIR/small.xml" >"$DIR/large.xml"
+code 0 "$BIN/hslt-scene" show "$DIR/large.xml"
+grep -q '^6 shapes (3 instances; 3 share 1 mesh), 126 triangles (46 in memory), ' "$DIR/out" || fail "instances that share: $(cat "$DIR/out")"
+
 # In the order of lines, files that are not there among them.
 cat >"$DIR/order.xml" <<'XML'
 <scene version="3.0.0"><integrator type="path"/>

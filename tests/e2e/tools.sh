@@ -64,6 +64,19 @@ printf x | code 1 "$BIN/hslt-tonemap" - piped.png
 "$BIN/hslt-assemble" a.exr -o - 2>err.log >whole.exr && code 0 "$BIN/hslt-tonemap" whole.exr piped.png && cmp piped.png dash.png ||
 	fail "assemble -o -: $(cat err.log)"
 rm dash.png piped.png
+# and is called so
+for c in "hslt-render box.xml -o - -i path --spp 1 --size 8x8 --quiet" "hslt-tonemap a.exr -" "hslt-assemble a.exr -o -"; do
+	! "$BIN/"$c >/dev/full 2>err.log || fail "$c: a full disk holds it"
+	grep -q ': stdout: .*No space left' err.log && ! grep -q /dev/stdout err.log || fail "$c on a full disk: $(cat err.log)"
+done
+code 0 "$BIN/hslt-render" box.xml -o dash.exr -i path --spp 1 --size 8x8 --quiet --stats - && grep -q '"schema"' out && [ ! -e - ] ||
+	fail "--stats -: $(cat out)"
+code 1 "$BIN/hslt-render" box.xml -o - -i path --spp 1 --size 8x8 --quiet --stats -
+grep -q 'are the same file, stdout' err.log || fail "-o - --stats -: $(cat err.log)"
+code 0 "$BIN/hslt-accuracy" box.xml -o - --parameters tolerance --rounds 2 --size 8x8 --epoch 1 --quiet && grep -qi '^<!doctype html' out && [ ! -e - ] ||
+	fail "hslt-accuracy -o -: $(head -n 3 out)"
+code 2 "$BIN/hslt-compare" a.exr again.exr --heatmap -
+rm dash.exr
 # What is no regular file is written to and stays; of a link the file that it leads to is replaced.
 code 0 "$BIN/hslt-tonemap" a.exr b.png --exposure -1
 "$BIN/hslt-tonemap" a.exr /dev/stdout --exposure -1 2>err.log | cmp - b.png || fail "/dev/stdout: $(cat err.log)"

@@ -19,6 +19,14 @@ done
 is_state "$low" held || fail "$low is $(value "$low" state)"
 high=$(submit "$BOX" -o "$DIR/high.exr" $HIGH)
 "$BIN/hslt-job" fetch "$low" --preview -o "$DIR/preview.exr" || fail "no preview"
+"$BIN/hslt-job" fetch "$low" --preview -o "$DIR/low.exr" 2>"$DIR/fetch.log" && [ ! -e "$DIR/low.exr" ] && [ -s "$DIR/low.preview.exr" ] ||
+	fail "a preview takes the name of the image"
+grep -qx "$low: preview, the image so far, in $DIR/low.preview.exr; $DIR/low.exr is for the final image" "$DIR/fetch.log" ||
+	fail "a preview under the name of the image: $(cat "$DIR/fetch.log")"
+"$BIN/hslt-job" fetch "$low" --preview -o - 2>"$DIR/fetch.log" | head -c 4 | od -An -tx1 | grep -q '76 2f 31 01' || fail "no preview on stdout"
+grep -qx "$low: preview, the image so far, in stdout" "$DIR/fetch.log" || fail "a preview on stdout: $(cat "$DIR/fetch.log")"
+! "$BIN/hslt-job" fetch "$low" --preview -o - >/dev/full 2>"$DIR/fetch.log" || fail "a full disk holds a preview"
+grep -qx "hslt-job: stdout: No space left on device" "$DIR/fetch.log" || fail "stdout is called: $(cat "$DIR/fetch.log")"
 head -c 4 "$DIR/preview.exr" | od -An -tx1 | grep -q '76 2f 31 01' || fail "the preview is no EXR"
 "$BIN/hslt-job" release "$low" 2>>"$DIR/hold.log" || fail "$low is $(value "$low" state)"
 until_true 20 is_state "$high" done || fail "$high is $(value "$high" state)"

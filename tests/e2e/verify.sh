@@ -55,7 +55,8 @@ until_true 10 grep -q 'is quarantined and gets no work' "$DIR/saint.log" || fail
 kill -9 $COORDINATOR_PID
 wait $COORDINATOR_PID 2>/dev/null || :
 LISTEN=$COORDINATOR
-start_coordinator --verify 0.5
+start_coordinator --verify 0.5 --forgive lair
+says "$DIR/coordinator.log" 'event=worker_not_forgiven name="lair" text="nobody of that name is quarantined; did you mean `liar`?"'
 is_quarantined liar || fail "a restart made an honest worker of it"
 until_true 10 sh -c "[ \$(grep -c 'is quarantined and gets no work' '$DIR/saint.log') -ge 2 ]" || fail "it is trusted after a restart"
 id=$(submit "$BOX" -o "$DIR/half.exr" $JOB --wait)

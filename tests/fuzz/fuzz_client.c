@@ -112,12 +112,12 @@ static void list(struct client *cl)
 static void submit(struct client *cl)
 {
 	static char folder_name[] = "/dev/null", name[] = "s.xml";
-	struct scene_bundle_file file = {.name = name, .size = strlen(farm_scene)};
-	struct scene_bundle b = {.folder = folder_name,
-				 .folders = asset_folders_of(folder_name, NULL, 0),
-				 .scene = name,
-				 .count = 1,
-				 .files = &file};
+	struct scene_file file = {.name = name, .size = strlen(farm_scene)};
+	struct scene_files b = {.folder = folder_name,
+				.folders = asset_folders_of(folder_name, NULL, 0),
+				.scene = name,
+				.count = 1,
+				.list = &file};
 	struct render_arguments args = {0};
 	struct submit_request r = {.name = "n", .output = "", .args = &args};
 	char text[PLAN_TEXT];

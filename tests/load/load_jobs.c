@@ -36,12 +36,12 @@ void load_submit(struct load *l, const char *host_port, const char *tls, unsigne
 {
 	static struct render_arguments args;
 	char folder[] = "tests/load", scene[] = "load.xml", text[PLAN_TEXT], name[32];
-	struct scene_bundle_file file = {.name = scene};
-	struct scene_bundle bundle = {.folder = folder,
-				      .folders = asset_folders_of(folder, NULL, 0),
-				      .scene = scene,
-				      .count = 1,
-				      .files = &file};
+	struct scene_file file = {.name = scene};
+	struct scene_files files = {.folder = folder,
+				    .folders = asset_folders_of(folder, NULL, 0),
+				    .scene = scene,
+				    .count = 1,
+				    .list = &file};
 	struct submit_request request = {.name = name, .output = "", .args = &args};
 	struct load_job *j = &l->jobs[index];
 	struct asset_source assets = asset_folder(folder);
@@ -51,7 +51,7 @@ void load_submit(struct load *l, const char *host_port, const char *tls, unsigne
 	struct error e;
 	snprintf(name, sizeof name, "load %u", index);
 	args.plan = request_of(&l->s, index);
-	bundle.summary.brightest = 1;
+	files.summary.brightest = 1;
 	int rc = plan_make(&args.plan, &j->plan, &e);
 	if (!rc)
 		rc = assets.open(assets.user, scene, &a, &e);
@@ -64,7 +64,7 @@ void load_submit(struct load *l, const char *host_port, const char *tls, unsigne
 		rc = client_open(&cl, host_port, tls, l->s.insecure, "load", &e);
 	if (rc)
 		load_die("%s", e.text);
-	rc = submit_send(cl, &request, &bundle, &job, text, sizeof text, &e);
+	rc = submit_send(cl, &request, &files, &job, text, sizeof text, &e);
 	client_close(cl);
 	j->id = job.job;
 	j->acknowledged = mem_alloc((size_t)j->plan.groups * j->plan.parts, sizeof *j->acknowledged);

@@ -125,7 +125,7 @@ static void ask_file(struct load_worker *w, const Farm__File *f)
 	send_message(w, &m, FARM__ENVELOPE__BODY_BLOB_GET);
 }
 
-/* The bundles are one small file each. */
+/* The scenes are one small file each. */
 static void take_job(struct load_worker *w, const Farm__JobInfo *info)
 {
 	struct load *l = w->load;

@@ -78,11 +78,15 @@ void node_add_transform(struct arena *a, struct scene_node *n, const char *name,
 /* A BSDF and its parts, which the first of these characters separates, and theirs the next. */
 static struct scene_node *nested_node(struct arena *a, char *text, const char *separators);
 
-/* " diffuse", or " texture checkerboard", or " texture scale texture checkerboard", or a BSDF with parts. */
+/* " diffuse", or " texture checkerboard", or " texture scale texture checkerboard", or " phase hg", or a BSDF with
+ * parts. */
 static struct scene_node *node_of_part(struct arena *a, char *text, const char *separators)
 {
 	if (*separators && strchr(text, *separators))
 		return nested_node(a, text, separators);
+	char *phase = strstr(text, "phase ");
+	if (phase)
+		return node_make(a, PLUGIN_PHASE, phase + strlen("phase "));
 	char *first = strstr(text, "texture "), *second = first ? strstr(first + 1, " texture ") : NULL;
 	if (!first)
 		return node_make(a, PLUGIN_BSDF, text);

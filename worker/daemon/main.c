@@ -16,7 +16,7 @@ static const struct option_row rows[] = {
 	{"threads", 't', "N", "Render threads (all cores)", OPTION_COUNT(CONFIG, threads, 1, 1024)},
 	{"name", 0, "NAME", "Displayed name of the worker (host and process)", OPTION_NAME(CONFIG, name, 127)},
 	{"cache", 0, "DIR", "Folder of cached scene files (~/.cache/hslt)", OPTION_TEXT(CONFIG, cache)},
-	{"cache-size", 0, "GB", "Limit of the cache", OPTION_SCALED(CONFIG, cache_bytes, 0.001, 1e6, 1e9),
+	{"cache-size", 0, "GB", "Limit of the cache", OPTION_SIZE(CONFIG, cache_bytes, 0.001, 1e6, 1e9),
 	 .standard = "20"},
 	{"grace", 0, "SECONDS", "After SIGTERM", OPTION_SECONDS(CONFIG, grace_seconds, 0, 86400), .standard = "20"},
 	{"idle-exit", 0, "SECONDS", "Exit after this long without a lease; 0: never",
@@ -42,7 +42,8 @@ static const struct program program = {
 		   "is returned as failed, as are leases that wait for a scene whose building makes no progress, "
 		   "and the worker exits, to be restarted. Rendering runs in a separate process: if a signal ends it "
 		   "(a fault caused by a scene, lack of memory), the lease is returned as failed and the process is "
-		   "restarted. Under systemd it reports when it is ready and feeds the watchdog.",
+		   "restarted. Under systemd it reports when it is ready and feeds the watchdog.\n"
+		   "The size of the cache is also written 500M, 20G or 2T, times 90s, 5m, 2h or 3d.",
 	.exits =
 		"0 stopped, 1 failed, 2 usage, 6 refused permanently (a certificate of another role, another version), "
 		"75 a thread hung",

@@ -11,7 +11,8 @@
 static const char *nearest(const char *wanted)
 {
 	static const char *const names[] = {"roughdielectric", "dielectric", "diffuse", "conductor", "roughconductor"};
-	struct spelling s = {.wanted = wanted};
+	static struct spelling s;
+	s = (struct spelling){.wanted = wanted};
 	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
 		spelling_offer(&s, names[i]);
 	return s.best ? s.best : "";
@@ -26,6 +27,18 @@ static void test_nearest(void **state)
 	assert_string_equal(nearest("rough_dielectric"), "roughdielectric");
 	assert_string_equal(nearest("subsurface"), "");
 	assert_string_equal(nearest(""), "");
+}
+
+/* An offered name may be gone afterwards, as those of a folder are. */
+static void test_copy(void **state)
+{
+	(void)state;
+	char name[] = "room.xml";
+	struct spelling s = {.wanted = "rom.xml"};
+	spelling_offer(&s, name);
+	memset(name, 'x', sizeof name - 1);
+	spelling_offer(&s, name);
+	assert_string_equal(s.best, "room.xml");
 }
 
 static void test_list(void **state)
@@ -44,6 +57,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_nearest),
+		cmocka_unit_test(test_copy),
 		cmocka_unit_test(test_list),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

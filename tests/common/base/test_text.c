@@ -201,20 +201,62 @@ static void test_times_with_units(void **state)
 	static const char *const bad[] = {"", "m", "5 m", "5min", "-5", "5M", "1e999", "nan", "inf", "5mm"};
 	double x;
 	for (size_t i = 0; i < sizeof good / sizeof *good; i++)
-		if (!text_seconds(good[i].text, &x) || x != good[i].seconds)
+		if (!text_time(good[i].text, 1, &x) || x != good[i].seconds)
 			fail_msg("'%s' is read as %g", good[i].text, x);
 	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
-		if (text_seconds(bad[i], &x))
+		if (text_time(bad[i], 1, &x))
 			fail_msg("'%s' is taken for %g s", bad[i], x);
+	assert_true(text_time("1.5", 86400, &x) && x == 129600);
+	assert_true(text_time("2h", 86400, &x) && x == 7200);
+	assert_false(text_time("1e308", 86400, &x));
+}
+
+static void test_sizes_with_units(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *text;
+		double bytes;
+	} good[] = {{"64", 64e6},   {"0.5", 5e5},  {"500k", 5e5},   {"64M", 64e6},
+		    {"64MB", 64e6}, {"20G", 2e10}, {"1.5g", 1.5e9}, {"2TB", 2e12}};
+	static const char *const bad[] = {"", "M", "5 M", "5GiB", "-5", "5B", "5MBB", "1e307T", "nan", "0x5M"};
+	double x;
+	for (size_t i = 0; i < sizeof good / sizeof *good; i++)
+		if (!text_bytes(good[i].text, 1e6, &x) || x != good[i].bytes)
+			fail_msg("'%s' is read as %g", good[i].text, x);
+	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+		if (text_bytes(bad[i], 1e6, &x))
+			fail_msg("'%s' is taken for %g bytes", bad[i], x);
+}
+
+static void test_lists_of_counts(void **state)
+{
+	(void)state;
+	uint32_t n[4];
+	static const char *const bad[] = {"",	   "1k",   "1kx",  "x1k",  "1.0001kx2",
+					  "1x2x3", "1x2 ", "-1x2", "5Gx1", "00000000000000000000000000000000001x2"};
+	assert_true(text_counts("1k", "x", n, 1) && n[0] == 1000);
+	assert_true(text_counts("1.5kx720", "x", n, 2) && n[0] == 1500 && n[1] == 720);
+	assert_true(text_counts("0,1k,320,.5k", ",,,", n, 4) && n[0] == 0 && n[1] == 1000 && n[2] == 320 &&
+		    n[3] == 500);
+	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+		if (text_counts(bad[i], "x", n, 2))
+			fail_msg("'%s' is taken for %u and %u", bad[i], n[0], n[1]);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_counts_with_units),	    cmocka_unit_test(test_times_with_units),
-		cmocka_unit_test(buffers_keep_their_limit),	    cmocka_unit_test(texts_become_lines),
-		cmocka_unit_test(texts_are_cut_between_characters), cmocka_unit_test(texts_are_made_clean),
-		cmocka_unit_test(values_cannot_forge_a_line),	    cmocka_unit_test(figures_read_well),
+		cmocka_unit_test(test_counts_with_units),
+		cmocka_unit_test(test_times_with_units),
+		cmocka_unit_test(test_sizes_with_units),
+		cmocka_unit_test(test_lists_of_counts),
+		cmocka_unit_test(buffers_keep_their_limit),
+		cmocka_unit_test(texts_become_lines),
+		cmocka_unit_test(texts_are_cut_between_characters),
+		cmocka_unit_test(texts_are_made_clean),
+		cmocka_unit_test(values_cannot_forge_a_line),
+		cmocka_unit_test(figures_read_well),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -221,14 +221,14 @@ static void damaged_at_rest(void **state)
 	static const char text[] = "bytes that are to stay as they are";
 	struct blob_store *s;
 	struct error e;
-	char path[4096], aside[300], hex[BLOB_HEX_SIZE];
+	char path[4096], damaged[300], hex[BLOB_HEX_SIZE];
 	uint64_t size;
 	assert_int_equal(blob_store_open(&s, folder, 1000, &e), 0);
 	struct blob_hash h = blob_text_store(s, text), other;
 	assert_int_equal(blob_hash_bytes("x", 1, &other, &e), 0);
 	blob_path(s, &h, path, sizeof path);
 	blob_hex(&h, hex);
-	snprintf(aside, sizeof aside, "%s/damaged.%s", folder, hex);
+	snprintf(damaged, sizeof damaged, "%s/damaged.%s", folder, hex);
 	for (size_t at = 0; at < strlen(text); at++) {
 		int fd = open(path, O_WRONLY);
 		char wrong = (char)(text[at] ^ 1);
@@ -242,7 +242,7 @@ static void damaged_at_rest(void **state)
 		}
 		assert_int_equal(blob_check(s, &h, at % 2 ? BLOB_SINCE_GIVEN : 0, &e), -EBADMSG);
 		assert_non_null(strstr(e.text, "damaged"));
-		assert_true(access(path, F_OK) != 0 && access(aside, F_OK) == 0);
+		assert_true(access(path, F_OK) != 0 && access(damaged, F_OK) == 0);
 		assert_true(!blob_has(s, &h, NULL) && !blob_hold(s, &h) && blob_open(s, &h, &size, &e) == -ENOENT);
 		assert_int_equal(blob_check(s, &h, 0, &e), -ENOENT);
 		blob_text_store(s, text);

@@ -93,7 +93,7 @@ static void test_two_outputs(void **state)
 	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
 		refuses(&(struct output_files){{{"-o", "new.exr", OUTPUT_EXR}, {"--stats", names[i], OUTPUT_JSON}}},
 			NULL, "-o and --stats are the same file");
-	accepts(&(struct output_files){{{"-o", "new.exr", OUTPUT_EXR}, {"--stats", "a/new.exr", OUTPUT_JSON}}}, NULL);
+	accepts(&(struct output_files){{{"-o", "new.exr", OUTPUT_EXR}, {"--stats", "a/new.json", OUTPUT_JSON}}}, NULL);
 	accepts(&(struct output_files){{{"-o", "/dev/null", OUTPUT_EXR}, {"--stats", "/dev/null", OUTPUT_JSON}}}, NULL);
 	assert_int_equal(access("new.exr", F_OK), -1); /* nothing is left behind */
 }
@@ -115,22 +115,38 @@ static void test_formats(void **state)
 	enum { ROWS = sizeof rows / sizeof *rows };
 	for (size_t i = 0; i < ROWS; i++)
 		for (size_t j = 0; j < ROWS; j++) {
-			struct output_files o = {{{"-o", "file", rows[j].format}}};
-			put("file", rows[i].begin);
+			struct output_files o = {{{"-o", "file.svg", rows[j].format}}};
+			put("file.svg", rows[i].begin);
 			if (i == j)
 				accepts(&o, NULL);
 			else
 				refuses(&o, NULL, rows[j].noun);
 		}
 	for (size_t j = 0; j < ROWS; j++) {
-		struct output_files o = {{{"-o", "file", rows[j].format}}};
-		put("file", "<scene version=\"0.6.0\"/>");
+		struct output_files o = {{{"-o", "file.svg", rows[j].format}}};
+		put("file.svg", "<scene version=\"0.6.0\"/>");
 		refuses(&o, NULL, rows[j].noun);
-		put("file", "");
+		put("file.svg", "");
 		accepts(&o, NULL);
 	}
 	assert_int_equal(output_format_of_plot("cost.svg"), OUTPUT_SVG);
 	assert_int_equal(output_format_of_plot("cost.png"), OUTPUT_PNG);
+	static const char *const plots[][2] = {
+		{"cost.sgv", "as .svg or .png; did you mean `.svg`?"},
+		{"cost.pngg", "did you mean `.png`?"},
+		{"cost.jpg", "as .svg or .png"},
+		{"a.svg/cost", "as .svg or .png"},
+		{"-", "as .svg or .png"},
+	};
+	for (size_t i = 0; i < sizeof plots / sizeof *plots; i++)
+		refuses(&(struct output_files){{{"--plot", plots[i][0], output_format_of_plot(plots[i][0])}}}, NULL,
+			plots[i][1]);
+	refuses(&(struct output_files){{{"-o", "report.PNG", OUTPUT_HTML}}}, NULL,
+		"-o report.PNG: an HTML file is written, which the name does not say");
+	refuses(&(struct output_files){{{"--stats", "room.exr", OUTPUT_JSON}}}, NULL,
+		"a file of statistics is written, which the name does not say");
+	refuses(&(struct output_files){{{"-o", "/dev/stdout", OUTPUT_EXR}, {"--stats", "/dev/stdout", OUTPUT_JSON}}},
+		NULL, "are the same file, stdout");
 }
 
 /* A name is not to say another format than the file has; one that says none, or in capitals, is taken. */

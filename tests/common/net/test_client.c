@@ -334,6 +334,36 @@ static void who_names_a_file_gets_it(void **state)
 	assert_true(file_holds("old.exr", image, sizeof image));
 }
 
+/* Also where the name is given, or leads there by a link: the final name is for the image. */
+static void a_preview_never_takes_the_final_name(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *path, *file;
+		bool kept;
+	} rows[] = {{"final.exr", "final.preview.exr", true},
+		    {"./final.exr", "./final.preview.exr", true},
+		    {"to-final.exr", "to-final.preview.exr", true},
+		    {"finals/final.exr", "finals/final.preview.exr", true},
+		    {"another.exr", "another.exr", false}};
+	struct error e;
+	write_text("final.exr");
+	assert_int_equal(symlink("final.exr", "to-final.exr"), 0);
+	assert_int_equal(mkdir("finals", 0700), 0);
+	assert_int_equal(symlink("../another.exr", "finals/final.exr"), 0);
+	for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+		struct coordinator c = {.name = "/home/ann/final.exr"};
+		struct client *cl = connect_client(&c);
+		bool kept = !rows[i].kept;
+		int rc = client_fetch_preview(cl, 1, rows[i].path, &kept, &e);
+		disconnect_client(&c, cl);
+		assert_int_equal(rc, 0);
+		assert_int_equal(kept, rows[i].kept);
+		assert_true(file_holds(rows[i].file, image, sizeof image));
+		assert_false(file_holds("final.exr", image, sizeof image));
+	}
+}
+
 static void a_file_of_another_size_is_another_file(void **state)
 {
 	(void)state;
@@ -543,6 +573,7 @@ int main(void)
 		cmocka_unit_test(names_lead_nowhere),
 		cmocka_unit_test(previews_leave_the_name),
 		cmocka_unit_test(who_names_a_file_gets_it),
+		cmocka_unit_test(a_preview_never_takes_the_final_name),
 		cmocka_unit_test(a_file_of_another_size_is_another_file),
 		cmocka_unit_test(a_signal_leaves_nothing_half_done),
 		cmocka_unit_test(a_dropped_fetch_begins_again),

@@ -112,7 +112,7 @@ static void a_lack_of_room_is_no_failure(void **state)
 	transcript_play(f, lines);
 	assert_true(farm_job(f, 1, 2, &s));
 	assert_string_equal(s.waiting, "worker w1 has no room for its scene now: full");
-	assert_string_equal(s.text, "");
+	assert_string_equal(s.why, "");
 	farm_free(f);
 }
 

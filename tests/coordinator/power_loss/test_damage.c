@@ -254,16 +254,16 @@ static void damaged_database(void **state)
 	}
 }
 
-/* Neither file knows what a job is: the start is refused, and nothing is touched; then it is put aside, and the others
- * go on. */
+/* Neither file knows what a job is: the start is refused, and nothing is touched; then it is kept as damaged, and the
+ * others go on. */
 static void what_is_lost(void **state)
 {
 	(void)state;
 	static const char *const files[] = {"jobs.db", "jobs-copy.db"};
 	run_before_damage(0);
-	uint64_t put_aside = 0;
+	uint64_t replaced = 0;
 	/* Whether a run leaves a checkpoint depends on what was under way when it ended. */
-	for (uint64_t seed = 201; put_aside < 4; seed++) {
+	for (uint64_t seed = 201; replaced < 4; seed++) {
 		char path[256];
 		assert_true(seed < 240);
 		begin(seed);
@@ -293,7 +293,7 @@ static void what_is_lost(void **state)
 		outage.accept_loss = false;
 		assert_int_equal(take_lost(), 1);
 		in_root("j=$(basename $(cat lost-job)); sed s,jobs/,lost/, sums | sha256sum --quiet -c && grep -q jobs.db lost/$j/why");
-		put_aside++;
+		replaced++;
 	}
 }
 

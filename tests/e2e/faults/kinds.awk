@@ -15,7 +15,7 @@ function kind_of(what) {
 
 BEGIN {
 	FS = "|"
-	count = split("no certificate, or no TLS;a certificate of another authority;wrong role;expired;revoked;a key in the open;jobs of somebody else;oversized;replayed;out of order;no proper bundle;path tricks;a scene sent past the client;beyond a quota", order, ";")
+	count = split("no certificate, or no TLS;a certificate of another authority;wrong role;expired;revoked;a key in the open;jobs of somebody else;oversized;replayed;out of order;invalid scene files;path tricks;a scene sent past the client;beyond a quota", order, ";")
 	for (i = 1; i <= count; i++)
 		place[order[i]] = i
 }

@@ -120,7 +120,7 @@ static void workers_share_a_cache_folder(void **state)
 	cache_close(&c);
 }
 
-/* In /tmp another user may have created the folder first, with files of the right names and wrong contents. */
+/* In /tmp anybody can be there first, with files of the right names and wrong contents. */
 static void a_cache_of_others_is_not_used(void **state)
 {
 	(void)state;
@@ -154,7 +154,7 @@ static void a_cache_of_others_is_not_used(void **state)
 	assert_int_equal(cache_open(&c, base, 1000, &e), -EPERM);
 }
 
-/* ---- bundle ---- */
+/* ---- job cache ---- */
 
 static void set_info(struct job_cache *b, const char *texts[], size_t count)
 {
@@ -260,7 +260,7 @@ static void files_of_an_earlier_run_are_read(void **state)
 	cache_close(&cache);
 }
 
-static void a_job_is_built_from_its_files(void **state)
+static void a_job_cache_holds_what_it_needs(void **state)
 {
 	(void)state;
 	struct cache cache;
@@ -324,7 +324,7 @@ int main(void)
 		cmocka_unit_test(the_pool_runs_tasks),
 		cmocka_unit_test_setup_teardown(workers_share_a_cache_folder, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_cache_of_others_is_not_used, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(a_job_is_built_from_its_files, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(a_job_cache_holds_what_it_needs, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(files_of_an_earlier_run_are_read, folder_set_up, folder_tear_down),
 		cmocka_unit_test(the_fingerprint_is_stable),
 	};

@@ -9,6 +9,7 @@
  */
 #include "common/base/mem.h"
 #include "common/base/program.h"
+#include "common/base/target.h"
 #include "common/base/progress.h"
 #include "common/exr/output_files.h"
 #include "worker/cli/accuracy/accuracy_csv.h"
@@ -30,10 +31,10 @@ struct arguments {
 };
 
 static const struct option_row rows[] = {
-	{"output", 'o', "FILE", "The report (HTML)", OPTION_TEXT(struct arguments, render.output)},
-	{"csv", 0, "FILE", "Also write the figures as comma-separated values", OPTION_TEXT(struct arguments, csv)},
-	{"budget", 0, "MINUTES", "Total time, divided equally; more makes the intervals narrower",
-	 OPTION_NUMBER(struct arguments, budget, 0, 1e6), .above = true, .below = true, .standard = "10"},
+	{"output", 'o', "FILE", "The report (HTML); -: stdout", OPTION_OUTPUT(struct arguments, render.output)},
+	{"csv", 0, "FILE", "Also write the figures as comma-separated values", OPTION_OUTPUT(struct arguments, csv)},
+	{"budget", 0, "MINUTES", "Total time (10, 90s, 2h), divided equally; more makes the intervals narrower",
+	 OPTION_TIME(struct arguments, budget, 0, 1e6, 60), .above = true, .below = true, .standard = "10"},
 	{"seconds", 0, "S", "CPU seconds for each setting, instead of a budget",
 	 OPTION_SECONDS(struct arguments, seconds, 0, 1e9), .above = true, .below = true},
 	{"rounds", 0, "N",
@@ -45,7 +46,6 @@ static const struct option_row rows[] = {
 	 "Parameters to vary, separated by commas: settings of --set (see --set help), max-depth, independent, "
 	 "mixture, preset",
 	 OPTION_TEXT(struct arguments, accuracy)},
-	{"knobs", 0, "LIST", "The old name of --parameters", OPTION_TEXT(struct arguments, accuracy), .hidden = true},
 	{"reference", 0, "FILE", "An image (OpenEXR) to measure the bias against, instead of a careful render",
 	 OPTION_TEXT(struct arguments, reference)},
 	{"quiet", 0, NULL, "Print errors only", OPTION_FLAG(struct arguments, quiet)},
@@ -166,7 +166,7 @@ static int render(struct session *s, struct error *e)
 				       .assets = &s->assets,
 				       .render = &a->render.render,
 				       .threads = a->threads,
-				       .seconds = 60 * a->budget,
+				       .seconds = a->budget,
 				       .setting_seconds = a->seconds,
 				       .setting_rounds = a->rounds,
 				       .stop = &interrupted,
@@ -231,7 +231,7 @@ static int run_session(struct session *s, struct error *e)
 	if (!rc && !s->a->quiet)
 		print_summary(s);
 	if (!rc && s->run.interrupted)
-		rc = error_set(e, EINTR, "interrupted: %s holds the figures so far", s->a->render.output);
+		rc = error_set(e, EINTR, "interrupted: %s holds the figures so far", target_shown(s->a->render.output));
 	return rc;
 }
 

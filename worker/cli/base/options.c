@@ -11,6 +11,7 @@
 #include "common/base/mem.h"
 #include "common/base/picture_name.h"
 #include "common/base/spelling.h"
+#include "common/base/target.h"
 #include "common/base/text.h"
 #include "worker/render/choose.h"
 #include "worker/render/settings/accuracy_settings.h"
@@ -40,7 +41,7 @@ int option_scene(void *target, size_t index, char *word, struct error *e)
 int option_image(void *target, char *arg, struct error *e)
 {
 	const char *format = picture_name_format(arg);
-	((struct render_arguments *)target)->output = strcmp(arg, "-") == 0 ? "/dev/stdout" : arg;
+	((struct render_arguments *)target)->output = target_of(arg);
 	if (!format || strcmp(format, ".exr") == 0)
 		return 0;
 	return error_set(e, EINVAL,
@@ -103,31 +104,14 @@ static int take_integrator(void *target, char *arg, struct error *e)
 	return 0;
 }
 
-/* Nonzero: they are not `count` numbers with these separators. */
-static int take_numbers(const char *arg, const char *separators, uint32_t *out, int count)
-{
-	const char *at = arg;
-	for (int i = 0; i < count; i++) {
-		char *end;
-		errno = 0;
-		unsigned long n = strtoul(at, &end, 10);
-		char wanted = i + 1 < count ? separators[i] : 0;
-		if (*at < '0' || *at > '9' || errno || n > UINT32_MAX || *end != wanted)
-			return -EINVAL;
-		out[i] = (uint32_t)n;
-		at = end + 1;
-	}
-	return 0;
-}
-
 /* "640x360", or "640": the height follows from the scene's aspect. */
 static int take_size(void *target, char *arg, struct error *e)
 {
 	struct render_arguments *a = target;
 	uint32_t n[2] = {0, 0};
 	bool both = strchr(arg, 'x') != NULL;
-	if (take_numbers(arg, "x", n, both ? 2 : 1))
-		return error_set(e, EINVAL, "--size takes W or WxH, such as 640x360, not '%s'", arg);
+	if (!text_counts(arg, "x", n, both ? 2 : 1))
+		return error_set(e, EINVAL, "--size takes W or WxH, such as 640x360 or 1.5k, not '%s'", arg);
 	if (n[0] == 0 || (both && n[1] == 0))
 		return error_set(e, EINVAL, "--size takes a film of at least 1x1 pixels");
 	if (n[0] > PLAN_MAX_SIZE || n[1] > PLAN_MAX_SIZE || (uint64_t)n[0] * n[1] > PLAN_MAX_FILM)
@@ -142,7 +126,7 @@ static int take_crop(void *target, char *arg, struct error *e)
 {
 	struct render_arguments *a = target;
 	uint32_t n[4];
-	if (take_numbers(arg, ",,,", n, 4))
+	if (!text_counts(arg, ",,,", n, 4))
 		return error_set(e, EINVAL, "--crop takes X,Y,W,H in pixels, such as 0,0,320,360, not '%s'", arg);
 	if (n[2] == 0 || n[3] == 0)
 		return error_set(e, EINVAL, "--crop takes a part of at least 1x1 pixels");
@@ -196,6 +180,11 @@ static int take_set(void *target, char *arg, struct error *e)
 {
 	if (strcmp(arg, "help") == 0)
 		list_settings();
+	struct spelling s = {.wanted = arg};
+	char hint[64];
+	spelling_offer(&s, "help");
+	if (s.best)
+		return error_set(e, EINVAL, "--set: '%s' is no setting%s", arg, spelling_hint(&s, hint, sizeof hint));
 	return add_setting(target, arg, e);
 }
 
@@ -216,7 +205,7 @@ static int take_sensor(void *target, char *arg, struct error *e)
 		a->sensor = arg;
 		return 0;
 	}
-	if (take_numbers(arg, "", &n, 1))
+	if (!text_counts(arg, "", &n, 1))
 		return error_set(e, EINVAL, "--sensor takes the number of a sensor or its id, not '%s'", arg);
 	return set_sensor(a, n, e);
 }
@@ -342,8 +331,8 @@ static const struct option_row when_rows[] = {
 	 OPTION_TAKE(take_mutations), .more = more_strategies},
 	{"time", 0, "SECONDS", "Wall-clock time (90, 5m, 2h), checked after complete rounds",
 	 OPTION_SECONDS(RENDER, plan.seconds, 0, 1e9), .above = true, .below = true},
-	{"target-error", 0, "E", "Estimated relative error: 0.02 or 2%",
-	 OPTION_RATIO(RENDER, plan.target_error, 0, 1e3), .above = true, .below = true},
+	{"target-error", 0, "E", "Estimated relative error: 0.02 or 2%", OPTION_RATIO(RENDER, plan.target_error, 0, 1),
+	 .above = true},
 	{0},
 };
 
@@ -466,14 +455,8 @@ static int no_scene(const char *path, const char *folder, const char *name, stru
 	if (lstat(path, &link) == 0) /* its own name would be the nearest */
 		return error_set(e, ENOENT, "%s: a link to a file that is not there", path);
 	DIR *d = opendir(folder);
-	char best[NAME_MAX + 1] = ""; /* readdir reuses its memory */
-	while (d && (entry = readdir(d))) {
+	while (d && (entry = readdir(d)))
 		spelling_offer(&near, entry->d_name);
-		if (near.best == entry->d_name) {
-			text_copy(best, sizeof best, entry->d_name);
-			near.best = best;
-		}
-	}
 	if (d)
 		closedir(d);
 	return error_set(e, ENOENT, "%s: no such file%s", path, spelling_hint(&near, hint, sizeof hint));

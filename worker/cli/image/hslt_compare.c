@@ -8,6 +8,7 @@
  */
 #include "common/base/mem.h"
 #include "common/base/program.h"
+#include "common/base/text.h"
 #include "common/estimate/stated_error.h"
 #include "common/exr/output_files.h"
 #include "worker/cli/image/compare.h"
@@ -30,17 +31,18 @@ struct arguments {
 static int take_size(void *target, char *arg, struct error *e)
 {
 	struct arguments *a = target;
-	char rest;
-	if (*arg < '0' || *arg > '9' || sscanf(arg, "%ux%u%c", &a->width, &a->height, &rest) != 2 || !a->width ||
-	    !a->height)
+	uint32_t n[2];
+	if (!text_counts(arg, "x", n, 2) || !n[0] || !n[1])
 		return error_set(e, EINVAL, "--size takes WxH, not '%s'", arg);
+	a->width = n[0];
+	a->height = n[1];
 	return 0;
 }
 
 static const struct option_row rows[] = {
 	{"exact", 0, NULL, "Only check whether all bits are equal", OPTION_FLAG(struct arguments, exact)},
-	{"trim", 0, "F", "Omit the worst share F of the pixels: 0.001", OPTION_NUMBER(struct arguments, trim, 0, 1),
-	 .below = true},
+	{"trim", 0, "F", "Omit the worst share F of the pixels: 0.001 or 0.1%",
+	 OPTION_RATIO(struct arguments, trim, 0, 1), .below = true},
 	{"size", 0, "WxH", "First average both to this size, which must divide theirs", OPTION_TAKE(take_size)},
 	{"heatmap", 0, "FILE.png", "Write relative errors as colours, from black (0.1 %) to white (100 %)",
 	 OPTION_TEXT(struct arguments, heatmap)},
@@ -65,6 +67,8 @@ static int check(void *target, struct error *e)
 	const struct arguments *a = target;
 	if (!a->path[1])
 		return error_set(e, EINVAL, "A.exr and B.exr are needed");
+	if (a->heatmap && strcmp(a->heatmap, "-") == 0)
+		return error_set(e, EINVAL, "--heatmap takes the name of a file: the figures go to stdout");
 	if (a->exact && (a->trim > 0 || a->width || a->heatmap || a->most >= 0))
 		return error_set(e, EINVAL, "--exact can only be combined with --json");
 	return 0;

@@ -2,6 +2,7 @@
 #include "common/base/mem.h"
 #include "common/base/picture_name.h"
 #include "common/base/program.h"
+#include "common/base/target.h"
 #include "common/exr/output_files.h"
 #include "worker/cli/image/picture.h"
 #include "worker/cli/image/tonemap.h"
@@ -29,7 +30,7 @@ static int take_word(void *target, size_t index, char *word, struct error *e)
 	if (index == 0)
 		a->in = dash ? "/dev/stdin" : word;
 	else
-		a->out = dash ? "/dev/stdout" : word;
+		a->out = target_of(word);
 	return 0;
 }
 

@@ -65,8 +65,8 @@ static int check(const struct estimate *s, struct error *e)
 		return 0;
 	return error_set(
 		e, EAGAIN,
-		"the pilot has only %u estimates of the error, and %d are needed: give it more time (--pilot SECONDS)",
-		s->looks->count, PILOT_LOOKS_LEAST);
+		"the pilot has only %u estimate%s of the error, and %d are needed: give it more time (--pilot SECONDS)",
+		s->looks->count, s->looks->count == 1 ? "" : "s", PILOT_LOOKS_LEAST);
 }
 
 /* ---- the table */

@@ -11,6 +11,7 @@
 #include "common/base/crash.h"
 #include "common/base/mem.h"
 #include "common/base/program.h"
+#include "common/base/target.h"
 #include "common/base/progress.h"
 #include "common/blob/blob.h"
 #include "common/exr/image_file.h"
@@ -49,7 +50,7 @@ static const struct option_row rows[] = {
 	{"stats", 0, "FILE",
 	 "Write plan, times, counters, strategies and effects as JSON, and print tables of strategies and "
 	 "path classes",
-	 OPTION_TEXT(struct arguments, stats)},
+	 OPTION_OUTPUT(struct arguments, stats)},
 	{"quiet", 0, NULL, "Print errors only", OPTION_FLAG(struct arguments, quiet)},
 	ESTIMATE_ROWS(struct arguments),
 	{"explain", 0, NULL, "Only print which effects the scene needs and why, and what omitting the others saves",
@@ -464,8 +465,9 @@ static int run_session(struct session *s, struct error *e)
 	if (!rc && s->image.rel_mse_doubt)
 		warn(s);
 	if (!rc && s->run.end == MERGE_GOES_ON)
-		rc = error_set(e, EINTR, "interrupted: %s holds %llu complete round%s", s->a->render.output,
-			       (unsigned long long)s->image.rounds, s->image.rounds == 1 ? "" : "s");
+		rc = error_set(e, EINTR, "interrupted: %s holds %llu complete round%s",
+			       target_shown(s->a->render.output), (unsigned long long)s->image.rounds,
+			       s->image.rounds == 1 ? "" : "s");
 	return rc;
 }
 

@@ -1,9 +1,21 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * One function for each part of the page, each of which goes through a table of the reader: plug-ins by class, what
+ * becomes of integrators, elements of values, kinds of spectra, names of older versions, and what --lenient replaces.
+ *
+ * Nothing can fail but the stream, which the caller checks.
+ */
 #include "worker/cli/scene/compatibility.h"
 
 #include "worker/render/render.h"
+#include "worker/render/scene/depth.h"
+#include "worker/render/scene/integrators.h"
 #include "worker/render/scene/lenient.h"
 #include "worker/render/scene/plugin.h"
+#include "worker/render/scene/spectral.h"
+#include "worker/render/scene/subsurface.h"
+#include "worker/render/scene/upgrade.h"
+#include "worker/render/scene/value.h"
 
 #include <string.h>
 
@@ -37,6 +49,61 @@ static void print_supported(FILE *out, const struct plugin_decl *d)
 	fprintf(out, " |\n");
 }
 
+static bool is_same(const struct integrator_image *a, const struct integrator_image *b)
+{
+	return a->other == b->other && a->direct == b->direct && a->prb == b->prb && a->no_media == b->no_media;
+}
+
+static void print_image(FILE *out, const struct integrator_image *image)
+{
+	if (image->other)
+		fprintf(out, "all light, or that of the integrator inside, with a note");
+	else if (image->direct)
+		fprintf(out, "light that is scattered once, with a note");
+	else
+		fprintf(out, "all light");
+	if (image->prb)
+		fprintf(out, ", by paths of %d edges if there is no `max_depth`", SCENE_PRB_DEPTH);
+	fprintf(out, image->no_media ? "; no media without `--set media=shown`, with a note |\n" : " |\n");
+}
+
+/* What becomes of each integrator, whose parameters are those of "any"; those of one kind in one row. */
+static void print_integrators(FILE *out)
+{
+	struct integrator_image image, other;
+	const char *type;
+	fprintf(out, "\n`--integrator` chooses how light is found; the scene's own says which light:\n\n"
+		     "| type | the image shows |\n|---|---|\n");
+	for (size_t i = 0; integrators_at(i, &image); i++) {
+		size_t first = 0;
+		while (integrators_at(first, &other) && !is_same(&image, &other))
+			first++;
+		if (first < i)
+			continue;
+		const char *before = "| ";
+		for (size_t k = i; (type = integrators_at(k, &other)); k++)
+			if (is_same(&image, &other)) {
+				fprintf(out, "%s`%s`", before, type);
+				before = ", ";
+			}
+		fprintf(out, " | ");
+		print_image(out, &image);
+	}
+	fprintf(out, "| any other | all light, with a note |\n");
+}
+
+static void print_samplers(FILE *out)
+{
+	enum plugin_class cls;
+	const char *type, *before = "\nAny sampler is accepted, and samples are independent; Mitsuba's are ";
+	for (size_t i = 0; (type = plugin_of_mitsuba(i, &cls)); i++)
+		if (cls == PLUGIN_SAMPLER) {
+			fprintf(out, "%s`%s`", before, type);
+			before = ", ";
+		}
+	fprintf(out, ".\n");
+}
+
 static void print_class(FILE *out, enum plugin_class cls)
 {
 	bool any = false;
@@ -50,6 +117,78 @@ static void print_class(FILE *out, enum plugin_class cls)
 		any = true;
 		print_supported(out, d);
 	}
+	if (cls == PLUGIN_INTEGRATOR)
+		print_integrators(out);
+	else if (cls == PLUGIN_SAMPLER)
+		print_samplers(out);
+}
+
+/* "a|b|c" as `a`, `b`, `c`. */
+static void print_names(FILE *out, const char *list)
+{
+	char name[64];
+	const char *before = "";
+	while ((list = element_next_name(list, name, sizeof name))) {
+		fprintf(out, "%s`%s`", before, name);
+		before = ", ";
+	}
+}
+
+static void print_values(FILE *out)
+{
+	const char *name, *holds;
+	fprintf(out, "\n## Values, colours and spectra\n\n| element | attributes |\n|---|---|\n");
+	for (size_t i = 0; (name = value_element_at(i, &holds)); i++) {
+		fprintf(out, "| `<%s>` | ", name);
+		print_names(out, holds);
+		fprintf(out, " |\n");
+	}
+	fprintf(out, "\n| `<spectrum>` with | holds |\n|---|---|\n");
+	for (size_t i = 0; (name = spectral_form_at(i, &holds)); i++)
+		fprintf(out, "| `%s` | %s |\n", name, holds);
+	fprintf(out,
+		"\nOther types are refused, with the nearest name.\n\n| `<spectrum type>` | understood |\n|---|---|\n");
+	for (size_t i = 0; (name = spectral_type_at(i, &holds)); i++) {
+		fprintf(out, "| `%s` | ", name);
+		print_names(out, holds);
+		fprintf(out, " |\n");
+	}
+}
+
+static void print_subsurfaces(FILE *out)
+{
+	const char *type, *becomes;
+	fprintf(out, "\n## Subsurface scattering of 0.6\n\nRefused; media inside shapes are supported.\n\n"
+		     "| `<subsurface type>` | with `--lenient` |\n|---|---|\n");
+	for (size_t i = 0; (type = subsurface_at(i, &becomes)); i++)
+		fprintf(out, "| `%s` | %s |\n", type, becomes);
+}
+
+static void print_renamed(FILE *out, const struct renamed *n, const char *versions)
+{
+	if (!n->element)
+		fprintf(out, "| `<%s>` | `<%s>` | %s |\n", n->old, n->now, versions);
+	else if (!n->parameter)
+		fprintf(out, "| %s `%s` | `%s` | %s |\n", n->element, n->old, n->now, versions);
+	else if (n->type)
+		fprintf(out, "| `%s` of the %s `%s` | `%s` | %s |\n", n->old, n->element, n->type, n->now, versions);
+	else
+		fprintf(out, "| `%s` of each %s | `%s` | %s |\n", n->old, n->element, n->now, versions);
+}
+
+static void print_other_names(FILE *out)
+{
+	struct renamed n;
+	char versions[32];
+	fprintf(out, "\n## Other names\n\nThose of older versions, read as the ones of today.\n\n"
+		     "| name | read as | in files of |\n|---|---|---|\n");
+	for (size_t i = 0; upgrade_name_at(i, &n); i++) {
+		snprintf(versions, sizeof versions, "before 0.%d", n.before);
+
+		print_renamed(out, &n, n.before ? versions : "2.x and 3.x");
+	}
+	for (size_t i = 0; plugin_new_name_at(i, &n); i++)
+		print_renamed(out, &n, "0.5 and 0.6");
 }
 
 static void print_stand_in(FILE *out, enum plugin_class cls, const char *type)
@@ -80,15 +219,15 @@ static void print_unsupported(FILE *out)
 	const char *type;
 	fprintf(out,
 		"\n## Mitsuba's plug-ins that are not supported\n\n"
-		"Refused, with file, line and the nearest name; with `--lenient` replaced. `hk` is a layer of a medium. Light "
-		"is unpolarised here, and\nwhat polarizes acts as in Mitsuba's unpolarized modes. Bump and normal maps of "
+		"Refused, with file, line and the nearest name; with `--lenient` replaced. Light is unpolarised here, and\n"
+		"what polarizes acts as in Mitsuba's unpolarized modes. Bump and normal maps of "
 		"materials with a specular lobe or a mask do without\n`flip_invalid_normals`, which is on in Mitsuba since "
 		"3.7.\n\n"
 		"| class | type | with `--lenient` |\n|---|---|---|\n");
 	enum plugin_class cls;
 	for (size_t i = 0; (type = plugin_of_mitsuba(i, &cls)); i++) {
 		const struct plugin_decl *d = plugin_find(render_plugins(), cls, type);
-		if (!d || strcmp(d->type, "*") == 0)
+		if (!d)
 			print_stand_in(out, cls, type);
 	}
 }
@@ -107,5 +246,8 @@ void compatibility_print(FILE *out)
 		"differ,\n[tests/corpus/README.md](../tests/corpus/README.md) how many public scenes load.\n");
 	for (int cls = 0; cls < PLUGIN_CLASSES; cls++)
 		print_class(out, (enum plugin_class)cls);
+	print_values(out);
+	print_subsurfaces(out);
+	print_other_names(out);
 	print_unsupported(out);
 }

@@ -271,20 +271,32 @@ static json_t *describe(const struct scene *s, const struct opened *o, struct er
 	for (size_t i = 0; render_scene_note(&m, i, text, sizeof text); i++)
 		json_array_append_new(notes, json_string(text));
 	const struct scene_settings *f = &m.settings;
-	json_t *all = json_pack(
-		"{s:i s:s s:s s:i s:i s:I s:f s:s s:i s:I s:I s:I s:I s:I s:I s:I s:o s:o s:o}", "schema", 1, "scene",
-		o->name, "dialect",
-		gltf_is(o->name) ? "glTF 2.0"
-		: s->dialect_3	 ? "3.x"
-				 : "0.6",
-		"width", (int)f->width, "height", (int)f->height, "sampleCount", (json_int_t)f->spp, "fov", f->fov,
-		"fovAxis", f->fov_axis, "maxDepth", (int)f->max_depth, "shapes", (json_int_t)m.shapes, "triangles",
-		(json_int_t)m.triangles, "segments", (json_int_t)m.segments, "instances", (json_int_t)m.instances,
-		"sharedMeshes", (json_int_t)m.shared_meshes, "storedTriangles", (json_int_t)m.stored_triangles,
-		"memoryBytes", (json_int_t)m.memory, "effects", effects_of(&m), "notes", notes, "files", files);
+	json_t *all =
+		json_pack("{s:i s:s s:s s:i s:i s:I s:f s:s s:i s:I s:I s:I s:I s:I s:I s:I s:I s:o s:o s:o}", "schema",
+			  1, "scene", o->name, "dialect",
+			  gltf_is(o->name) ? "glTF 2.0"
+			  : s->dialect_3   ? "3.x"
+					   : "0.6",
+			  "width", (int)f->width, "height", (int)f->height, "sampleCount", (json_int_t)f->spp, "fov",
+			  f->fov, "fovAxis", f->fov_axis, "maxDepth", (int)f->max_depth, "shapes", (json_int_t)m.shapes,
+			  "triangles", (json_int_t)m.triangles, "segments", (json_int_t)m.segments, "instances",
+			  (json_int_t)m.instances, "sharingShapes", (json_int_t)m.sharing, "sharedMeshes",
+			  (json_int_t)m.shared_meshes, "storedTriangles", (json_int_t)m.stored_triangles, "memoryBytes",
+			  (json_int_t)m.memory, "effects", effects_of(&m), "notes", notes, "files", files);
 	if (!all)
 		error_set(e, ENOMEM, "no memory for the description");
 	return all;
+}
+
+/* Small meshes are copied; what moves may share one without an instance. */
+static void print_instances(long long instances, long long sharing, long long meshes)
+{
+	printf(" (");
+	if (instances)
+		printf("%lld instance%s%s", instances, instances == 1 ? "" : "s", sharing ? "; " : "");
+	if (sharing)
+		printf("%lld share%s %lld mesh%s", sharing, sharing == 1 ? "s" : "", meshes, meshes == 1 ? "" : "es");
+	printf(")");
 }
 
 static void print_text(json_t *all)
@@ -292,25 +304,26 @@ static void print_text(json_t *all)
 	size_t i;
 	json_t *one;
 	const char *text;
-	long long shapes, triangles, segments, spp, instances, meshes, stored, memory;
+	long long shapes, triangles, segments, spp, instances, sharing, meshes, stored, memory;
 	int width, height, depth;
 	double fov;
 	const char *name, *dialect, *axis;
 	char text_of_segments[64];
-	json_unpack(all, "{s:s s:s s:i s:i s:I s:f s:s s:i s:I s:I s:I s:I s:I s:I s:I}", "scene", &name, "dialect",
+	json_unpack(all, "{s:s s:s s:i s:i s:I s:f s:s s:i s:I s:I s:I s:I s:I s:I s:I s:I}", "scene", &name, "dialect",
 		    &dialect, "width", &width, "height", &height, "sampleCount", &spp, "fov", &fov, "fovAxis", &axis,
 		    "maxDepth", &depth, "shapes", &shapes, "triangles", &triangles, "segments", &segments, "instances",
-		    &instances, "sharedMeshes", &meshes, "storedTriangles", &stored, "memoryBytes", &memory);
+		    &instances, "sharingShapes", &sharing, "sharedMeshes", &meshes, "storedTriangles", &stored,
+		    "memoryBytes", &memory);
 	bool gltf = strncmp(dialect, "glTF", 4) == 0;
 	printf("%s: %s%s, film %d x %d, field of view %.4g degrees (%s), ", name, gltf ? "" : "Mitsuba ", dialect,
 	       width, height, fov, axis);
 	if (spp)
 		printf("%lld sample%s per pixel, ", spp, spp == 1 ? "" : "s");
 	printf("paths of at most %d edges\n%lld shape%s", depth, shapes, shapes == 1 ? "" : "s");
-	if (instances)
-		printf(" (%lld instances of %lld mesh%s)", instances, meshes, meshes == 1 ? "" : "es");
+	if (instances || sharing)
+		print_instances(instances, sharing, meshes);
 	printf(", %lld triangle%s", triangles, triangles == 1 ? "" : "s");
-	if (instances)
+	if (sharing)
 		printf(" (%lld in memory)", stored);
 	printf("%s", segments_text((uint64_t)segments, text_of_segments, sizeof text_of_segments));
 	printf(", about %.0f MB; calls for", ceil((double)memory * 0x1p-20));

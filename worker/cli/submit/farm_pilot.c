@@ -23,7 +23,7 @@ static int run_pilot(struct farm_pilot *p, const char *what, const struct plan_r
 	request.name = name;
 	request.args = args;
 	p->end = (struct submit_end){0};
-	rc = submit_send(p->client, &request, p->bundle, &job, text, sizeof text, e);
+	rc = submit_send(p->client, &request, p->files, &job, text, sizeof text, e);
 	mem_free(args);
 	if (!rc)
 		rc = submit_wait(p->client, &job, &p->end, e);

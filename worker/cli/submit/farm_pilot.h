@@ -12,7 +12,7 @@ struct farm_pilot {
 	/* in */
 	struct client *client;
 	const struct submit_request *request; /* of the render, its plan request complete */
-	const struct scene_bundle *bundle;
+	const struct scene_files *files;
 	double seconds;
 	/* out */
 	struct plan render, plan; /* of the render being predicted; of the pilot */

@@ -9,6 +9,7 @@
  */
 #include "common/base/crash.h"
 #include "common/base/program.h"
+#include "common/base/target.h"
 #include "common/base/text.h"
 #include "worker/cli/base/interrupt.h"
 #include "worker/cli/render/choice.h"
@@ -39,7 +40,7 @@ struct arguments {
 
 static bool to_stdout(const struct arguments *a)
 {
-	return a->render.output && strcmp(a->render.output, "/dev/stdout") == 0;
+	return a->render.output && strcmp(a->render.output, TARGET_STDOUT) == 0;
 }
 
 static int take_priority(void *target, char *arg, struct error *e)
@@ -132,7 +133,7 @@ static void print_id(const struct arguments *a, uint64_t job, const char *plan, 
 	snprintf(id, sizeof id, "j%llu", (unsigned long long)job);
 	if (a->json) {
 		json_t *o = json_pack("{s:i s:s s:s s:s s:s s:s}", "schema", 1, "id", id, "name", a->request.name,
-				      "output", a->render.output, "plan", plan, "state", state);
+				      "output", target_arg(a->render.output), "plan", plan, "state", state);
 		json_dumpf(o, stdout, JSON_COMPACT);
 		putchar('\n');
 		json_decref(o);
@@ -151,8 +152,7 @@ static void say_at_the_end(const struct arguments *a, uint64_t job)
 	static char text[512];
 	unsigned long long id = job;
 	char fetch[256], cancel[64];
-	int width = snprintf(fetch, sizeof fetch, "hslt-job fetch j%llu -o %.200s", id,
-			     to_stdout(a) ? "-" : a->render.output);
+	int width = snprintf(fetch, sizeof fetch, "hslt-job fetch j%llu -o %.200s", id, target_arg(a->render.output));
 	snprintf(cancel, sizeof cancel, "hslt-job cancel j%llu", id);
 	snprintf(
 		text, sizeof text,
@@ -162,14 +162,14 @@ static void say_at_the_end(const struct arguments *a, uint64_t job)
 	interrupt_say(text);
 }
 
-static int submit_scene(struct arguments *a, struct client **cl, const struct scene_bundle *b, int *code,
+static int submit_scene(struct arguments *a, struct client **cl, const struct scene_files *files, int *code,
 			struct error *e)
 {
 	struct submitted job;
 	struct submit_end end = {0};
 	char plan[PLAN_TEXT] = "";
 	struct reconnect o = {a->coordinator, a->tls, a->insecure, a->patience};
-	int rc = submit_send(*cl, &a->request, b, &job, plan, sizeof plan, e);
+	int rc = submit_send(*cl, &a->request, files, &job, plan, sizeof plan, e);
 	if (rc)
 		return rc;
 	fprintf(stderr, "%s\n", plan);
@@ -191,10 +191,12 @@ static int submit_scene(struct arguments *a, struct client **cl, const struct sc
 	return rc;
 }
 
-static int estimate(const struct arguments *a, struct client *cl, const struct scene_bundle *b, struct error *e)
+static int estimate(const struct arguments *a, struct client *cl, const struct scene_files *files, struct error *e)
 {
-	struct farm_pilot p = {
-		.client = cl, .request = &a->request, .bundle = b, .seconds = a->pilot > 0 ? a->pilot : PILOT_SECONDS};
+	struct farm_pilot p = {.client = cl,
+			       .request = &a->request,
+			       .files = files,
+			       .seconds = a->pilot > 0 ? a->pilot : PILOT_SECONDS};
 	int rc = farm_pilot(&p, e);
 	if (rc)
 		return rc;
@@ -221,14 +223,14 @@ static int check_plan(const struct arguments *a, struct error *e)
 }
 
 /* The duration of leases is measured only if it matters; with --epoch it is known. */
-static void measure(struct arguments *a, const struct scene_bundle *b)
+static void measure(struct arguments *a, const struct scene_files *files)
 {
 	struct plan plan;
 	struct error e;
 	double speed;
 	if (a->estimate || plan_make(&a->render.plan, &plan, &e) || !plan_wants_speed(&a->render.plan, &plan))
 		return;
-	if (speed_measure(&a->render, b->folder, b->scene, &speed, &e)) {
+	if (speed_measure(&a->render, files->folder, files->scene, &speed, &e)) {
 		fprintf(stderr, "hslt-submit: note: no pilot for the length of epochs: %s\n", e.text);
 		return;
 	}
@@ -261,7 +263,7 @@ static const char *name_of_file(const char *file, char name[NAME_MOST + 1])
 int main(int argc, char **argv)
 {
 	static struct arguments a; /* large */
-	struct scene_bundle b;
+	struct scene_files files;
 	struct client *cl;
 	struct error e;
 	int code = 0;
@@ -272,50 +274,50 @@ int main(int argc, char **argv)
 					{"--plot", a.plot, output_format_of_plot(a.plot ? a.plot : "")}}};
 	int rc = output_files_check(&outputs, &a.render.scene, 1, &e);
 	if (!rc)
-		rc = scene_bundle_read(&b, a.render.scene, &a.render, &outputs, &e);
+		rc = scene_files_read(&files, a.render.scene, &a.render, &outputs, &e);
 	if (rc) {
 		place_print(stderr, "hslt-submit: ", a.render.scene, e.text);
 		return 1;
 	}
-	for (size_t i = 0; i < b.note_count; i++)
-		place_print(stderr, "note: ", a.render.scene, b.notes[i]);
-	rc = a.estimate ? pilot_plan_from_scene(&a.render, &b.summary, &e)
-			: render_plan_from_scene(&a.render, &b.summary, &e);
+	for (size_t i = 0; i < files.note_count; i++)
+		place_print(stderr, "note: ", a.render.scene, files.notes[i]);
+	rc = a.estimate ? pilot_plan_from_scene(&a.render, &files.summary, &e)
+			: render_plan_from_scene(&a.render, &files.summary, &e);
 	if (rc) {
 		fprintf(stderr, "hslt-submit: %s\n", e.text);
-		scene_bundle_fini(&b);
+		scene_files_fini(&files);
 		return rc == -EINVAL ? 2 : 1;
 	}
 	char note[512], name[NAME_MOST + 1];
-	for (size_t i = 0; render_scene_note(&b.summary, i, note, sizeof note); i++)
+	for (size_t i = 0; render_scene_note(&files.summary, i, note, sizeof note); i++)
 		place_print(stderr, "hslt-submit: note: ", a.render.scene, note);
-	a.request.output = a.estimate ? "" : last_part(a.render.output);
-	a.request.name = a.name ? a.name : name_of_file(b.scene, name);
+	a.request.output = a.estimate || to_stdout(&a) ? "" : last_part(a.render.output);
+	a.request.name = a.name ? a.name : name_of_file(files.scene, name);
 	if ((rc = check_access(&a, &e))) {
 		fprintf(stderr, "hslt-submit: %s\n", e.text);
-		scene_bundle_fini(&b);
+		scene_files_fini(&files);
 		return client_exit_code(rc);
 	}
 	struct choice choice;
-	rc = choice_make(&a.render, b.folder, b.scene, &choice, &e);
+	rc = choice_make(&a.render, files.folder, files.scene, &choice, &e);
 	if (!rc)
 		rc = check_plan(&a, &e);
 	if (rc) {
 		fprintf(stderr, "hslt-submit: %s\n", e.text);
-		scene_bundle_fini(&b);
+		scene_files_fini(&files);
 		return rc == -EINVAL ? 2 : 1;
 	}
 	choice_print(&choice, a.render.plan.integrator);
 	option_depth_note(a.render.plan.integrator, a.render.plan.max_depth, note, sizeof note);
 	if (*note)
 		fprintf(stderr, "hslt-submit: note: %s\n", note);
-	measure(&a, &b);
+	measure(&a, &files);
 	rc = client_open(&cl, a.coordinator, a.tls, a.insecure, "hslt-submit", &e);
 	if (!rc) {
-		rc = a.estimate ? estimate(&a, cl, &b, &e) : submit_scene(&a, &cl, &b, &code, &e);
+		rc = a.estimate ? estimate(&a, cl, &files, &e) : submit_scene(&a, &cl, &files, &code, &e);
 		client_close(cl);
 	}
-	scene_bundle_fini(&b);
+	scene_files_fini(&files);
 	if (rc)
 		fprintf(stderr, "hslt-submit: %s\n", e.text);
 	return rc ? client_exit_code(rc) : code;

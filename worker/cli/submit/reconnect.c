@@ -2,6 +2,7 @@
 #include "worker/cli/submit/reconnect.h"
 
 #include "common/base/clock.h"
+#include "common/base/target.h"
 #include <stdio.h>
 
 static const double first_pause = 0.25, longest_pause = 10;
@@ -56,11 +57,11 @@ int reconnect_job(struct client **cl, const struct reconnect *o, const struct su
 				e, ECONNREFUSED,
 				"no coordinator at %s for %g s. The job is in its spool and continues when it is back: hslt-job "
 				"fetch j%llu -o %s",
-				o->coordinator, o->patience, (unsigned long long)job->job, output);
+				o->coordinator, o->patience, (unsigned long long)job->job, target_arg(output));
 		if (rc == -EKEYEXPIRED) {
 			struct error why = *e;
 			return error_set(e, EKEYEXPIRED, "%s. The job continues: hslt-job fetch j%llu -o %s", why.text,
-					 (unsigned long long)job->job, output);
+					 (unsigned long long)job->job, target_arg(output));
 		}
 		if (rc)
 			break;

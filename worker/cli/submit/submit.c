@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The bundle is read through a folder that hashes each file while the scene is read and checked as a worker will. Then
+ * The scene is read through a folder that hashes each of its files while it is read and checked as a worker will. Then
  * the job is sent; the coordinator answers which files it lacks, and those are sent in chunks, each compared with the
  * hash.
  *
@@ -21,28 +21,28 @@
 
 enum { CHUNK = 1 << 20 };
 
-/* ---- the bundle ---- */
+/* ---- the scene's files ---- */
 
 /* A folder that records which files were opened, with their hashes: the world is built here as by workers, so they
  * need exactly these. One thread. */
 struct opened {
 	struct asset_source folder;
-	struct scene_bundle *bundle;
+	struct scene_files *files;
 };
 
-static int add_file(struct scene_bundle *b, const char *name, const struct asset *a, struct error *e)
+static int add_file(struct scene_files *files, const char *name, const struct asset *a, struct error *e)
 {
-	for (size_t i = 0; i < b->count; i++)
-		if (strcmp(b->files[i].name, name) == 0)
+	for (size_t i = 0; i < files->count; i++)
+		if (strcmp(files->list[i].name, name) == 0)
 			return 0;
-	struct scene_bundle_file *more = list_room(b->files, b->count, sizeof *more);
+	struct scene_file *more = list_room(files->list, files->count, sizeof *more);
 	char *copy = mem_strdup(name);
-	b->files = more ? more : b->files;
+	files->list = more ? more : files->list;
 	if (!more || !copy) {
 		mem_free(copy);
 		return error_set(e, ENOMEM, "no memory for the list of files");
 	}
-	struct scene_bundle_file *f = &b->files[b->count++];
+	struct scene_file *f = &files->list[files->count++];
 	f->name = copy;
 	f->size = a->size;
 	return blob_hash_bytes(a->bytes, a->size, &f->hash, e);
@@ -52,7 +52,7 @@ static int open_remembered(void *user, const char *name, struct asset *out, stru
 {
 	struct opened *o = user;
 	int rc = o->folder.open(o->folder.user, name, out, e);
-	if (!rc && (rc = add_file(o->bundle, name, out, e)))
+	if (!rc && (rc = add_file(o->files, name, out, e)))
 		o->folder.close(o->folder.user, out);
 	return rc;
 }
@@ -63,53 +63,55 @@ static void close_remembered(void *user, struct asset *a)
 	o->folder.close(o->folder.user, a);
 }
 
-static int copy_notes(struct scene_bundle *b, const struct scene *s, struct error *e)
+static int copy_notes(struct scene_files *files, const struct scene *s, struct error *e)
 {
-	b->notes = mem_alloc(s->note_count, sizeof *b->notes);
-	for (uint32_t i = 0; b->notes && i < s->note_count; i++) {
-		b->notes[i] = mem_strdup(s->notes[i]);
-		if (!b->notes[i])
+	files->notes = mem_alloc(s->note_count, sizeof *files->notes);
+	for (uint32_t i = 0; files->notes && i < s->note_count; i++) {
+		files->notes[i] = mem_strdup(s->notes[i]);
+		if (!files->notes[i])
 			break;
-		b->note_count++;
+		files->note_count++;
 	}
-	return b->note_count == s->note_count && b->notes ? 0 : error_set(e, ENOMEM, "no memory for the scene's notes");
+	return files->note_count == s->note_count && files->notes
+		       ? 0
+		       : error_set(e, ENOMEM, "no memory for the scene's notes");
 }
 
-int scene_bundle_read(struct scene_bundle *b, const char *path, struct render_arguments *a,
-		      const struct output_files *outputs, struct error *e)
+int scene_files_read(struct scene_files *files, const char *path, struct render_arguments *a,
+		     const struct output_files *outputs, struct error *e)
 {
 	struct scene scene;
-	memset(b, 0, sizeof *b);
-	int rc = scene_path_split(path, a, &b->folder, &b->scene, e);
+	memset(files, 0, sizeof *files);
+	int rc = scene_path_split(path, a, &files->folder, &files->scene, e);
 	if (rc)
 		return rc;
-	b->folders = option_folders(a, b->folder);
-	struct guarded_source files;
-	struct opened opened = {guarded_source(&files, asset_search(&b->folders), outputs), b};
+	files->folders = option_folders(a, files->folder);
+	struct guarded_source guarded;
+	struct opened opened = {guarded_source(&guarded, asset_search(&files->folders), outputs), files};
 	struct asset_source assets = {.user = &opened, .open = open_remembered, .close = close_remembered};
-	rc = option_scene_read(&scene, &assets, b->scene, a, e);
+	rc = option_scene_read(&scene, &assets, files->scene, a, e);
 	if (!rc) {
-		rc = scene_missing(&scene, &assets, render_check(&scene, &assets, &a->render, &b->summary, e), e);
+		rc = scene_missing(&scene, &assets, render_check(&scene, &assets, &a->render, &files->summary, e), e);
 		if (!rc)
-			rc = copy_notes(b, &scene, e);
+			rc = copy_notes(files, &scene, e);
 		scene_fini(&scene);
 	}
 	if (rc)
-		scene_bundle_fini(b);
+		scene_files_fini(files);
 	return rc;
 }
 
-void scene_bundle_fini(struct scene_bundle *b)
+void scene_files_fini(struct scene_files *files)
 {
-	for (size_t i = 0; i < b->count; i++)
-		mem_free(b->files[i].name);
-	for (size_t i = 0; i < b->note_count; i++)
-		mem_free(b->notes[i]);
-	mem_free(b->files);
-	mem_free(b->notes);
-	mem_free(b->folder);
-	mem_free(b->scene);
-	memset(b, 0, sizeof *b);
+	for (size_t i = 0; i < files->count; i++)
+		mem_free(files->list[i].name);
+	for (size_t i = 0; i < files->note_count; i++)
+		mem_free(files->notes[i]);
+	mem_free(files->list);
+	mem_free(files->notes);
+	mem_free(files->folder);
+	mem_free(files->scene);
+	memset(files, 0, sizeof *files);
 }
 
 /* ---- sending ---- */
@@ -131,11 +133,11 @@ static void lists_fini(struct lists *l)
 	mem_free(l->effect_at);
 }
 
-static int lists_init(struct lists *l, const struct submit_request *r, struct scene_bundle *b, struct error *e)
+static int lists_init(struct lists *l, const struct submit_request *r, struct scene_files *files, struct error *e)
 {
-	size_t lines = b->summary.line_count;
-	*l = (struct lists){mem_alloc(b->count, sizeof *l->files),
-			    mem_alloc(b->count, sizeof *l->file_at),
+	size_t lines = files->summary.line_count;
+	*l = (struct lists){mem_alloc(files->count, sizeof *l->files),
+			    mem_alloc(files->count, sizeof *l->file_at),
 			    mem_alloc(r->args->define_count, sizeof *l->defines),
 			    mem_alloc(r->args->define_count, sizeof *l->define_at),
 			    mem_alloc(lines, sizeof *l->effects),
@@ -144,12 +146,12 @@ static int lists_init(struct lists *l, const struct submit_request *r, struct sc
 		lists_fini(l);
 		return error_set(e, ENOMEM, "no memory for the submission");
 	}
-	for (size_t i = 0; i < b->count; i++) {
+	for (size_t i = 0; i < files->count; i++) {
 		Farm__File *f = l->file_at[i] = &l->files[i];
 		farm__file__init(f);
-		f->name = b->files[i].name;
-		f->hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, b->files[i].hash.bytes};
-		f->size = b->files[i].size;
+		f->name = files->list[i].name;
+		f->hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, files->list[i].hash.bytes};
+		f->size = files->list[i].size;
 	}
 	for (size_t i = 0; i < r->args->define_count; i++) {
 		Farm__Define *d = l->define_at[i] = &l->defines[i];
@@ -160,11 +162,11 @@ static int lists_init(struct lists *l, const struct submit_request *r, struct sc
 	for (size_t i = 0; i < lines; i++) {
 		Farm__Effect *f = l->effect_at[i] = &l->effects[i];
 		farm__effect__init(f);
-		f->name = text_borrow(b->summary.lines[i].name);
-		f->on = b->summary.lines[i].on;
-		f->why = b->summary.lines[i].why;
-		f->forced = b->summary.lines[i].forced;
-		f->saves = text_borrow(b->summary.lines[i].saves);
+		f->name = text_borrow(files->summary.lines[i].name);
+		f->on = files->summary.lines[i].on;
+		f->why = files->summary.lines[i].why;
+		f->forced = files->summary.lines[i].forced;
+		f->saves = text_borrow(files->summary.lines[i].saves);
 	}
 	return 0;
 }
@@ -179,39 +181,39 @@ static int wait_answer(struct client *cl, struct client_message *answer, struct 
 	return rc;
 }
 
-static int send_submit(struct client *cl, const struct submit_request *r, struct scene_bundle *b, struct error *e)
+static int send_submit(struct client *cl, const struct submit_request *r, struct scene_files *files, struct error *e)
 {
 	struct lists l;
 	char camera[RENDER_CAMERA_TEXT];
 	Farm__Submit s;
 	Farm__PlanRequest plan;
-	int rc = lists_init(&l, r, b, e);
+	int rc = lists_init(&l, r, files, e);
 	if (rc)
 		return rc;
 	farm__submit__init(&s);
 	plan_request_to_wire(&r->args->plan, &plan);
 	s.name = text_borrow(r->name);
-	s.scene = b->scene;
+	s.scene = files->scene;
 	s.n_defines = r->args->define_count;
 	s.defines = l.define_at;
 	s.render_width = r->args->render.width;
 	s.render_height = r->args->render.height;
 	s.plan = &plan;
 	s.priority = r->priority;
-	render_camera_text(&b->summary, camera, sizeof camera);
+	render_camera_text(&files->summary, camera, sizeof camera);
 	s.camera = camera;
 	char *paths[OPTION_PATHS_MAX];
 	for (size_t i = 0; i < r->args->path_count; i++)
 		paths[i] = text_borrow(r->args->paths[i]);
 	s.n_paths = r->args->path_count;
 	s.paths = paths;
-	s.brightest = b->summary.brightest;
-	s.n_files = b->count;
+	s.brightest = files->summary.brightest;
+	s.n_files = files->count;
 	s.files = l.file_at;
-	s.n_effects = b->summary.line_count;
+	s.n_effects = files->summary.line_count;
 	s.effects = l.effect_at;
-	s.n_notes = b->note_count;
-	s.notes = b->notes;
+	s.n_notes = files->note_count;
+	s.notes = files->notes;
 	s.output = text_borrow(r->output);
 	s.mixed = r->mixed;
 	s.verify = r->verify;
@@ -220,16 +222,16 @@ static int send_submit(struct client *cl, const struct submit_request *r, struct
 	return rc;
 }
 
-static const struct scene_bundle_file *file_of_hash(const struct scene_bundle *b, const ProtobufCBinaryData *hash)
+static const struct scene_file *file_of_hash(const struct scene_files *files, const ProtobufCBinaryData *hash)
 {
-	for (size_t i = 0; i < b->count; i++)
-		if (hash->len == BLOB_HASH_SIZE && memcmp(hash->data, b->files[i].hash.bytes, BLOB_HASH_SIZE) == 0)
-			return &b->files[i];
+	for (size_t i = 0; i < files->count; i++)
+		if (hash->len == BLOB_HASH_SIZE && memcmp(hash->data, files->list[i].hash.bytes, BLOB_HASH_SIZE) == 0)
+			return &files->list[i];
 	return NULL;
 }
 
-static int send_chunk(struct client *cl, const struct scene_bundle_file *f, uint64_t offset, const void *bytes,
-		      size_t size, struct error *e)
+static int send_chunk(struct client *cl, const struct scene_file *f, uint64_t offset, const void *bytes, size_t size,
+		      struct error *e)
 {
 	struct blob_hash hash = f->hash;
 	return client_send(cl,
@@ -240,10 +242,9 @@ static int send_chunk(struct client *cl, const struct scene_bundle_file *f, uint
 
 /* Opened as before, below the scene's folder or one of --path; only the bytes that were read then leave this
  * machine. */
-static int send_file(struct client *cl, const struct scene_bundle *b, const struct scene_bundle_file *f,
-		     struct error *e)
+static int send_file(struct client *cl, const struct scene_files *files, const struct scene_file *f, struct error *e)
 {
-	struct asset_source folder = asset_search(&b->folders);
+	struct asset_source folder = asset_search(&files->folders);
 	struct asset a;
 	struct blob_hash hash;
 	int rc = folder.open(folder.user, f->name, &a, e);
@@ -263,27 +264,28 @@ static int send_file(struct client *cl, const struct scene_bundle *b, const stru
 	return rc;
 }
 
-static int send_missing(struct client *cl, const struct scene_bundle *b, const Farm__SubmitAnswer *a, struct error *e)
+static int send_missing(struct client *cl, const struct scene_files *files, const Farm__SubmitAnswer *a,
+			struct error *e)
 {
 	int rc = 0;
 	for (size_t i = 0; !rc && i < a->n_missing; i++) {
-		const struct scene_bundle_file *f = file_of_hash(b, &a->missing[i]);
-		rc = f ? send_file(cl, b, f, e)
+		const struct scene_file *f = file_of_hash(files, &a->missing[i]);
+		rc = f ? send_file(cl, files, f, e)
 		       : error_set(e, EPROTO, "the coordinator asks for a file that is not ours");
 	}
 	return rc;
 }
 
-int submit_send(struct client *cl, const struct submit_request *r, const struct scene_bundle *bundle,
-		struct submitted *job, char *plan_text, size_t plan_size, struct error *e)
+int submit_send(struct client *cl, const struct submit_request *r, const struct scene_files *of, struct submitted *job,
+		char *plan_text, size_t plan_size, struct error *e)
 {
-	struct scene_bundle b = *bundle; /* texts in messages are not const */
+	struct scene_files files = *of; /* texts in messages are not const */
 	struct client_message answer = {0};
-	int rc = send_submit(cl, r, &b, e);
+	int rc = send_submit(cl, r, &files, e);
 	if (!rc)
 		rc = wait_answer(cl, &answer, e);
 	if (!rc && answer.envelope.message->submit_answer->n_missing) {
-		rc = send_missing(cl, &b, answer.envelope.message->submit_answer, e);
+		rc = send_missing(cl, &files, answer.envelope.message->submit_answer, e);
 		client_message_fini(&answer);
 		if (!rc)
 			rc = wait_answer(cl, &answer, e);

@@ -13,26 +13,26 @@
 #include "worker/cli/base/options.h"
 
 /* A scene and its files, as read here. */
-struct scene_bundle {
+struct scene_files {
 	char *folder; /* of the scene file; names of files are relative to it, or to a folder of --path */
 	struct asset_folders folders;
 	char *scene; /* the scene file's name in it */
 	size_t count;
-	struct scene_bundle_file {
+	struct scene_file {
 		char *name;
 		struct blob_hash hash;
 		uint64_t size;
-	} * files;
+	} * list;
 	struct render_summary summary;
 	size_t note_count;
 	char **notes;
 };
 
 /* Reads and checks the scene with everything that it needs; files that building its world did not need are not part
- * of the bundle. No output may replace one of them. The error names file, line and element. */
-int scene_bundle_read(struct scene_bundle *b, const char *path, struct render_arguments *a,
-		      const struct output_files *outputs, struct error *e);
-void scene_bundle_fini(struct scene_bundle *b);
+ * among them. No output may replace one of them. The error names file, line and element. */
+int scene_files_read(struct scene_files *files, const char *path, struct render_arguments *a,
+		     const struct output_files *outputs, struct error *e);
+void scene_files_fini(struct scene_files *files);
 
 struct submit_request {
 	const char *name, *output; /* output: a file's name for a later fetch, or "" */
@@ -49,8 +49,8 @@ struct submitted {
 };
 
 /* -EACCES: refused, with the coordinator's sentence. plan_text: what was chosen, and by which rule. */
-int submit_send(struct client *cl, const struct submit_request *r, const struct scene_bundle *b, struct submitted *job,
-		char *plan_text, size_t plan_size, struct error *e);
+int submit_send(struct client *cl, const struct submit_request *r, const struct scene_files *files,
+		struct submitted *job, char *plan_text, size_t plan_size, struct error *e);
 
 struct submit_end {
 	uint32_t exit_code; /* of a program that waited */

@@ -23,7 +23,7 @@
 struct coat {
 	struct bsdf inner;
 	struct texture specular;
-	struct color absorption; /* sigma_a */
+	struct texture absorption; /* sigma_a */
 	double thickness, eta, specular_max;
 	struct rough_boundary boundary;
 	struct rough_boundary *rough; /* that one, or NULL: smooth */
@@ -72,9 +72,9 @@ static bool refract_into(const struct layer *l, vec3 w, struct passage *out)
 static spectrum absorbed_by(const struct coat *c, const struct bsdf_point *p, vec3 a, vec3 b)
 {
 	double way = c->thickness * (1 / fabs(a.z) + 1 / fabs(b.z));
-	if (!(c->thickness > 0) || color_max(&c->absorption) == 0)
+	if (!(c->thickness > 0) || texture_max(&c->absorption) == 0)
 		return spectrum_of(1);
-	spectrum s = color_eval(&c->absorption, p->w);
+	spectrum s = texture_eval(&c->absorption, &p->where, p->w);
 	for (int i = 0; i < SPECTRUM_LANES; i++)
 		s.v[i] = s.v[i] > 0 ? exp(-fmin(s.v[i] * way, 800)) : 1;
 	return s;
@@ -234,17 +234,8 @@ static int read_inner(struct coat *c, struct bsdf *b, const struct scene_node *n
 static int read_absorption(struct coat *c, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 			   struct error *e)
 {
-	const struct property *p = node_find(n, "sigma_a");
-	struct error reason;
 	c->thickness = node_float(n, "thickness", 1);
-	c->absorption = color_constant(0);
-	if (!p)
-		return 0;
-	int code = color_from_value(&p->value, COLOR_UNBOUNDED, build->arena, &c->absorption, &reason);
-	if (code)
-		return node_error(n, e, -code, "sigma_a: %s", reason.text);
-	bsdf_add_shape(b, c->absorption.shape);
-	return 0;
+	return bsdf_quantity(b, &c->absorption, n, "sigma_a", 0, false, build, e);
 }
 
 static int read_layer(struct coat *c, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
@@ -300,7 +291,7 @@ static int roughcoating_create(struct bsdf *b, const struct scene_node *n, const
 #define COAT_PARAMS                                                                           \
 	IOR_NUMBER("int_ior"), IOR_NUMBER("ext_ior"),                                         \
 		{.name = "specular_reflectance", .types = VALUE_TEXTURE, .min = 0, .max = 1}, \
-		{.name = "sigma_a", .types = VALUE_COLOR, .min = 0, .max = 1e9},              \
+		{.name = "sigma_a", .types = VALUE_TEXTURE, .min = 0, .max = 1e9},            \
 	{                                                                                     \
 		.name = "thickness", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1e9   \
 	}

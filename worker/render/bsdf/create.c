@@ -66,9 +66,9 @@ void bsdf_add_shape(struct bsdf *b, enum color_shape shape)
 }
 
 static int read_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name,
-			double fallback, const struct texture_build *build, struct error *e)
+			double fallback, enum color_role role, const struct texture_build *build, struct error *e)
 {
-	int code = texture_from_node(t, n, name, fallback, COLOR_REFLECTANCE, build, e);
+	int code = texture_from_node(t, n, name, fallback, role, build, e);
 	if (code)
 		return code;
 	bsdf_add_shape(b, texture_shape(t));
@@ -80,7 +80,7 @@ int bsdf_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, 
 		 const struct bsdf_build *build, struct error *e)
 {
 	const struct texture_build inner = bsdf_texture_build(build);
-	return read_texture(b, t, n, name, fallback, &inner, e);
+	return read_texture(b, t, n, name, fallback, COLOR_REFLECTANCE, &inner, e);
 }
 
 int bsdf_number(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
@@ -88,7 +88,15 @@ int bsdf_number(struct bsdf *b, struct texture *t, const struct scene_node *n, c
 {
 	struct texture_build inner = bsdf_texture_build(build);
 	inner.number = true;
-	return read_texture(b, t, n, name, fallback, &inner, e);
+	return read_texture(b, t, n, name, fallback, COLOR_REFLECTANCE, &inner, e);
+}
+
+int bsdf_quantity(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
+		  bool number, const struct bsdf_build *build, struct error *e)
+{
+	struct texture_build inner = bsdf_texture_build(build);
+	inner.number = number;
+	return read_texture(b, t, n, name, fallback, COLOR_UNBOUNDED, &inner, e);
 }
 
 enum { PROBE_SIDE = 64 };
@@ -128,4 +136,18 @@ struct bsdf_point bsdf_probe(const struct bsdf_probes *p, uint32_t i)
 			put_middle(p->mesh, &at.where);
 	}
 	return at;
+}
+
+struct bsdf_range bsdf_probe_range(const struct texture *t, const struct bsdf_build *build)
+{
+	const struct bsdf_probes probes = bsdf_probes_of(build);
+	struct bsdf_range r = {INFINITY, -INFINITY};
+	uint32_t count = texture_is_constant(t) ? 1 : probes.count;
+	for (uint32_t i = 0; i < count; i++) {
+		const struct bsdf_point at = bsdf_probe(&probes, i);
+		double x = spectrum_mean(texture_eval(t, &at.where, at.w));
+		r.least = fmin(r.least, x);
+		r.most = fmax(r.most, x);
+	}
+	return r;
 }

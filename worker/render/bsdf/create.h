@@ -17,6 +17,11 @@ int bsdf_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, 
 int bsdf_number(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
 		const struct bsdf_build *build, struct error *e);
 
+/* Likewise a quantity that may exceed 1: an index of refraction, an exponent, an absorption. number: it is no spectrum
+ * (texture_build). The caller checks its range. */
+int bsdf_quantity(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
+		  bool number, const struct bsdf_build *build, struct error *e);
+
 /*
  * Points at which textures are evaluated to find their range: a grid over (u,v), and points of the mesh's triangles in
  * turn. An attribute has its extremes at corners, and what depends on the distance to the edges has them there and
@@ -31,6 +36,12 @@ struct bsdf_probes {
 };
 struct bsdf_probes bsdf_probes_of(const struct bsdf_build *build);
 struct bsdf_point bsdf_probe(const struct bsdf_probes *p, uint32_t i);
+/* The smallest and the largest number of a texture there, means over the lanes: only colours that are no images differ
+ * in them. */
+struct bsdf_range {
+	double least, most;
+};
+struct bsdf_range bsdf_probe_range(const struct texture *t, const struct bsdf_build *build);
 
 /* Ends of `sample` where nothing is refracted. The lobes that are not specular send light to wi; false: the density
  * there is 0. */

@@ -7,18 +7,27 @@
 #include "worker/render/bsdf/warp.h"
 #include "worker/render/math/frame.h"
 
+#define EXPONENT_MAX 1e9
+
 struct phong {
 	struct texture diffuse, specular;
-	double exponent;
-	double scale;		/* of both reflectances */
-	double specular_chance; /* of sampling the specular lobe */
+	struct texture exponent; /* a number, EXPONENT_MAX at most */
+	double scale;		 /* of both reflectances */
+	double specular_chance;	 /* of sampling the specular lobe */
 };
 
 /* The lobe without its normalisation: zero behind the plane across the mirror direction. */
-static double lobe_of(const struct phong *ph, vec3 wo, vec3 wi)
+static double lobe_of(double exponent, vec3 wo, vec3 wi)
 {
 	double c = wo.z * wi.z - wo.x * wi.x - wo.y * wi.y;
-	return c > 0 ? pow(c, ph->exponent) : 0;
+	return c > 0 ? pow(c, exponent) : 0;
+}
+
+static double exponent_at(const struct phong *ph, const struct bsdf_point *p)
+{
+	if (texture_is_constant(&ph->exponent))
+		return ph->exponent.color.scale;
+	return fmin(fmax(spectrum_mean(texture_eval(&ph->exponent, &p->where, p->w)), 0), EXPONENT_MAX);
 }
 
 static spectrum phong_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
@@ -26,18 +35,17 @@ static spectrum phong_eval(const struct bsdf *b, const struct bsdf_point *p, vec
 	const struct phong *ph = b->data;
 	if (!(wo.z > 0 && wi.z > 0))
 		return spectrum_of(0);
-	double lobe = (ph->exponent + 2) / (2 * WARP_PI) * lobe_of(ph, wo, wi);
+	double exponent = exponent_at(ph, p), lobe = (exponent + 2) / (2 * WARP_PI) * lobe_of(exponent, wo, wi);
 	spectrum d = texture_eval(&ph->diffuse, &p->where, p->w), s = texture_eval(&ph->specular, &p->where, p->w);
 	return spectrum_scale(ph->scale, spectrum_add(spectrum_scale(1 / WARP_PI, d), spectrum_scale(lobe, s)));
 }
 
 static double phong_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
-	(void)p;
 	const struct phong *ph = b->data;
 	if (!(wo.z > 0 && wi.z > 0))
 		return 0;
-	double lobe = (ph->exponent + 1) / (2 * WARP_PI) * lobe_of(ph, wo, wi);
+	double exponent = exponent_at(ph, p), lobe = (exponent + 1) / (2 * WARP_PI) * lobe_of(exponent, wo, wi);
 	return ph->specular_chance * lobe + (1 - ph->specular_chance) * wi.z / WARP_PI;
 }
 
@@ -55,9 +63,23 @@ static bool phong_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 
 	const struct phong *ph = b->data;
 	if (!(wo.z > 0))
 		return false;
-	vec3 wi = u[2] < ph->specular_chance ? sample_lobe(ph->exponent, wo, u[0], u[1])
+	vec3 wi = u[2] < ph->specular_chance ? sample_lobe(exponent_at(ph, p), wo, u[0], u[1])
 					     : warp_cosine_hemisphere(u[0], u[1]);
 	return bsdf_sample_smooth(b, p, wo, wi, out);
+}
+
+/* An exponent's largest value, the one of the sharpest lobe, or the error. */
+static int read_exponent(struct phong *ph, struct bsdf *b, double *most, const struct scene_node *n,
+			 const struct bsdf_build *build, struct error *e)
+{
+	int code = bsdf_quantity(b, &ph->exponent, n, "exponent", 30, true, build, e);
+	if (code)
+		return code;
+	if (!(texture_max(&ph->exponent) <= EXPONENT_MAX))
+		return node_error(n, e, ERANGE, "exponent=%g is outside [0, %g]", texture_max(&ph->exponent),
+				  EXPONENT_MAX);
+	*most = fmax(bsdf_probe_range(&ph->exponent, build).most, 0);
+	return 0;
 }
 
 static int phong_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
@@ -66,26 +88,30 @@ static int phong_create(struct bsdf *b, const struct scene_node *n, const struct
 	int code = bsdf_texture(b, &ph->diffuse, n, "diffuse_reflectance", 0.5, build, e);
 	if (!code)
 		code = bsdf_texture(b, &ph->specular, n, "specular_reflectance", 0.2, build, e);
+	double exponent = 0;
+	if (!code)
+		code = read_exponent(ph, b, &exponent, n, build, e);
 	if (code)
 		return code;
 	double d = texture_max(&ph->diffuse), s = texture_max(&ph->specular);
 	b->black = d + s == 0;
-	ph->exponent = node_float(n, "exponent", 30);
 	ph->scale = d + s > 1 ? 0.99 / (d + s) : 1;
 	ph->specular_chance = d + s > 0 ? s / (d + s) : 0;
 	code = bsdf_check_energy(n, d + s, e);
 	b->modes = BSDF_REFLECT;
 	b->has_smooth = true;
-	double alpha = sqrt(2 / (ph->exponent + 2));
+	double alpha = sqrt(2 / (exponent + 2));
 	b->alpha = s > 0 ? alpha : INFINITY;
 	b->alpha_mean = ph->specular_chance * alpha + (1 - ph->specular_chance);
 	return code;
 }
 
 const struct bsdf_ops bsdf_ops_phong = {
-	.decl = PLUGIN(BSDF, "phong", {.name = "diffuse_reflectance", .types = VALUE_TEXTURE, .max = 1},
-		       {.name = "specular_reflectance", .types = VALUE_TEXTURE, .max = 1},
-		       {.name = "exponent", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1e9}, BSDF_ENERGY_PARAM),
+	.decl = PLUGIN(
+		BSDF, "phong", {.name = "diffuse_reflectance", .types = VALUE_TEXTURE, .max = 1},
+		{.name = "specular_reflectance", .types = VALUE_TEXTURE, .max = 1},
+		{.name = "exponent", .types = VALUE_FLOAT | VALUE_INT | VALUE_NODE, .min = 0, .max = EXPONENT_MAX},
+		BSDF_ENERGY_PARAM),
 	.data_size = sizeof(struct phong),
 	.create = phong_create,
 	.eval = phong_eval,

@@ -96,7 +96,7 @@ void principled_know(struct principled *p, const struct bsdf_build *build)
 	p->varies = !is_number(&p->roughness) || !is_number(&p->metallic);
 	for (int i = 0; i < SHARES; i++)
 		p->varies |= p->share[i].ops != NULL;
-	p->known = (struct principled_point){.p = p};
+	p->known = (struct principled_point){.p = p, .eta = p->eta};
 	read_numbers(p, &at, &p->known);
 }
 
@@ -120,9 +120,8 @@ static double schlick(double cosine)
 
 spectrum principled_boundary(const struct principled_point *s, double cosine)
 {
-	const struct principled *p = s->p;
-	double rest = schlick(cosine), root = (p->eta - 1) / (p->eta + 1), tint = s->share[SPEC_TINT];
-	double plain = (1 - tint) * fresnel_dielectric(min_of(cosine, 1), p->eta).reflected;
+	double rest = schlick(cosine), root = (s->eta - 1) / (s->eta + 1), tint = s->share[SPEC_TINT];
+	double plain = (1 - tint) * fresnel_dielectric(min_of(cosine, 1), s->eta).reflected;
 	spectrum f;
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
 		double tinted = min_of(s->specular.v[i] * root * root, 1);
@@ -392,16 +391,8 @@ static bool principled_sample(const struct bsdf *b, const struct bsdf_point *at,
 
 static double range_of(const struct texture *t, const struct bsdf_build *build, bool largest)
 {
-	const struct bsdf_probes probes = bsdf_probes_of(build);
-	double least = 1, most = 0;
-	uint32_t count = texture_is_constant(t) ? 1 : probes.count;
-	for (uint32_t i = 0; i < count; i++) {
-		const struct bsdf_point at = bsdf_probe(&probes, i);
-		double x = principled_share_at(t, &at);
-		least = fmin(least, x);
-		most = fmax(most, x);
-	}
-	return largest ? most : least;
+	const struct bsdf_range r = bsdf_probe_range(t, build);
+	return fmin(fmax(largest ? r.most : r.least, 0), 1);
 }
 
 double principled_least(const struct texture *t, const struct bsdf_build *build)
@@ -496,6 +487,7 @@ const struct bsdf_ops bsdf_ops_principled = {
 		       PRINCIPLED_SHARE("anisotropic"), PRINCIPLED_SHARE("coat"), PRINCIPLED_SHARE("coat_roughness"),
 		       {.name = "specular_color", .types = VALUE_TEXTURE, .min = 0, .max = 1},
 		       {.name = "lambertian", .types = VALUE_BOOL},
+		       {.name = "thin", .status = PARAM_REFUSED}, /* what is meant is `principledthin` */
 		       {.name = "specular", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 8},
 		       {.name = "eta", .types = VALUE_FLOAT | VALUE_INT, .min = 1, .max = 10},
 		       {.name = "diffuse_reflectance_sampling_rate", .status = PARAM_IGNORED},

@@ -25,7 +25,7 @@ enum {
 /* The parameters at a point of the surface. */
 struct principled_point {
 	spectrum base, tint, specular; /* specular: what SPEC_TINT mixes in */
-	double roughness, metallic, share[SHARES];
+	double roughness, metallic, eta, share[SHARES];
 	struct microfacet facets, coat; /* coat: only where there is one */
 	const struct principled *p;
 };

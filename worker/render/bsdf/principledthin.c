@@ -9,7 +9,8 @@
  * where transmitted light is reflected light mirrored to the other side, by facets D' with the roughness times 0.65 eta
  * - 0.35. Nothing is refracted: both sides have the same index.
  *
- * A `diff_trans` outside [0, 2] is refused. A sample fails where the facet's direction is on the wrong side.
+ * A `diff_trans` outside [0, 2] or an `eta` outside [1, 10] is refused. A sample fails where the facet's direction is
+ * on the wrong side.
  */
 #include "worker/render/bsdf/principled.h"
 
@@ -20,15 +21,29 @@
 
 enum { THIN_REFLECT, THIN_TRANSMIT, THIN_DIFFUSE, THIN_THROUGH, THIN_LOBES };
 
+#define THIN_ETA_MIN 1
+#define THIN_ETA_MAX 10
+
 struct thin {
 	struct principled p;
 	struct texture diff_trans; /* a number, `through`, if it has no ops */
 	double through;		   /* d of the header comment */
+	struct texture eta;	   /* a number, p.eta, if it has no ops */
 };
 
 static double through_at(const struct thin *t, const struct bsdf_point *p)
 {
 	return 0.5 * fmin(fmax(spectrum_mean(texture_eval(&t->diff_trans, &p->where, p->w)), 0), 2);
+}
+
+static double eta_at(const struct thin *t, const struct bsdf_point *p)
+{
+	return fmin(fmax(spectrum_mean(texture_eval(&t->eta, &p->where, p->w)), THIN_ETA_MIN), THIN_ETA_MAX);
+}
+
+static double passing_roughness(double eta, double roughness)
+{
+	return (0.65 * eta - 0.35) * roughness;
 }
 
 /* A point of the surface, and a direction from it, whose side counts as the upper one. */
@@ -44,7 +59,7 @@ static void find_chances(struct thin_point *x, double cosine)
 {
 	const struct thin *t = x->t;
 	double base = t->p.base_max, diffuse = 1 - x->spec_trans, sum = 0;
-	double reflected = fresnel_dielectric(min_of(cosine, 1), t->p.eta).reflected;
+	double reflected = fresnel_dielectric(min_of(cosine, 1), x->s.eta).reflected;
 	/* Facets reflect other shares than the plane they lie in, so neither lobe is ever left out. */
 	x->chance[THIN_REFLECT] = x->spec_trans * (0.25 + 0.5 * reflected);
 	x->chance[THIN_TRANSMIT] = x->spec_trans * base * (0.75 - 0.5 * reflected);
@@ -61,10 +76,12 @@ static struct thin_point thin_at(const struct bsdf *b, const struct bsdf_point *
 	const struct thin *t = b->data;
 	struct thin_point x = {.t = t, .s = principled_at(&t->p, p)};
 	x.through = t->diff_trans.ops ? through_at(t, p) : t->through;
+	if (t->eta.ops)
+		x.s.eta = eta_at(t, p);
 	/* Specular transmission is not what principled_diffuse leaves. */
 	x.spec_trans = x.s.share[TRANSMISSION];
 	x.s.share[TRANSMISSION] = 0;
-	x.passing = principled_facets(x.s.share[ANISOTROPIC], (0.65 * t->p.eta - 0.35) * x.s.roughness);
+	x.passing = principled_facets(x.s.share[ANISOTROPIC], passing_roughness(x.s.eta, x.s.roughness));
 	find_chances(&x, fabs(wo.z));
 	return x;
 }
@@ -83,7 +100,6 @@ struct pair {
 static struct pair pair_of(const struct thin_point *x, vec3 wo, vec3 wi)
 {
 	struct pair out = {spectrum_of(0), 0};
-	const struct thin *t = x->t;
 	bool reflect = wo.z * wi.z > 0;
 	const struct microfacet *m = reflect ? &x->s.facets : &x->passing;
 	vec3 h, o = facing_up(wo), i = facing_up(wi);
@@ -99,7 +115,7 @@ static struct pair pair_of(const struct thin_point *x, vec3 wo, vec3 wi)
 				     spectrum_scale(diffuse * (1 - x->through), d));
 		out.pdf = x->chance[THIN_REFLECT] * seen + x->chance[THIN_DIFFUSE] * i.z / WARP_PI;
 	} else {
-		double passes = both * fresnel_dielectric(cosine, t->p.eta).transmitted;
+		double passes = both * fresnel_dielectric(cosine, x->s.eta).transmitted;
 		out.f = spectrum_scale(passes + diffuse * x->through / WARP_PI, x->s.base);
 		out.pdf = x->chance[THIN_TRANSMIT] * seen + x->chance[THIN_THROUGH] * i.z / WARP_PI;
 	}
@@ -156,15 +172,30 @@ static int read_through(struct bsdf *b, struct thin *t, const struct scene_node 
 		return 0;
 	if (strcmp(texture->type, "checkerboard") != 0)
 		return bsdf_number(b, &t->diff_trans, n, "diff_trans", 0, build, e);
-	struct texture_build inner = bsdf_texture_build(build);
-	inner.number = true;
-	int code = texture_create(&t->diff_trans, texture, COLOR_UNBOUNDED, &inner, e);
+	int code = bsdf_quantity(b, &t->diff_trans, n, "diff_trans", 0, true, build, e);
 	if (code)
 		return code;
-	b->textured = true;
-	bsdf_add_shape(b, texture_shape(&t->diff_trans));
 	double most = texture_max(&t->diff_trans);
 	return most <= 2 ? 0 : node_error(n, e, ERANGE, "diff_trans=%g is outside [0, 2]", most);
+}
+
+/* p.eta becomes the smallest index, with which transmission is sharpest. */
+static int read_index(struct bsdf *b, struct thin *t, const struct scene_node *n, const struct bsdf_build *build,
+		      struct error *e)
+{
+	if (!node_ref(n, "eta")) {
+		t->p.eta = node_float(n, "eta", 1.5);
+		return 0;
+	}
+	int code = bsdf_quantity(b, &t->eta, n, "eta", 0, true, build, e);
+	if (code)
+		return code;
+	const struct bsdf_range r = bsdf_probe_range(&t->eta, build);
+	if (!(r.least >= THIN_ETA_MIN && texture_max(&t->eta) <= THIN_ETA_MAX))
+		return node_error(n, e, ERANGE, "eta=%g is outside [%d, %d]",
+				  r.least >= THIN_ETA_MIN ? texture_max(&t->eta) : r.least, THIN_ETA_MIN, THIN_ETA_MAX);
+	t->p.eta = r.least;
+	return 0;
 }
 
 static int thin_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
@@ -178,16 +209,17 @@ static int thin_create(struct bsdf *b, const struct scene_node *n, const struct 
 		code = principled_shares(p, b, n, build, e);
 	if (!code)
 		code = read_through(b, t, n, build, e);
+	if (!code)
+		code = read_index(b, t, n, build, e);
 	if (code)
 		return code;
 	p->metallic = (struct texture){.color = color_constant(0)};
-	p->eta = node_float(n, "eta", 1.5);
 	p->base_max = texture_max(&p->base);
 	principled_know(p, build);
 	double spec_trans = p->most[TRANSMISSION];
 	double rough = principled_least(&p->roughness, build);
 	struct microfacet facets = principled_facets(p->most[ANISOTROPIC], rough),
-			  passing = principled_facets(p->most[ANISOTROPIC], (0.65 * p->eta - 0.35) * rough);
+			  passing = principled_facets(p->most[ANISOTROPIC], passing_roughness(p->eta, rough));
 	b->modes = BSDF_REFLECT | (spec_trans > 0 || t->diff_trans.ops || t->through > 0 ? BSDF_TRANSMIT : 0);
 	b->has_smooth = true;
 	b->two_sided = true;
@@ -202,7 +234,10 @@ const struct bsdf_ops bsdf_ops_principledthin = {
 		       PRINCIPLED_SHARE("anisotropic"), PRINCIPLED_SHARE("spec_trans"), PRINCIPLED_SHARE("spec_tint"),
 		       PRINCIPLED_SHARE("sheen"), PRINCIPLED_SHARE("sheen_tint"), PRINCIPLED_SHARE("flatness"),
 		       {.name = "diff_trans", .types = VALUE_FLOAT | VALUE_INT | VALUE_NODE, .min = 0, .max = 2},
-		       {.name = "eta", .types = VALUE_FLOAT | VALUE_INT, .min = 1, .max = 10},
+		       {.name = "eta",
+			.types = VALUE_FLOAT | VALUE_INT | VALUE_NODE,
+			.min = THIN_ETA_MIN,
+			.max = THIN_ETA_MAX},
 		       {.name = "diffuse_reflectance_sampling_rate",
 			.types = VALUE_FLOAT | VALUE_INT,
 			.status = PARAM_IGNORED},

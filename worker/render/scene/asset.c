@@ -248,12 +248,10 @@ static bool find_entry(const char *folder, const char *inside, const char *wante
 		if (one->d_name[0] == '.' || !has_same_digits(one->d_name, wanted))
 			continue;
 		spelling_offer(&s, one->d_name);
-		if (s.best == one->d_name) { /* which the next one overwrites */
-			snprintf(best, NAME_MAX + 1, "%s", one->d_name);
-			s.best = best;
-		}
 	}
 	closedir(all);
+	if (s.best)
+		snprintf(best, NAME_MAX + 1, "%s", s.best);
 	return s.best != NULL;
 }
 

@@ -29,17 +29,6 @@ bool element_is_unset(const struct xml_element *el)
 	return unset;
 }
 
-bool element_is_of_scene(const struct xml_element *el)
-{
-	static const char *const names[] = {"embree_use_robust_intersection", "embree_use_robust_intersections",
-					    "allow_thread_reordering", "compact_accel", "portal_weight"};
-	const char *name = xml_attribute(el, "name");
-	for (size_t i = 0; i < sizeof names / sizeof *names && name; i++)
-		if (strcmp(name, names[i]) == 0)
-			return strcmp(el->name, "boolean") == 0 || strcmp(el->name, "float") == 0;
-	return false;
-}
-
 int xml_error(const struct xml_element *el, struct error *e, int errno_value, const char *format, ...)
 {
 	char text[768];
@@ -76,20 +65,11 @@ static bool is_listed(const char *list, const char *wanted, struct spelling *s)
 	return false;
 }
 
-/* spelling_offer keeps the pointer: the names of attributes must outlive the search, those in a list do not. */
 static int refuse_attribute(const struct xml_element *el, const char *known, const char *wanted, struct error *e)
 {
-	char name[64], best[64] = "", hint[128];
+	char hint[128];
 	struct spelling s = {.wanted = wanted};
-	for (const char *list = known; (list = element_next_name(list, name, sizeof name));) {
-		const char *before = s.best;
-		size_t distance = s.distance;
-		spelling_offer(&s, name);
-		if (s.best && (s.best != before || s.distance != distance)) {
-			memcpy(best, name, sizeof best);
-			s.best = best;
-		}
-	}
+	is_listed(known, wanted, &s);
 	return xml_error(el, e, EINVAL, "has no attribute `%.64s`%s (it may have: %s)", wanted,
 			 spelling_hint(&s, hint, sizeof hint), known);
 }

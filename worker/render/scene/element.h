@@ -49,9 +49,6 @@ const char *element_spelling(const struct xml_element *el, const char *name);
 /* Whether a value in it, such as a step of a transform, is unset. */
 bool element_is_unset(const struct xml_element *el);
 
-/* Whether it is a value that Mitsuba 3 takes directly in <scene>. All are about how it computes, not about light. */
-bool element_is_of_scene(const struct xml_element *el);
-
 /* error_set with "file:line: <element>: " before the text. */
 __attribute__((format(printf, 4, 5))) int xml_error(const struct xml_element *el, struct error *e, int errno_value,
 						    const char *format, ...);

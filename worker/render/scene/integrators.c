@@ -3,32 +3,78 @@
 
 #include "worker/render/scene/depth.h"
 
+/* Those of both dialects, and the ones here. */
+static const struct {
+	const char *type;
+	bool other; /* its image is of something other than all light */
+	bool no_media;
+} types[] = {
+	{"path", false, true},
+	{"volpath", false, false},
+	{"volpath_simple", false, false},
+	{"volpathmis", false, false},
+	{"prbvolpath", false, false},
+	{"ptracer", false, false},
+	{"bdpt", false, false},
+	{"mlt", false, false},
+	{"pssmlt", false, false},
+	{"erpt", false, false},
+	{"hslt", false, false},
+	{"adaptive", false, false},
+	{"motion", false, false},
+	{"direct", false, true},
+	{"direct_projective", false, true},
+	{"direct_reparam", false, false},
+	{"prb", false, true},
+	{"prb_basic", false, true},
+	{"prb_projective", false, true},
+	{"prb_reparam", false, false},
+	{"emission_reparam", true, false},
+	{"volprim_rf_basic", true, false},
+	{"aov", true, false},
+	{"multichannel", true, false},
+	{"stokes", true, false},
+	{"moment", true, false},
+	{"depth", true, false},
+	{"field", true, false},
+	{"ao", true, false},
+	{"vpl", true, false},
+	{"irrcache", true, false},
+	{"sppm", true, false},
+	{"ppm", true, false},
+	{"photonmapper", true, false},
+};
+enum { TYPES = sizeof types / sizeof *types };
+
+/* TYPES: unknown. */
+static size_t find(const char *type)
+{
+	size_t i = 0;
+	while (i < TYPES && strcmp(types[i].type, type) != 0)
+		i++;
+	return i;
+}
+
+const char *integrators_at(size_t i, struct integrator_image *out)
+{
+	if (i >= TYPES)
+		return NULL;
+	*out = (struct integrator_image){.other = types[i].other,
+					 .direct = depth_is_direct(types[i].type),
+					 .prb = depth_is_prb(types[i].type),
+					 .no_media = types[i].no_media};
+	return types[i].type;
+}
+
 bool integrators_show_other(const struct scene_node *n)
 {
-	static const char *const others[] = {"emission_reparam",
-					     "volprim_rf_basic",
-					     "aov",
-					     "multichannel",
-					     "stokes",
-					     "moment",
-					     "depth",
-					     "field",
-					     "ao",
-					     "vpl",
-					     "irrcache",
-					     "sppm",
-					     "ppm",
-					     "photonmapper"};
-	return text_is_among(n->type, others, sizeof others / sizeof *others);
+	size_t i = find(n->type);
+	return i < TYPES && types[i].other;
 }
 
 bool integrators_are_known(const struct scene_node *n)
 {
-	static const char *const lights[] = {"path", "volpath", "volpath_simple", "volpathmis", "prbvolpath", "ptracer",
-					     "bdpt", "mlt",	"pssmlt",	  "erpt",	"adaptive",   "motion",
-					     "hslt"};
-	return text_is_among(n->type, lights, sizeof lights / sizeof *lights) || integrators_show_other(n) ||
-	       depth_is_direct(n->type) || depth_is_prb(n->type);
+	return find(n->type) < TYPES || depth_is_direct(n->type);
 }
 
 const struct scene_node *integrators_inner(const struct scene_node *n)
@@ -60,10 +106,10 @@ int64_t integrators_depth(const struct scene_node *n)
 
 const struct scene_node *integrators_without_media(const struct scene_node *n)
 {
-	static const char *const without[] = {"path", "direct",	   "direct_projective",
-					      "prb",  "prb_basic", "prb_projective"};
-	for (; n; n = integrators_inner(n))
-		if (text_is_among(n->type, without, sizeof without / sizeof *without))
+	for (; n; n = integrators_inner(n)) {
+		size_t i = find(n->type);
+		if (i < TYPES && types[i].no_media)
 			return n;
+	}
 	return NULL;
 }

@@ -5,6 +5,19 @@
 
 #include "worker/render/scene/node.h"
 
+#include <stdbool.h>
+#include <stddef.h>
+
+/* What becomes of the image of an integrator of this type. */
+struct integrator_image {
+	bool other;    /* Mitsuba's is not of all light: ours is of that, or of what the integrator inside asks for */
+	bool direct;   /* of light that is scattered once */
+	bool prb;      /* of short paths, unless the scene says otherwise */
+	bool no_media; /* without media */
+};
+/* The i-th known type; NULL after the last. */
+const char *integrators_at(size_t i, struct integrator_image *out);
+
 /* The one inside n; of several (`multichannel`, `aov`) the first that shows light, if any does. NULL: none. */
 const struct scene_node *integrators_inner(const struct scene_node *n);
 

@@ -233,7 +233,8 @@ const struct param *lenient_old_param(const struct plugin_decl *d, bool stands_i
 static bool has_passage(const struct scene_node *n)
 {
 	static const char *const types[] = {"null",	  "polarizer",	     "circular",       "retarder",  "mask",
-					    "dielectric", "roughdielectric", "thindielectric", "difftrans", NULL},
+					    "dielectric", "roughdielectric", "thindielectric", "difftrans", "hk",
+					    NULL},
 				 *const parameters[] = {"spec_trans", "diff_trans", NULL};
 	if (is_one_of(n->type, types))
 		return true;

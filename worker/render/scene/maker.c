@@ -10,9 +10,11 @@
 #include "worker/render/scene/maker.h"
 
 #include "worker/render/scene/animation.h"
+#include "worker/render/scene/gltf.h"
 #include "worker/render/scene/lenient.h"
 #include "worker/render/scene/nesting.h"
 #include "worker/render/scene/old_values.h"
+#include "worker/render/scene/over_one.h"
 #include "worker/render/scene/param_check.h"
 #include "worker/render/scene/plugin.h"
 #include "worker/render/scene/refuse.h"
@@ -33,6 +35,7 @@ struct draft {
 	const struct plugin_decl *decl;
 	bool stands_in; /* replaces a plug-in that is not supported */
 	bool lacks;	/* something inside it was left out, or is wrong */
+	bool flat;	/* its transform has no inverse */
 	struct property *properties;
 	const struct scene_node **children;
 	struct xml_nesting nesting;
@@ -63,6 +66,10 @@ static int add_property(struct maker *m, struct draft *d, const struct xml_eleme
 			struct value v)
 {
 	int r = param_check(el, p, &v, m->error);
+	if (r == -ERANGE && over_one(d->node->cls, p, &v)) {
+		const struct error why = *m->error;
+		return error_set(m->error, ERANGE, "%s%s", why.text, OVER_ONE_HINT);
+	}
 	if (r)
 		return r;
 	const struct property *before = node_find(d->node, p->name);
@@ -74,27 +81,42 @@ static int add_property(struct maker *m, struct draft *d, const struct xml_eleme
 	return 0;
 }
 
-/* Forks of Mitsuba add parameters. A name that resembles none in the table with an effect, and that no other plug-in of
- * the class has, is taken for one of these; other unknown names are mistakes. In 3.x sensors, films, shapes and
- * emitters alone allow it: elsewhere parameters are visible in the image, and Mitsuba 3 refuses them. 0.6 ignores
- * unknown names of all classes, and in its files an object may have the parameter of another, left there when its type
- * was changed. */
+/* Whether another plug-in of the class has it, by this name or, as in 0.6, by one with capitals. */
+static bool is_of_another(const struct maker *m, enum plugin_class cls, const char *name)
+{
+	char snake[128] = "";
+	if (strlen(name) < sizeof snake / 2)
+		snake_case(name, snake);
+	for (const struct plugin_decl *other = m->decls; other->type; other++)
+		if (other->cls == cls && (plugin_param(other, name) || plugin_param(other, snake)))
+			return true;
+	return false;
+}
+
+/* Forks of Mitsuba add parameters. A name that resembles none in the table with an effect, and in 3.x no other plug-in
+ * of the class has, is taken for one of these; other unknown names are mistakes. Materials, textures, media and filters
+ * are visible in the image, so in 3.x more is taken for a mistake there than a spelling. In files of 0.6 an object may
+ * have the parameter of another, left there when its type was changed. What glTF names is its own, and what stands in
+ * for a plug-in has other names. */
 static bool is_foreign_parameter(const struct maker *m, const struct draft *d, const struct xml_element *el,
 				 const char *name)
 {
 	enum plugin_class cls = d->node->cls;
-	struct spelling s = {.wanted = name};
 	bool hidden = cls == PLUGIN_SENSOR || cls == PLUGIN_FILM || cls == PLUGIN_SHAPE || cls == PLUGIN_EMITTER;
 	/* Shapes of Mitsuba 3 may hold textures of any name, for whoever asks for attributes. */
 	bool attribute = cls == PLUGIN_SHAPE && (strcmp(el->name, "texture") == 0 || strcmp(el->name, "ref") == 0);
-	if (!(value_is_element(el->name) || (attribute && !el->snake)) || !(el->snake || hidden))
+	if (!value_is_element(el->name) && !(attribute && !el->snake))
 		return false;
+	if (!el->snake && !hidden && (gltf_is(el->file) || d->stands_in))
+		return false;
+	struct spelling s = {.wanted = name};
 	plugin_offer_params(d->decl, &s);
-	for (const struct plugin_decl *other = m->decls; other->type && !s.best && !el->snake; other++)
-		if (other->cls == cls && plugin_param(other, name))
-			return false;
-	const struct param *meant = s.best ? plugin_param(d->decl, s.best) : NULL;
-	return !s.best || (meant && meant->status == PARAM_IGNORED);
+	const struct param *meant = s.best		  ? plugin_param(d->decl, s.best)
+				    : hidden || el->snake ? NULL
+							  : meant_parameter(d->decl, name);
+	if (!meant)
+		return el->snake || !is_of_another(m, cls, name);
+	return meant->status == PARAM_IGNORED;
 }
 
 /* Of an integrator or sampler all is ignored but a few parameters: a name that resembles one of these may be meant for
@@ -118,7 +140,7 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 {
 	const char *here = el->snake ? plugin_new_name(d->decl, name) : name;
 	const struct param *found = plugin_param(d->decl, d->stands_in ? lenient_param(d->decl->type, here) : here);
-	const char *written = element_spelling(el, name), *no_effect = "has no effect on light and is ignored";
+	const char *written = element_spelling(el, name);
 	int r = 0;
 	*p = NULL;
 	if (d->decl->status == PARAM_IGNORED) {
@@ -129,7 +151,7 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 		r = note_old_name(&m->notes, owner, el, found->name);
 	/* All BSDFs of 0.6 have it; those whose reflectances can add up to more than 1 have it in their tables. */
 	if (!found && el->snake && d->node->cls == PLUGIN_BSDF && strcmp(name, "ensure_energy_conservation") == 0)
-		return note_parameter(&m->notes, owner, el, written, no_effect);
+		return note_no_effect(&m->notes, owner, el, written);
 	if (!found && is_foreign_parameter(m, d, el, name))
 		return note_parameter(&m->notes, owner, el, written, "is not known and is ignored");
 	if (found && d->stands_in && lenient_says_again(d->decl->type, found->name, owner))
@@ -140,7 +162,7 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 	if (!found || found->status == PARAM_REFUSED)
 		return refuse_property(d->decl, d->node->type, el, name, found, m->error);
 	if (found->status == PARAM_IGNORED)
-		return note_parameter(&m->notes, owner, el, written, no_effect);
+		return note_no_effect(&m->notes, owner, el, written);
 	if ((found->types & VALUE_OF_3) && !m->tree->dialect_3)
 		return note_parameter(&m->notes, owner, el, written,
 				      "is not a parameter of Mitsuba 0.6 and is ignored, as there");
@@ -148,6 +170,18 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 		return note_difference(&m->notes, owner, el, written);
 	*p = found;
 	return r;
+}
+
+/* What a value means where Mitsuba, or `lenient`, takes it for another one. Of what stands in for a plug-in that has
+ * the parameter in other units, the value is left out instead. */
+static int adjust_value(struct maker *m, const struct draft *d, const struct xml_element *owner,
+			const struct xml_element *el, const struct param *p, struct value *v)
+{
+	enum plugin_class cls = d->node->cls;
+	int r = el->snake ? old_value(&m->notes, owner, el, p, cls, m->arena, v) : 0;
+	if (!r && (p->types & VALUE_CLIPPED))
+		return clip_value(&m->notes, owner, el, p, v);
+	return !r && m->lenient && !d->stands_in ? over_one_value(&m->notes, owner, el, cls, p, m->arena, v) : r;
 }
 
 static int read_property(struct maker *m, struct draft *d, const struct xml_element *owner,
@@ -176,10 +210,8 @@ static int read_property(struct maker *m, struct draft *d, const struct xml_elem
 		return r || !p ? r : REPORT_TOLD;
 	struct value v;
 	r = value_read(el, m->assets_from, m->arena, &v, m->error);
-	if (!r && el->snake)
-		r = old_value(&m->notes, owner, el, p, d->node->cls, m->arena, &v);
-	if (!r && (p->types & VALUE_CLIPPED))
-		r = clip_value(&m->notes, owner, el, p, &v);
+	if (!r)
+		r = adjust_value(m, d, owner, el, p, &v);
 	if (!r && v.type == VALUE_TRANSFORM)
 		v.animation = animation;
 	if (!r)
@@ -193,8 +225,12 @@ static int read_property(struct maker *m, struct draft *d, const struct xml_elem
 		r = *v.as.string ? maker_add_asset(m, v.as.string, owner)
 				 : xml_error(el, m->error, EINVAL, "an empty file name");
 	mat4 inverse;
-	if (!r && v.type == VALUE_TRANSFORM && d->node->cls == PLUGIN_SHAPE && !mat4_invert(v.as.transform, &inverse))
-		r = xml_error(owner, m->error, EINVAL, "%s flattens the shape (it has no inverse): line %d", written,
+	bool flat = !r && v.type == VALUE_TRANSFORM && d->node->cls == PLUGIN_SHAPE &&
+		    !mat4_invert(v.as.transform, &inverse);
+	d->flat |= flat;
+	if (flat && !m->lenient)
+		r = xml_error(owner, m->error, EINVAL,
+			      "%s flattens the shape (it has no inverse): line %d; --lenient leaves it out", written,
 			      el->line);
 	const char *file = v.type == VALUE_SPECTRUM ? xml_attribute(el, "filename") : NULL;
 	return r || !file ? r : maker_add_asset(m, file, el);
@@ -247,6 +283,8 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 	if (!r)
 		r = nesting_take(&d->nesting, d->node->cls, el, target, once, m->error);
 	if (r)
+		return r;
+	if (p && (r = over_one_texture(&m->notes, d->node->cls, p, m->lenient, m->arena, el, &child)))
 		return r;
 	if (p)
 		return add_property(m, d, el, p, (struct value){.type = VALUE_NODE, .as.node = child});
@@ -450,6 +488,11 @@ int maker_node(struct maker *m, struct xml_element *el, const struct scene_node 
 	el->busy = false;
 	el->nesting = d.nesting;
 	*out = d.node;
+	if (!r && d.flat && m->lenient) {
+		if (m->flat_shapes++ == 0)
+			m->first_flat = el;
+		return REPORT_TOLD;
+	}
 	if (!r)
 		r = remarks_on_object(d.node, &m->report, m->error);
 	if (!r && m->lenient && (r = substitute_medium(&m->notes, el, d.lacks, d.node)))

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/scene/notes.h"
 
+#include "common/base/spelling.h"
+#include "common/base/text.h"
 #include "worker/render/scene/plugin.h"
 
 #include <ctype.h>
@@ -28,6 +30,32 @@ int note_parameter(const struct notes *t, const struct xml_element *owner, const
 	const char *type = xml_attribute(owner, "type");
 	return note(t, owner, type, name, "%s:%d: <%.64s type=\"%.64s\">: `%.64s` %s", el->file, el->line, owner->name,
 		    type, name, what);
+}
+
+int note_no_effect(struct notes *t, const struct xml_element *owner, const struct xml_element *el, const char *name)
+{
+	const char *type = xml_attribute(owner, "type");
+	char key[REPORT_TEXT_MAX], shown[72], text[REPORT_TEXT_MAX];
+	snprintf(key, sizeof key, "%.64s/%.64s/%.64s", owner->name, type, name);
+	if (report_has(t->report, key))
+		return 0;
+	snprintf(shown, sizeof shown, "`%.64s`", name);
+	if (t->owner == owner) {
+		spelling_list(t->names, sizeof t->names, shown);
+		text_print(text, sizeof text,
+			   "%.160s:%d: <%.32s type=\"%.64s\">: %s have no effect on light and are ignored", el->file,
+			   t->line, owner->name, type, t->names);
+		return report_extend(t->report, t->at, key, text, t->error);
+	}
+	uint32_t before = t->report->note_count;
+	int r = note_parameter(t, owner, el, name, "has no effect on light and is ignored");
+	if (t->report->note_count > before && t->report->note_count < REPORT_NOTES_MAX) {
+		t->owner = owner;
+		t->at = before;
+		t->line = el->line;
+		snprintf(t->names, sizeof t->names, "%s", shown);
+	}
+	return r;
 }
 
 int note_difference(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,

@@ -13,6 +13,10 @@
 struct notes {
 	struct report *report;
 	struct error *error;
+	const struct xml_element *owner; /* the object whose parameters without effect were noted last; NULL: none */
+	uint32_t at;			 /* which note that is */
+	int line;			 /* its place */
+	char names[256];		 /* the parameters in it */
 };
 
 /* type, property: with the element's name the kind of thing. */
@@ -21,6 +25,8 @@ __attribute__((format(printf, 5, 6))) int note(const struct notes *t, const stru
 /* What becomes of a parameter: "is ignored". */
 int note_parameter(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 		   const char *name, const char *what);
+/* One without effect on light; those of an object share a line. */
+int note_no_effect(struct notes *t, const struct xml_element *owner, const struct xml_element *el, const char *name);
 /* One that would change light a little. */
 int note_difference(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 		    const char *name);

@@ -1,4 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Look-ups in the tables of plug-ins, and two tables of its own: the names that parameters had in 0.5 and 0.6, and
+ * Mitsuba's plug-ins that the tables lack. They are lists of some dozens, searched from the beginning.
+ */
 #include "worker/render/scene/plugin.h"
 
 #include <string.h>
@@ -65,16 +69,38 @@ const struct param *plugin_param(const struct plugin_decl *d, const char *name)
 	return any;
 }
 
+bool plugin_any_has(const struct plugin_decl *decls, const char *name)
+{
+	for (; decls->type; decls++)
+		for (const struct param *p = decls->params; p && p->name; p++)
+			if (strcmp(p->name, name) == 0)
+				return true;
+	return false;
+}
+
+static const struct {
+	enum plugin_class cls;
+	const char *type, *old, *now;
+} names[] = {
+	{PLUGIN_BSDF, "diffuse", "diffuse_reflectance", "reflectance"},
+	{PLUGIN_BSDF, "roughdiffuse", "diffuse_reflectance", "reflectance"},
+	{PLUGIN_MEDIUM, "heterogeneous", "density", "sigma_t"},
+};
+
+bool plugin_new_name_at(size_t i, struct renamed *out)
+{
+	if (i >= sizeof names / sizeof *names)
+		return false;
+	*out = (struct renamed){.element = class_names[names[i].cls],
+				.type = names[i].type,
+				.old = names[i].old,
+				.now = names[i].now,
+				.parameter = true};
+	return true;
+}
+
 const char *plugin_new_name(const struct plugin_decl *d, const char *name)
 {
-	static const struct {
-		enum plugin_class cls;
-		const char *type, *old, *now;
-	} names[] = {
-		{PLUGIN_BSDF, "diffuse", "diffuse_reflectance", "reflectance"},
-		{PLUGIN_BSDF, "roughdiffuse", "diffuse_reflectance", "reflectance"},
-		{PLUGIN_MEDIUM, "heterogeneous", "density", "sigma_t"},
-	};
 	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
 		if (names[i].cls == d->cls && strcmp(names[i].type, d->type) == 0 && strcmp(names[i].old, name) == 0)
 			return names[i].now;
@@ -98,7 +124,6 @@ static const struct {
 	{PLUGIN_SHAPE, "packed"},
 	{PLUGIN_BSDF, "acousticbsdf"},
 	{PLUGIN_BSDF, "dielectric_disp"},
-	{PLUGIN_BSDF, "hk"},
 	{PLUGIN_BSDF, "irawan"},
 	{PLUGIN_BSDF, "neuralbsdf"},
 	{PLUGIN_BSDF, "openpbr"},
@@ -119,6 +144,14 @@ static const struct {
 	{PLUGIN_SENSOR, "irradiancemeter"},
 	{PLUGIN_SENSOR, "microphone"},
 	{PLUGIN_SENSOR, "radiancemeter"},
+	{PLUGIN_SAMPLER, "halton"},
+	{PLUGIN_SAMPLER, "hammersley"},
+	{PLUGIN_SAMPLER, "independent"},
+	{PLUGIN_SAMPLER, "ldsampler"},
+	{PLUGIN_SAMPLER, "multijitter"},
+	{PLUGIN_SAMPLER, "orthogonal"},
+	{PLUGIN_SAMPLER, "sobol"},
+	{PLUGIN_SAMPLER, "stratified"},
 	{PLUGIN_FILM, "specfilm"},
 	{PLUGIN_FILM, "tape"},
 	{PLUGIN_MEDIUM, "heterogeneous"},

@@ -17,13 +17,25 @@ void plugin_offer_classes(struct spelling *s);
 const struct plugin_decl *plugin_find(const struct plugin_decl *decls, enum plugin_class cls, const char *type);
 const struct param *plugin_param(const struct plugin_decl *d, const char *name);
 
+/* Whether any of them has a parameter of that name. */
+bool plugin_any_has(const struct plugin_decl *decls, const char *name);
+
 /* The 3.x name of what 0.5/0.6 names differently, beyond the spelling; otherwise the name itself. */
 const char *plugin_new_name(const struct plugin_decl *d, const char *name);
+
+/* A name of an older version, and the one that it is read as. */
+struct renamed {
+	int before;		    /* the minor version of 0.x from which on it is not; 0: any */
+	const char *element, *type; /* what has it, or in which a parameter is; NULL: any */
+	const char *old, *now;
+	bool parameter; /* otherwise a type; without an element, that of elements themselves */
+};
+bool plugin_new_name_at(size_t i, struct renamed *out); /* false: no more */
 
 /* An object in the scene that only tells Mitsuba where light comes from, and changes no image. type: NULL: none. */
 bool plugin_is_guide(const char *element, const char *type);
 
-/* Whether it is one of Mitsuba's own plug-ins, of either dialect, that are not or were not supported. */
+/* Whether it is one of Mitsuba's own plug-ins, of either dialect, that the tables lack, or lacked, by this name. */
 bool plugin_is_mitsubas(enum plugin_class cls, const char *type);
 /* The index-th of these, with its class; NULL: no more. */
 const char *plugin_of_mitsuba(size_t index, enum plugin_class *cls);

@@ -95,6 +95,31 @@ int refuse_type(const struct plugin_decl *decls, const struct xml_element *el, e
 			 *near && *lenient ? lenient + 1 : lenient, list); /* after "?" without ";" */
 }
 
+/* Whether the shorter of two names is the first or the last words of the longer one, as `ior` is of `int_ior`. */
+static bool is_part(const char *a, const char *b)
+{
+	size_t n = strlen(a), m = strlen(b);
+	if (n > m)
+		return is_part(b, a);
+	if (n == 0 || n == m)
+		return false;
+	return (b[n] == '_' && strncmp(a, b, n) == 0) || (b[m - n - 1] == '_' && strcmp(a, b + m - n) == 0);
+}
+
+const struct param *meant_parameter(const struct plugin_decl *owner, const char *name)
+{
+	struct spelling s = {.wanted = name};
+	plugin_offer_params(owner, &s);
+	const char *usual = lenient_param(owner->type, name), *best = s.best;
+	if (!best && strcmp(usual, name) != 0)
+		best = usual;
+	const struct param *meant = best ? plugin_param(owner, best) : NULL;
+	for (const struct param *p = owner->params; p && p->name && !meant; p++)
+		if (p->status != PARAM_IGNORED && is_part(name, p->name))
+			meant = p;
+	return meant;
+}
+
 int refuse_property(const struct plugin_decl *owner, const char *type, const struct xml_element *el, const char *name,
 		    const struct param *p, struct error *e)
 {
@@ -109,8 +134,8 @@ int refuse_property(const struct plugin_decl *owner, const char *type, const str
 	const char *value = xml_attribute(el, "value");
 	if (gltf_is(el->file) && value && strcmp(value, ELEMENT_UNSUPPORTED) == 0)
 		return xml_error(el->parent, e, ENOTSUP, "`%.64s` is not supported; --lenient leaves it out", name);
-	struct spelling s = {.wanted = name};
-	plugin_offer_params(owner, &s);
+	const struct param *meant = meant_parameter(owner, name);
+	struct spelling s = {.wanted = name, .best = meant ? meant->name : NULL};
 	return xml_error(el, e, EINVAL, "<%s type=\"%.64s\"> has no `%.64s`%s (supported: %s)",
 			 plugin_class_name(owner->cls), type, written, spelling_hint(&s, hint, sizeof hint), list);
 }

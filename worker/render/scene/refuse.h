@@ -14,6 +14,10 @@ int refuse_element(const struct xml_element *el, struct error *e);
 int refuse_type(const struct plugin_decl *decls, const struct xml_element *el, enum plugin_class cls, const char *type,
 		struct error *e);
 
+/* The parameter that a name which `owner` does not have is a misspelling of, another usual name for, or, where the
+ * parameter has an effect, a part of; NULL: none. */
+const struct param *meant_parameter(const struct plugin_decl *owner, const char *name);
+
 /* A parameter of `owner`, whose type in the file is `type`: unknown (p NULL), or not supported. */
 int refuse_property(const struct plugin_decl *owner, const char *type, const struct xml_element *el, const char *name,
 		    const struct param *p, struct error *e);

@@ -23,13 +23,37 @@ __attribute__((format(printf, 5, 0))) int report_note(struct report *r, const ch
 	return report_text(r, file, key, text, e);
 }
 
+bool report_has(const struct report *r, const char *key)
+{
+	size_t length = strlen(key);
+	for (uint32_t i = 0; i < r->note_count; i++)
+		for (const char *line = r->note_keys[i]; line; line = strchr(line, '\n')) {
+			line += *line == '\n';
+			if (strncmp(line, key, length) == 0 && (!line[length] || line[length] == '\n'))
+				return true;
+		}
+	return false;
+}
+
+int report_extend(struct report *r, uint32_t note, const char *key, const char *text, struct error *e)
+{
+	size_t before = strlen(r->note_keys[note]), added = strlen(key);
+	char *keys = arena_alloc(r->arena, before + added + 2, 1), *copy = keys ? arena_strdup(r->arena, text) : NULL;
+	if (!copy)
+		return error_set(e, ENOMEM, "out of memory");
+	memcpy(keys, r->note_keys[note], before);
+	keys[before] = '\n';
+	memcpy(keys + before + 1, key, added + 1);
+	text_clean(copy);
+	r->note_keys[note] = keys;
+	r->notes[note] = copy;
+	return 0;
+}
+
 int report_text(struct report *r, const char *file, const char *key, const char *said, struct error *e)
 {
 	char text[REPORT_TEXT_MAX];
-	for (uint32_t i = 0; i < r->note_count; i++)
-		if (strcmp(r->note_keys[i], key) == 0)
-			return 0;
-	if (r->note_count == REPORT_NOTES_MAX)
+	if (r->note_count == REPORT_NOTES_MAX || report_has(r, key))
 		return 0;
 	snprintf(text, sizeof text, "%s", said);
 	text_clean(text);

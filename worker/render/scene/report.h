@@ -10,6 +10,7 @@
 #include "common/base/error.h"
 
 #include <stdarg.h>
+#include <stdbool.h>
 #include <stdint.h>
 
 enum { REPORT_NOTES_MAX = 256, REPORT_PROBLEMS_MAX = 1024, REPORT_TEXT_MAX = 512 };
@@ -17,14 +18,20 @@ enum { REPORT_NOTES_MAX = 256, REPORT_PROBLEMS_MAX = 1024, REPORT_TEXT_MAX = 512
 struct report {
 	struct arena *arena;
 	uint32_t note_count, problem_count;
-	const char **notes, **note_keys, **problems; /* REPORT_..._MAX */
-	int code;				     /* of the first problem; 0: none */
+	const char **notes, **problems; /* REPORT_..._MAX */
+	const char **note_keys;		/* one key per line */
+	int code;			/* of the first problem; 0: none */
 	struct error first;
 };
 
 int report_init(struct report *r, struct arena *arena, struct error *e);
 
-/* key: identifies the kind of thing; a second note with the same key is dropped. 0 or -ENOMEM. */
+/* Another thing joins a note, which gets the new text. */
+int report_extend(struct report *r, uint32_t note, const char *key, const char *text, struct error *e);
+/* Whether a note with the key is there. */
+bool report_has(const struct report *r, const char *key);
+
+/* key: identifies the kind of thing, without line feeds; a second note with the same key is dropped. 0 or -ENOMEM. */
 int report_note(struct report *r, const char *file, const char *key, struct error *e, const char *format, va_list ap);
 
 int report_text(struct report *r, const char *file, const char *key, const char *said, struct error *e);

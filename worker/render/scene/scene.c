@@ -52,6 +52,14 @@ static int read_include(struct maker *m, const struct xml_element *el, const str
 	return r ? r : read_top(m, strcmp(el->first->name, "scene") == 0 ? el->first : el, objects);
 }
 
+/* A value directly in <scene>, in 3.x, that means nothing: no spectrum for others, and none of a plug-in's parameters
+ * in the wrong place. 0.6 ignores all. */
+static bool is_foreign_value(const struct maker *m, const struct xml_element *el)
+{
+	const char *name = xml_attribute(el, "name");
+	return name && !id_table_names(el) && !plugin_any_has(m->decls, name);
+}
+
 /* An element that stands directly in <scene>, or alone in a file that is included there. */
 static int read_top_element(struct maker *m, struct xml_element *el, const struct scene_node **objects)
 {
@@ -68,7 +76,7 @@ static int read_top_element(struct maker *m, struct xml_element *el, const struc
 		return element_check(el, "name|value", false, m->error);
 	if (strcmp(el->name, "path") == 0)
 		return element_check(el, "value", false, m->error);
-	if (value_is_element(el->name) && (el->snake || element_is_of_scene(el))) /* 0.6 has none and ignores all */
+	if (value_is_element(el->name) && (el->snake || is_foreign_value(m, el)))
 		return note_foreign(&m->notes, el);
 	if (el->unset)
 		return 0;
@@ -142,6 +150,17 @@ static bool add_default_light(struct xml_tree *t, const struct plugin_decl *decl
 	return make_daylight(t->root, arena);
 }
 
+/* Shapes that `lenient` leaves out together. */
+static int note_flat(const struct maker *m)
+{
+	const struct xml_element *first = m->first_flat;
+	return !first ? 0
+		      : note(&m->notes, first, "", "flat",
+			     "%u shape%s that to_world flattens (it has no inverse) %s left out (lenient; first: the %.64s in %s:%d)",
+			     m->flat_shapes, m->flat_shapes == 1 ? "" : "s", m->flat_shapes == 1 ? "is" : "are",
+			     xml_attribute(first, "type"), first->file, first->line);
+}
+
 static int make_scene(struct maker *m)
 {
 	struct scene *s = m->scene;
@@ -171,6 +190,8 @@ static int make_scene(struct maker *m)
 			objects[i]->cls == PLUGIN_INTEGRATOR && integrators_without_media(objects[i]) != NULL;
 	for (uint32_t i = 0; i < m->tree->note_count && !r; i++)
 		r = note(&m->notes, m->tree->root, m->tree->notes[i], "", "%s: %s", m->name, m->tree->notes[i]);
+	if (!r)
+		r = note_flat(m);
 	if (!r && !m->tree->holes)
 		r = remarks_on_scene(objects, s->object_count, s->dialect_3, &m->report, m->error);
 	return r ? r : list_assets(m);
@@ -200,7 +221,7 @@ static int read_all(struct scene *s, const struct asset_source *assets, const ch
 			    .decls = decls,
 			    .error = m->error,
 			    .lenient = lenient};
-	m->notes = (struct notes){&m->report, m->error};
+	m->notes = (struct notes){.report = &m->report, .error = m->error};
 	m->tree = arena_alloc(m->arena, 1, sizeof *m->tree);
 	s->file = arena_strdup(&s->arena, name);
 	int r = m->tree && s->file ? report_init(&m->report, &s->arena, m->error) : maker_out_of_memory(m);

@@ -137,10 +137,11 @@ static int read_file(const struct xml_element *el, const char *name, const struc
 	return r;
 }
 
-static int read_value(const struct xml_element *el, const char *text, struct arena *arena, struct value *out,
-		      struct error *e)
+static int read_value(const struct xml_element *el, const char *text, const struct asset_source *assets,
+		      struct arena *arena, struct value *out, struct error *e)
 {
 	double x[3];
+	(void)assets;
 	if (strchr(text, ':'))
 		return read_pairs(el, text, text + strlen(text), ':', arena, out, e);
 	if (number_parse(text, x)) {
@@ -384,9 +385,18 @@ static bool is_listed(const char *list, const char *wanted)
 	return false;
 }
 
-static int read_typed(const struct xml_element *el, const char *type, struct arena *arena, struct value *out,
-		      struct error *e)
+const char *spectral_type_at(size_t i, const char **names)
 {
+	if (i >= TYPES)
+		return NULL;
+	*names = types[i].names;
+	return types[i].type;
+}
+
+static int read_typed(const struct xml_element *el, const char *type, const struct asset_source *assets,
+		      struct arena *arena, struct value *out, struct error *e)
+{
+	(void)assets;
 	char hint[128], list[256] = "";
 	struct spelling s = {.wanted = type};
 	for (int i = 0; i < TYPES; i++) {
@@ -407,16 +417,39 @@ static int read_typed(const struct xml_element *el, const char *type, struct are
 			 spelling_hint(&s, hint, sizeof hint), list);
 }
 
+static const struct {
+	const char *attribute, *holds;
+	int (*read)(const struct xml_element *el, const char *text, const struct asset_source *assets,
+		    struct arena *arena, struct value *out, struct error *e);
+} forms[] = {
+	{"value", "a number, or a list `nm:value, nm:value, ...`; in 0.6 also three numbers, which are rgb",
+	 read_value},
+	{"filename", "a file (`.spd`) with a line `nm value` for each point", read_file},
+	{"type", "one of the next table", read_typed},
+};
+enum { FORMS = sizeof forms / sizeof *forms };
+
+const char *spectral_form_at(size_t i, const char **holds)
+{
+	if (i >= FORMS)
+		return NULL;
+	*holds = forms[i].holds;
+	return forms[i].attribute;
+}
+
 int spectral_read(const struct xml_element *el, const struct asset_source *assets, struct arena *arena,
 		  struct value *out, struct error *e)
 {
-	const char *file = xml_attribute(el, "filename"), *text = xml_attribute(el, "value"),
-		   *type = xml_attribute(el, "type");
-	if ((file != NULL) + (text != NULL) + (type != NULL) != 1)
+	const char *text[FORMS];
+	int given = 0, form = 0;
+	for (int i = 0; i < FORMS; i++)
+		if ((text[i] = xml_attribute(el, forms[i].attribute)) != NULL) {
+			form = i;
+			given++;
+		}
+	if (given != 1)
 		return xml_error(el, e, EINVAL, "needs either value or filename or type");
-	if (type)
-		return read_typed(el, type, arena, out, e);
-	if (el->first)
+	if (el->first && forms[form].read != read_typed)
 		return xml_error(el->first, e, EINVAL, "has no place in <spectrum>");
-	return file ? read_file(el, file, assets, arena, out, e) : read_value(el, text, arena, out, e);
+	return forms[form].read(el, text[form], assets, arena, out, e);
 }

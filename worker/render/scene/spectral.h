@@ -12,10 +12,15 @@
 #include "worker/render/scene/xml.h"
 
 #include <stdbool.h>
+#include <stddef.h>
 
 enum { SPECTRAL_POINTS_MAX = 65536 };
 
 bool spectral_is_type(const char *type); /* of <spectrum type="..."> */
+/* The i-th such type and what may be inside it, "a|b"; NULL after the last. */
+const char *spectral_type_at(size_t i, const char **names);
+/* The i-th attribute that says what a <spectrum> is, and what it holds; NULL after the last. */
+const char *spectral_form_at(size_t i, const char **holds);
 /* A <spectrum>; *out may also become an rgb colour (three numbers in 0.6, type="srgb" and "rgb"). */
 int spectral_read(const struct xml_element *el, const struct asset_source *assets, struct arena *arena,
 		  struct value *out, struct error *e);

@@ -178,6 +178,24 @@ static void unlink_child(struct xml_element *parent, const struct xml_element *e
 		parent->last = before;
 }
 
+enum { DIPOLE };
+static const struct {
+	const char *type, *becomes;
+} models[] = {
+	[DIPOLE] =
+		{"dipole",
+		 "a diffuse base of the same reflectance below `plastic` and `roughplastic`; otherwise it is left out"},
+	{"singlescatter", "nothing: it is left out"},
+};
+
+const char *subsurface_at(size_t i, const char **becomes)
+{
+	if (i >= sizeof models / sizeof *models)
+		return NULL;
+	*becomes = models[i].becomes;
+	return models[i].type;
+}
+
 static int settle_shape(struct maker *m, struct xml_element *shape)
 {
 	struct xml_element *dipole = NULL, *holder = NULL;
@@ -185,7 +203,8 @@ static int settle_shape(struct maker *m, struct xml_element *shape)
 	char base[128];
 	for (struct xml_element *c = shape->first; c; c = c->next) {
 		const char *type = xml_attribute(c, "type");
-		if (strcmp(c->name, "subsurface") == 0 && type && strcmp(type, "dipole") == 0 && !element_is_unset(c))
+		if (strcmp(c->name, "subsurface") == 0 && type && strcmp(type, models[DIPOLE].type) == 0 &&
+		    !element_is_unset(c))
 			dipole = c;
 		else if (!plastic && (plastic = plastic_of(m, c)))
 			holder = c;

@@ -14,6 +14,9 @@ double subsurface_reflectance(double albedo, double eta);
 /* The diffuse reflectance below the boundary of a `plastic` with which it reflects `reflectance` in all. */
 double subsurface_base(double reflectance, double eta);
 
+/* The i-th of Mitsuba 0.6's models and what a lenient reader makes of it; NULL after the last. */
+const char *subsurface_at(size_t i, const char **becomes);
+
 /* Shapes with a dipole below a `plastic` or `roughplastic` get this one with such a base instead, with a note. Other
  * subsurfaces stay where they are. 0 or -ENOMEM. */
 int subsurface_settle(struct maker *m);

@@ -59,6 +59,31 @@ static const struct new_name parameters[] = {
 	{3, "bsdf", "roughdielectric", "alphaB", "alpha"},
 };
 
+static const struct new_name elements[] = {{4, NULL, NULL, "luminaire", "emitter"},
+					   {4, NULL, NULL, "camera", "sensor"}};
+
+/* `thin` chooses between this and `principledthin`. */
+static const struct new_name unreleased[] = {{0, "bsdf", NULL, "disney", "principled"}};
+
+bool upgrade_name_at(size_t i, struct renamed *out)
+{
+	static const struct {
+		const struct new_name *names;
+		size_t count;
+		bool parameters;
+	} tables[] = {{elements, sizeof elements / sizeof *elements, false},
+		      {types, sizeof types / sizeof *types, false},
+		      {parameters, sizeof parameters / sizeof *parameters, true},
+		      {unreleased, sizeof unreleased / sizeof *unreleased, false}};
+	for (size_t t = 0; t < sizeof tables / sizeof *tables; i -= tables[t++].count)
+		if (i < tables[t].count) {
+			const struct new_name *n = &tables[t].names[i];
+			*out = (struct renamed){n->before, n->element, n->type, n->old, n->now, tables[t].parameters};
+			return true;
+		}
+	return false;
+}
+
 static bool is_named(const struct xml_element *el, const char *name)
 {
 	return strcmp(el->name, name) == 0;
@@ -273,13 +298,12 @@ static int upgrade(struct xml_element *el, int minor, struct arena *arena, struc
 	int r = 0;
 	if (minor < 3 && !upgrade_oldest(el, arena))
 		return xml_error(el, e, ENOMEM, "out of memory");
-	if (minor < 4 && is_named(el, "luminaire"))
-		el->name = "emitter";
-	if (minor < 4 && is_named(el, "camera")) {
-		el->name = "sensor";
-		if (!turn_camera(el, arena))
-			return xml_error(el, e, ENOMEM, "out of memory");
-	}
+	bool camera = minor < 4 && is_named(el, "camera");
+	for (size_t i = 0; i < sizeof elements / sizeof *elements; i++)
+		if (minor < elements[i].before && is_named(el, elements[i].old))
+			el->name = elements[i].now;
+	if (camera && !turn_camera(el, arena))
+		return xml_error(el, e, ENOMEM, "out of memory");
 	/* pixelFormat has replaced it, and has no effect here. */
 	const char *name = xml_attribute(el, "name");
 	if (minor < 4 && el->parent && is_named(el->parent, "film") && name && strcmp(name, "alpha") == 0)
@@ -316,7 +340,7 @@ static void rename_disney(struct xml_element *bsdf, struct xml_attribute *type)
 	struct xml_element *thin = named_child(bsdf, "thin");
 	const char *value = thin && is_named(thin, "boolean") ? xml_attribute(thin, "value") : NULL;
 	bool yes = value && strcasecmp(value, "true") == 0;
-	type->value = yes ? "principledthin" : "principled";
+	type->value = yes ? "principledthin" : unreleased[0].now;
 	if (yes || (value && strcasecmp(value, "false") == 0))
 		take_out(bsdf, thin);
 }
@@ -324,7 +348,7 @@ static void rename_disney(struct xml_element *bsdf, struct xml_attribute *type)
 void upgrade_unreleased(struct xml_element *root)
 {
 	struct xml_attribute *type = is_named(root, "bsdf") && !root->snake ? attribute_of(root, "type") : NULL;
-	if (type && strcasecmp(type->value, "disney") == 0)
+	if (type && strcasecmp(type->value, unreleased[0].old) == 0)
 		rename_disney(root, type);
 	for (struct xml_element *c = root->first; c; c = c->next)
 		upgrade_unreleased(c);

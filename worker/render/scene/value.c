@@ -28,8 +28,14 @@ static int read_bool(const struct xml_element *el, struct value *out, struct err
 	if (r)
 		return r;
 	out->as.boolean = strcasecmp(text, "true") == 0; /* Python's exporters write True */
-	if (!out->as.boolean && strcasecmp(text, "false") != 0)
-		return xml_error(el, e, EINVAL, "`%.64s` is neither true nor false", text);
+	if (!out->as.boolean && strcasecmp(text, "false") != 0) {
+		struct spelling s = {.wanted = text};
+		char hint[32];
+		spelling_offer(&s, "true");
+		spelling_offer(&s, "false");
+		return xml_error(el, e, EINVAL, "`%.64s` is neither true nor false%s", text,
+				 spelling_hint(&s, hint, sizeof hint));
+	}
 	return 0;
 }
 
@@ -140,6 +146,16 @@ void value_offer_elements(struct spelling *s)
 	for (int i = 0; i < KINDS; i++)
 		if (kinds[i].type)
 			spelling_offer(s, kinds[i].element);
+}
+
+const char *value_element_at(size_t i, const char **attributes)
+{
+	for (size_t k = 0; k < KINDS; k++)
+		if (kinds[k].type && i-- == 0) {
+			*attributes = kinds[k].attributes;
+			return kinds[k].element;
+		}
+	return NULL;
 }
 
 int value_read(const struct xml_element *el, const struct asset_source *assets, struct arena *arena, struct value *out,

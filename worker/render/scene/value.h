@@ -12,6 +12,8 @@ bool value_is_element(const char *name);
 /* Offers all these names for a suggestion. */
 struct spelling;
 void value_offer_elements(struct spelling *s);
+/* The i-th element and its attributes, "a|b"; NULL after the last. */
+const char *value_element_at(size_t i, const char **attributes);
 
 /* assets: for spectra from files. */
 int value_read(const struct xml_element *el, const struct asset_source *assets, struct arena *arena, struct value *out,

@@ -113,12 +113,33 @@ static int name_error(const char *name, struct error *e)
 			 spelling_hint(&s, hint, sizeof hint), known);
 }
 
+/* Of one that is written without a value; "" if only the value is missing. */
+static const char *name_hint(const char *name, char *text, size_t size)
+{
+	struct spelling s = {.wanted = name};
+	for (size_t i = 0; i < SETTING_COUNT; i++)
+		spelling_offer(&s, list[i].name);
+	if (s.best && s.distance == 0)
+		s.best = NULL;
+	return spelling_hint(&s, text, size);
+}
+
 static int find(const char *name, size_t *index, struct error *e)
 {
 	for (*index = 0; *index < SETTING_COUNT; ++*index)
 		if (strcmp(list[*index].name, name) == 0)
 			return 0;
 	return name_error(name, e);
+}
+
+/* "; did you mean `double`?" of a choice that there is not; otherwise "". */
+static const char *value_hint(const struct render_setting *k, const char *wanted, char *text, size_t size)
+{
+	char choice[VALUE_BYTES];
+	struct spelling s = {.wanted = wanted};
+	for (int i = 0; k->kind == SETTING_CHOICE && choice_at(k->choices, i, 0, choice, sizeof choice); i++)
+		spelling_offer(&s, choice);
+	return spelling_hint(&s, text, size);
 }
 
 /* Numbers are rounded to what a plan's text holds of them, so that a text and its canonical form mean the same. */
@@ -146,13 +167,14 @@ static bool parse_value(const struct render_setting *k, const char *text, double
 
 static int read_entry(const char *text, size_t length, struct accuracy_settings *out, struct error *e)
 {
-	char entry[80], range[80];
+	char entry[80], range[80], hint[80];
 	if (length >= sizeof entry)
 		return error_set(e, EINVAL, "'%.60s...': a setting is written NAME=VALUE", text);
 	text_copy(entry, length + 1, text);
 	char *equals = strchr(entry, '=');
 	if (!equals || equals == entry)
-		return error_set(e, EINVAL, "'%s': a setting is written NAME=VALUE", entry);
+		return error_set(e, EINVAL, "'%s': a setting is written NAME=VALUE%s", entry,
+				 name_hint(entry, hint, sizeof hint));
 	*equals = 0;
 	size_t index;
 	double value;
@@ -161,8 +183,9 @@ static int read_entry(const char *text, size_t length, struct accuracy_settings 
 		return rc;
 	if (!parse_value(&list[index], equals + 1, &value)) {
 		render_setting_range(&list[index], range, sizeof range);
-		return error_set(e, EINVAL, "%s is%s %s, not '%s'", entry,
-				 list[index].kind == SETTING_WHOLE ? " a whole number from" : "", range, equals + 1);
+		return error_set(e, EINVAL, "%s is%s %s, not '%s'%s", entry,
+				 list[index].kind == SETTING_WHOLE ? " a whole number from" : "", range, equals + 1,
+				 value_hint(&list[index], equals + 1, hint, sizeof hint));
 	}
 	set(out, index, value);
 	return 0;

@@ -274,8 +274,9 @@ static int read_lines(struct reader *o)
 		const char *newline = memchr(o->p, '\n', (size_t)(o->end - o->p));
 		o->p = newline ? newline + 1 : o->end;
 	}
-	if (o->file->triangles.count == 0)
-		return node_error(o->node, o->error, EINVAL, "%s: has no faces", o->name);
+	/* Vertices alone are a mesh, an empty one; without them it is some other file. */
+	if (o->file->triangles.count == 0 && o->file->positions.count == 0)
+		return node_error(o->node, o->error, EINVAL, "%s: has no vertices and no faces", o->name);
 	return 0;
 }
 

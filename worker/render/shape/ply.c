@@ -443,17 +443,19 @@ static int read_body(struct ply *f)
 static int check_header(struct ply *f)
 {
 	uint64_t vertices = 0;
-	bool faces = false;
+	bool faces = false, others = false; /* others: strips of triangles, for instance */
 	for (uint32_t i = 0; i < f->element_count; i++) {
 		const struct element *el = &f->elements[i];
 		if (el->kind == ELEMENT_VERTEX)
 			vertices = el->count;
+		else
+			others |= el->count > 0;
 		for (uint32_t k = 0; k < el->property_count; k++)
 			faces |= el->properties[k].role == ROLE_INDICES && el->count > 0;
 	}
-	if (vertices == 0 || !f->has[ROLE_X] || !f->has[ROLE_Y] || !f->has[ROLE_Z])
+	if ((vertices == 0 && others) || !f->has[ROLE_X] || !f->has[ROLE_Y] || !f->has[ROLE_Z])
 		return node_error(f->node, f->error, EINVAL, "%s: has no vertices with x, y and z", f->name);
-	if (!faces)
+	if (!faces && others)
 		return node_error(f->node, f->error, EINVAL, "%s: has no faces with vertex_indices", f->name);
 	if (vertices >= UINT32_MAX || vertices > (uint64_t)(f->end - f->p))
 		return node_error(f->node, f->error, EINVAL, "%s: too short for %llu vertices", f->name,

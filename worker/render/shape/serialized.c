@@ -177,8 +177,8 @@ static int check_end(struct stream *s)
 static int make_room(const struct stream *s, const uint64_t count[2], uint64_t vertex_size, uint64_t triangle_size,
 		     bool normals, bool uv, struct arena *arena, struct mesh *m)
 {
-	if (count[0] == 0 || count[1] == 0)
-		return file_error(s, "the mesh has no triangles");
+	if (count[0] == 0 && count[1] > 0)
+		return file_error(s, "the mesh has triangles, but no vertices");
 	if (count[1] > MESH_TRIANGLES_MAX || count[0] >= UINT32_MAX || count[0] > s->most / vertex_size ||
 	    count[1] > s->most / triangle_size)
 		return file_error(s, "more vertices or triangles than there can be");

@@ -94,6 +94,15 @@ spectrum color_eval_rgb_illuminant(const double rgb[3], const struct wavelengths
 	return s;
 }
 
+spectrum color_eval_rgb_unbounded(const double rgb[3], const struct wavelengths *w)
+{
+	if (WAVELENGTHS_GREY(w) || w->rgb || (rgb[0] == rgb[1] && rgb[1] == rgb[2]))
+		return color_eval_rgb_reflectance(rgb, w);
+	double scale = COLOR_UNBOUNDED_OVER * fmax(rgb[0], fmax(rgb[1], rgb[2]));
+	const double part[3] = {rgb[0] / scale, rgb[1] / scale, rgb[2] / scale};
+	return spectrum_scale(scale, color_eval_rgb_reflectance(part, w));
+}
+
 struct color color_constant(double x)
 {
 	return (struct color){.shape = COLOR_SHAPE_CONSTANT, .scale = x};
@@ -138,7 +147,9 @@ int color_from_rgb(const double rgb[3], enum color_role role, struct color *out)
 		return 0;
 	out->shape = COLOR_SHAPE_OTHER;
 	out->sigmoid = true;
-	out->scale = role == COLOR_REFLECTANCE ? 1 : role == COLOR_ILLUMINANT ? largest : 2 * largest;
+	out->scale = role == COLOR_REFLECTANCE	? 1
+		     : role == COLOR_ILLUMINANT ? largest
+						: COLOR_UNBOUNDED_OVER * largest;
 	double *unit = out->rgb, c[3];
 	out->tinted = true;
 	for (int k = 0; k < 3; k++)

@@ -67,6 +67,9 @@ spectrum color_eval_rgb_reflectance(const double rgb[3], const struct wavelength
 double color_max_rgb_reflectance(const double rgb[3]); /* of that spectrum */
 /* The same for emitters: largest component x reflectance x D65. rgb >= 0. */
 spectrum color_eval_rgb_illuminant(const double rgb[3], const struct wavelengths *w);
+/* The same for what may exceed 1: COLOR_UNBOUNDED_OVER times the largest component x reflectance. */
+#define COLOR_UNBOUNDED_OVER 2
+spectrum color_eval_rgb_unbounded(const double rgb[3], const struct wavelengths *w);
 double color_max_d65(void);
 
 /* D65 normalised so that an emitter with this spectrum has Rec. 709 (1,1,1); by linear interpolation. */

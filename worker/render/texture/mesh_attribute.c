@@ -2,7 +2,8 @@
 /*
  * Numbers at the vertices of a mesh, interpolated linearly, or one per triangle: `mesh_attribute` of 3.x, and
  * `vertexcolors` of 0.5/0.6, which is the attribute vertex_color. Colours are interpolated as linear rgb and then
- * upsampled; one number is grey. Reflectances are clamped to [0,1], like those of images.
+ * upsampled; one number is grey. Reflectances are clamped to [0,1], like those of images; what may exceed 1, a metal's
+ * `eta` and `k`, an exponent, is the attribute's numbers.
  *
  * Derivatives of an attribute by (u,v) are not known, so it cannot displace or bend normals.
  */
@@ -22,9 +23,7 @@ struct mesh_attribute {
 
 static int refuse_role(const struct scene_node *n, enum color_role role, struct error *e)
 {
-	const char *what = role == COLOR_HEIGHT	  ? "displace a surface"
-			   : role == COLOR_RELIEF ? "be a bump or normal map"
-						  : "be used for this quantity";
+	const char *what = role == COLOR_HEIGHT ? "displace a surface" : "be a bump or normal map";
 	return node_error(n, e, ENOTSUP, "an attribute of a mesh cannot %s", what);
 }
 
@@ -37,8 +36,12 @@ static void find_bounds(struct mesh_attribute *m, const struct attribute_values 
 		m->max = most * color_max_d65();
 		return;
 	}
-	/* The spectrum of a colour is not bounded by the colour's components. */
 	m->shape = v->grey ? COLOR_SHAPE_CONSTANT : COLOR_SHAPE_OTHER;
+	if (m->role == COLOR_UNBOUNDED) {
+		m->max = v->grey ? most : COLOR_UNBOUNDED_OVER * most;
+		return;
+	}
+	/* The spectrum of a colour is not bounded by the colour's components. */
 	m->max = v->grey ? fmin(most, 1) : 1;
 }
 
@@ -46,7 +49,7 @@ static int make_attribute(struct texture *t, const struct scene_node *n, const c
 			  const struct texture_build *build, struct error *e)
 {
 	struct attribute_table *table = build->attributes;
-	if (role != COLOR_REFLECTANCE && role != COLOR_ILLUMINANT)
+	if (color_role_is_number(role))
 		return refuse_role(n, role, e);
 	if (!table)
 		return node_error(n, e, EINVAL, "attributes are only available on a mesh");
@@ -64,6 +67,9 @@ static int make_attribute(struct texture *t, const struct scene_node *n, const c
 				     .scale = node_float(n, "scale", 1),
 				     .role = role};
 	find_bounds(m, v);
+	if (role == COLOR_UNBOUNDED && !(m->max <= COLOR_UNBOUNDED_OVER * PARAM_METAL_MAX))
+		return node_error(n, e, ERANGE, "numbers of the attribute up to %g: must be within [0, %g]", m->max,
+				  PARAM_METAL_MAX);
 	return 0;
 }
 
@@ -103,7 +109,9 @@ static spectrum mesh_attribute_eval(const struct texture *t, const struct textur
 	look_up(m, at, rgb);
 	for (int k = 0; k < 3; k++)
 		rgb[k] = fmin(fmax(rgb[k], 0), most);
-	return m->role == COLOR_ILLUMINANT ? color_eval_rgb_illuminant(rgb, w) : color_eval_rgb_reflectance(rgb, w);
+	return m->role == COLOR_ILLUMINANT  ? color_eval_rgb_illuminant(rgb, w)
+	       : m->role == COLOR_UNBOUNDED ? color_eval_rgb_unbounded(rgb, w)
+					    : color_eval_rgb_reflectance(rgb, w);
 }
 
 static double mesh_attribute_max(const struct texture *t)

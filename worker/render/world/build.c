@@ -389,7 +389,7 @@ static int prepare(struct builder *b, const struct render_options *o)
 		rc = choose_emitters(b);
 	if (!rc) {
 		unseen_note(b->w, b->boxes);
-		dark_note(b->w);
+		dark_note(b->w, b->lost_light);
 		build_media_note(b);
 	}
 	if (!rc && !b->w->effects.colour)
@@ -510,6 +510,7 @@ void world_summary(const struct world *w, struct render_summary *out)
 				       .line_count = w->effects.line_count,
 				       .shapes = w->shape_count,
 				       .instances = w->instance_count,
+				       .sharing = w->sharing_count,
 				       .shared_meshes = w->shared_mesh_count,
 				       .brightest = world_brightest(w),
 				       .beams = world_has_beam(w),

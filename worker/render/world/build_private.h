@@ -35,6 +35,7 @@ struct builder {
 	struct grid_cache grids;
 	struct volume_build volumes; /* with `grids` */
 	struct box all, *boxes;	     /* boxes: one a shape */
+	bool lost_light;	     /* a shape that shines was left out, because it has no area */
 	struct report *found;	     /* the problems after which building goes on; NULL: the first ends it */
 	struct error *e;
 };

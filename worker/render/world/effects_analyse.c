@@ -374,9 +374,13 @@ static void surfaces(struct report *r, const struct census *c, const struct worl
 	static const enum effect absent[] = {EFFECT_BUMP, EFFECT_ALPHA};
 	for (size_t i = 0; i < sizeof absent / sizeof *absent; i++)
 		line(r, absent[i], false, "%s", effect_table[absent[i]].refuse);
-	if (w->instance_count)
-		line(r, EFFECT_INSTANCING, true, "%u shapes are instances of %u meshes", w->instance_count,
+	if (w->sharing_count)
+		line(r, EFFECT_INSTANCING, true, "%u shapes are instances of %u meshes", w->sharing_count,
 		     w->shared_mesh_count);
+	else if (w->instance_count)
+		line(r, EFFECT_INSTANCING, false,
+		     "no mesh is shared: copies of what the %u instance%s show%s are as fast", w->instance_count,
+		     w->instance_count == 1 ? "" : "s", w->instance_count == 1 ? "s" : "");
 	else
 		line(r, EFFECT_INSTANCING, false, "no mesh stands in several places");
 	struct tally moving = {0};

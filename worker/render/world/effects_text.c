@@ -51,7 +51,10 @@ static int parse_item(const char *item, size_t length, struct effects_choice *ou
 		struct spelling s = {.wanted = wanted};
 		for (int i = 0; i < EFFECTS; i++)
 			spelling_offer(&s, effect_table[i].name);
-		if (s.best)
+		spelling_offer(&s, "all");
+		if (s.best && strcmp(s.best, "all") == 0)
+			spelling_hint(&s, hint, sizeof hint);
+		else if (s.best)
 			snprintf(hint, sizeof hint, "; did you mean `+%s` or `-%s`?", s.best, s.best);
 		return error_set(e, EINVAL, "takes 'all', or +NAME and -NAME separated by commas, not '%s'%s", wanted,
 				 hint);
@@ -131,8 +134,9 @@ bool render_scene_note(const struct render_summary *scene, size_t i, char *text,
 			 scene->brightest > 0 ? "" : "; it has no emitter either: the image is black");
 		return true;
 	}
-	const char *const met[] = {scene->notes.unseen, scene->notes.dark, scene->notes.endless,  scene->notes.backs,
-				   scene->notes.scales, scene->notes.flat, scene->notes.materials};
+	const char *const met[] = {scene->notes.unseen,	 scene->notes.dark,   scene->notes.endless,
+				   scene->notes.backs,	 scene->notes.scales, scene->notes.flat,
+				   scene->notes.without, scene->notes.gone,   scene->notes.materials};
 	for (size_t k = 0; k < sizeof met / sizeof *met; k++)
 		if (*met[k] && i-- == 0) {
 			snprintf(text, size, "%s", met[k]);

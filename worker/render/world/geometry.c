@@ -3,8 +3,8 @@
  * Shapes of a world: read in double, moved into the unit sphere with the camera, then rounded to float; shapes that are
  * too large for that relative to small ones also stay in double.
  *
- * Failures have the object's place. Triangles without area, shapes that are too small relative to others and materials
- * that are not read are counted and noted, not errors.
+ * Failures have the object's place. Triangles without area, meshes without triangles, shapes that are too small
+ * relative to others and materials that are not read are counted and noted, not errors.
  */
 #include "worker/render/world/geometry.h"
 
@@ -21,12 +21,14 @@
 /* Over all shapes: Embree takes about 150 bytes for each. */
 enum { TRIANGLES_MAX = 1 << 28 };
 
-/* Counted and noted: triangles without area, which nothing hits and which are left out, and files with materials
- * that Mitsuba 0.6 would read because the shape has no BSDF in the scene. */
+/* Counted and noted: triangles without area, which nothing hits and which are left out, meshes without triangles, and
+ * files with materials that Mitsuba 0.6 would read because the shape has no BSDF in the scene. */
 struct counted {
 	uint64_t triangles;
 	uint32_t shapes, empty; /* shapes that have some; that have nothing else */
 	const struct scene_node *first;
+	uint32_t without; /* meshes that have no triangles at all */
+	const struct scene_node *first_without;
 	uint32_t materials;
 	const struct scene_node *first_material;
 };
@@ -35,14 +37,20 @@ static void count_flat(struct counted *f, const struct scene_node *n, uint64_t t
 {
 	if (triangles && !f->first)
 		f->first = n;
+	if (!triangles && empty && f->without++ == 0)
+		f->first_without = n;
 	f->triangles += triangles;
 	f->shapes += triangles > 0;
-	f->empty += empty;
+	f->empty += triangles > 0 && empty;
 }
 
 static void note_flat(struct world *w, const struct counted *f)
 {
 	char first[NODE_TITLE_MAX], empty[64] = "";
+	if (f->without)
+		snprintf(w->notes.without, sizeof w->notes.without,
+			 "%u mesh%s without triangles %s left out (first: %s)", f->without, f->without == 1 ? "" : "es",
+			 f->without == 1 ? "is" : "are", node_title(f->first_without, first));
 	if (!f->first)
 		return;
 	if (f->empty)
@@ -153,7 +161,11 @@ static int read_listed(struct builder *b, const struct listed_shape *l, struct s
 		rc = n ? read_shape(b, n, l->moves != NULL, g, &dropped) : build_out_of_memory(b->e);
 		if (!rc)
 			rc = take_geometry(b, n, g, dropped, counted);
-		if (rc || (g->kind == SHAPE_MESH && g->mesh.triangle_count == 0))
+		if (!rc && g->kind == SHAPE_MESH && g->mesh.triangle_count == 0) {
+			b->lost_light |= n->shines;
+			return 0;
+		}
+		if (rc)
 			return rc;
 		b->boxes[id] = build_box_of(g);
 	}
@@ -189,6 +201,8 @@ int build_read_shapes(struct builder *b)
 		return build_out_of_memory(b->e);
 	b->all = box_empty();
 	struct counted counted = {0};
+	for (uint32_t i = 0; i < listed; i++) /* those of one instance follow each other */
+		b->w->instance_count += list[i].instance && (i == 0 || list[i].instance != list[i - 1].instance);
 	for (uint32_t i = 0; i < listed && !rc; i++)
 		if ((rc = read_listed(b, &list[i], meshes, &counted)))
 			rc = build_go_on(b, rc);
@@ -299,6 +313,7 @@ static void put_chain(struct curves *out, const struct world *w, const struct ch
 	}
 }
 
+/* g->curves stays NULL where no piece has a radius in float. */
 static int place_curves(struct builder *b, struct geom_shape *g, const struct curve *c, const struct scene_node *n)
 {
 	struct curves *out = arena_alloc(&b->w->arena, 1, sizeof *out);
@@ -313,12 +328,70 @@ static int place_curves(struct builder *b, struct geom_shape *g, const struct cu
 	list_free(&points);
 	if (rc)
 		return build_out_of_memory(b->e);
-	if (!(out->thickest > 0))
-		return node_error(n, b->e, EINVAL, "no piece of this shape has a radius at the scale of the scene");
+	if (!(out->thickest > 0)) /* no piece has a radius */
+		return 0;
 	curves_lay(out);
 	g->curves = out;
 	g->normal_sign = node_bool(n, "flip_normals", false) ? -1 : 1;
 	return 0;
+}
+
+static void place_sphere(struct builder *b, struct geom_shape *g, const struct sphere *s)
+{
+	const struct world *w = b->w;
+	g->is_sphere = true;
+	g->center = vec3_scale(w->scale, vec3_sub(s->center, w->center));
+	g->radius = w->scale * s->radius;
+	g->normal_sign = s->flip_normals ? -1 : 1;
+	g->sphere_axes.s = vec3_normalize(mat4_vector(&s->to_world, (vec3){1, 0, 0}));
+	g->sphere_axes.t = vec3_normalize(mat4_vector(&s->to_world, (vec3){0, 1, 0}));
+	g->sphere_axes.n = vec3_normalize(mat4_vector(&s->to_world, (vec3){0, 0, 1}));
+}
+
+/* *gone: in float nothing of it has an area. */
+static int place_shape(struct builder *b, uint32_t i, double wide_from, bool *gone)
+{
+	struct world *w = b->w;
+	struct shape_geometry *from = &b->geometry[i];
+	struct geom_shape *g = &w->shapes[i];
+	*gone = false;
+	if (b->shared[i])
+		return shared_mesh_place(b, b->shared[i], b->instances[i], i);
+	g->unit = w->scale;
+	if (from->kind == SHAPE_SPHERE) {
+		place_sphere(b, g, &from->sphere);
+		return b->motions[i] ? moving_place_sphere(b, i) : 0;
+	}
+	if (from->kind == SHAPE_CURVE) {
+		int rc = place_curves(b, g, &from->curve, b->shape_nodes[i]);
+		*gone = !rc && !g->curves;
+		return rc;
+	}
+	int rc = build_place_mesh(b, g, &from->mesh, b->shape_nodes[i], w->center, w->scale);
+	*gone = !rc && g->triangle_count == 0;
+	return rc || *gone ? rc : build_keep_unrounded(b, g, &from->mesh, wide_from);
+}
+
+/* What belongs to shape `from` becomes that of shape `to`, which is not after it. */
+static void move_shape(struct builder *b, uint32_t from, uint32_t to)
+{
+	if (from == to)
+		return;
+	b->geometry[to] = b->geometry[from];
+	b->boxes[to] = b->boxes[from];
+	b->shape_nodes[to] = b->shape_nodes[from];
+	b->shared[to] = b->shared[from];
+	b->instances[to] = b->instances[from];
+	b->motions[to] = b->motions[from];
+}
+
+static void note_gone(struct world *w, uint32_t gone, const struct scene_node *first)
+{
+	char title[NODE_TITLE_MAX];
+	if (gone)
+		snprintf(w->notes.gone, sizeof w->notes.gone,
+			 "%u shape%s too small for the scene to have an area %s left out (first: %s)", gone,
+			 gone == 1 ? "" : "s", gone == 1 ? "is" : "are", node_title(first, title));
 }
 
 int build_place_shapes(struct builder *b)
@@ -329,42 +402,24 @@ int build_place_shapes(struct builder *b)
 	if (!w->shapes || !w->parts)
 		return build_out_of_memory(b->e);
 	double wide_from = w->scale * origin_wide_from(&b->all, b->boxes, w->shape_count);
+	uint32_t kept = 0;
+	const struct scene_node *first_gone = NULL;
 	for (uint32_t i = 0; i < w->shape_count; i++) {
-		struct shape_geometry *from = &b->geometry[i];
-		struct geom_shape *g = &w->shapes[i];
+		bool gone;
 		tick();
-		if (b->shared[i]) {
-			int rc = shared_mesh_place(b, b->shared[i], b->instances[i], i);
-			if (rc)
-				return rc;
-			continue;
-		}
-		g->unit = w->scale;
-		if (from->kind == SHAPE_SPHERE) {
-			const struct sphere *s = &from->sphere;
-			g->is_sphere = true;
-			g->center = vec3_scale(w->scale, vec3_sub(s->center, w->center));
-			g->radius = w->scale * s->radius;
-			g->normal_sign = s->flip_normals ? -1 : 1;
-			g->sphere_axes.s = vec3_normalize(mat4_vector(&s->to_world, (vec3){1, 0, 0}));
-			g->sphere_axes.t = vec3_normalize(mat4_vector(&s->to_world, (vec3){0, 1, 0}));
-			g->sphere_axes.n = vec3_normalize(mat4_vector(&s->to_world, (vec3){0, 0, 1}));
-			int rc = b->motions[i] ? moving_place_sphere(b, i) : 0;
-			if (rc)
-				return rc;
-			continue;
-		}
-		if (from->kind == SHAPE_CURVE) {
-			int rc = place_curves(b, g, &from->curve, b->shape_nodes[i]);
-			if (rc)
-				return rc;
-			continue;
-		}
-		int rc = build_place_mesh(b, g, &from->mesh, b->shape_nodes[i], w->center, w->scale);
-		if (!rc)
-			rc = build_keep_unrounded(b, g, &from->mesh, wide_from);
+		move_shape(b, i, kept);
+		int rc = place_shape(b, kept, wide_from, &gone);
 		if (rc)
 			return rc;
+		if (!gone) {
+			kept++;
+			continue;
+		}
+		b->lost_light |= b->shape_nodes[kept]->shines;
+		first_gone = first_gone ? first_gone : b->shape_nodes[kept];
+		w->shapes[kept] = (struct geom_shape){0};
 	}
+	note_gone(w, w->shape_count - kept, first_gone);
+	w->shape_count = kept;
 	return 0;
 }

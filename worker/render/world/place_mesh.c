@@ -87,8 +87,6 @@ int build_place_mesh(struct builder *b, struct geom_shape *g, struct mesh *m, co
 		}
 	}
 	g->triangle_count = take_triangles(g, m, build_is_displaced(b, n));
-	if (g->triangle_count == 0)
-		return node_error(n, b->e, EINVAL, "no triangle of this shape has an area at the scale of the scene");
 	return 0;
 }
 

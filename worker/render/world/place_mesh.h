@@ -8,7 +8,7 @@
 
 struct box build_box_of(const struct shape_geometry *g);
 bool build_is_displaced(const struct builder *b, const struct scene_node *shape);
-/* A mesh as floats, relative to that centre and scale. */
+/* A mesh as floats, relative to that centre and scale. It may have no triangle left whose area is not 0 then. */
 int build_place_mesh(struct builder *b, struct geom_shape *g, struct mesh *m, const struct scene_node *n, vec3 center,
 		     double scale);
 

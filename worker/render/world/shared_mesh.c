@@ -59,7 +59,10 @@ static int place_once(struct builder *b, struct shared_mesh *m, const struct sce
 	m->center = vec3_add(m->box.low, half);
 	m->scale = ldexp(1, -exponent);
 	m->placed = true;
-	return build_place_mesh(b, &m->shape, &m->geometry.mesh, node, m->center, m->scale);
+	int rc = build_place_mesh(b, &m->shape, &m->geometry.mesh, node, m->center, m->scale);
+	return rc || m->shape.triangle_count > 0
+		       ? rc
+		       : node_error(node, b->e, EINVAL, "no triangle of this shape has an area at its own scale");
 }
 
 static bool turn_triangles(struct shared_mesh *m, struct arena *arena)
@@ -127,7 +130,7 @@ int shared_mesh_place(struct builder *b, struct shared_mesh *m, const struct sce
 	if (rc)
 		return build_out_of_memory(b->e);
 	p->first = m->first;
-	w->instance_count++;
+	w->sharing_count++;
 	if (p->mirrored && !turn_triangles(m, &w->arena))
 		return build_out_of_memory(b->e);
 	struct geom_shape *g = &w->shapes[id];

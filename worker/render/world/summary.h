@@ -39,6 +39,8 @@ struct render_coincident {
 struct world_notes {
 	char scales[512];    /* a shape that is too small relative to another, by name */
 	char flat[384];	     /* how many triangles without area were left out */
+	char without[256];   /* how many meshes have none */
+	char gone[256];	     /* how many shapes are too small for the scene */
 	char materials[384]; /* how many files of shapes have materials that are not read */
 	char unseen[192];    /* that the camera sees no shape */
 	char dark[128];	     /* that the emitters give no light */
@@ -52,13 +54,14 @@ struct render_summary {
 	struct effect_line lines[RENDER_EFFECTS_MAX];
 	size_t line_count;
 	uint64_t shapes, triangles; /* instances, with everything they show */
-	uint64_t instances, shared_meshes,
-		stored_triangles; /* shapes that share meshes; number of these meshes; their memory */
-	uint64_t segments;	  /* round cones of curves */
-	uint64_t memory;	  /* bytes of the world, approximately; Embree's part is estimated per triangle */
-	double brightest;	  /* see world_brightest */
-	bool beams;		  /* see world_has_beam */
-	bool rolls;		  /* see world_rolls */
+	uint64_t instances;	    /* objects of the scene that show a group of shapes somewhere */
+	uint64_t sharing, shared_meshes, stored_triangles; /* shapes that share meshes, as those of large groups do;
+							      number of these meshes; memory */
+	uint64_t segments;				   /* round cones of curves */
+	uint64_t memory;  /* bytes of the world, approximately; Embree's part is estimated per triangle */
+	double brightest; /* see world_brightest */
+	bool beams;	  /* see world_has_beam */
+	bool rolls;	  /* see world_rolls */
 	struct render_coincident coincident;
 	struct world_notes notes;
 };

@@ -84,7 +84,7 @@ void unseen_note(struct world *w, const struct box *boxes)
 					  : "all are beside the image or behind it");
 }
 
-void dark_note(struct world *w)
+void dark_note(struct world *w, bool lost)
 {
 	bool light = false;
 	for (uint32_t i = 0; i < w->emitter_count; i++)
@@ -95,6 +95,9 @@ void dark_note(struct world *w)
 		snprintf(w->notes.dark, sizeof w->notes.dark,
 			 "no emitter gives light from %g to %g nm, which is what is rendered: the image is black",
 			 WAVELENGTH_MIN, WAVELENGTH_MAX);
+	else if (lost && !light)
+		snprintf(w->notes.dark, sizeof w->notes.dark,
+			 "the scene has no emitter with an area: the image is black");
 }
 
 /* ---- black backs ---- */

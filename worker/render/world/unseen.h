@@ -12,9 +12,9 @@
 void unseen_note(struct world *w, const struct box *boxes);
 
 /* Sets w->notes.dark if there are emitters, and none of them and no medium gives light at wavelengths that are
- * rendered.
+ * rendered. lost: there were emitters on shapes that have been left out.
  */
-void dark_note(struct world *w);
+void dark_note(struct world *w, bool lost);
 
 /* Sets w->notes.backs if one in twenty of the camera's rays that meet a surface meets the back of an opaque material
  * which reflects on its front alone, because the scene's dialect makes it black: a surprise where a mesh is inside out.

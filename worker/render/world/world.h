@@ -42,7 +42,8 @@ struct world {
 	vec3 center;
 	double scale, radius; /* of the rescaled bounding sphere around the origin */
 	uint32_t shape_count, bsdf_count, emitter_count;
-	uint32_t instance_count, shared_mesh_count; /* shapes that share a mesh with others; number of these meshes */
+	uint32_t instance_count;		   /* of the scene, whatever becomes of them */
+	uint32_t sharing_count, shared_mesh_count; /* shapes that share a mesh with others; number of these meshes */
 	struct geom_shape *shapes;
 	struct world_shape *parts; /* one a shape */
 	struct bsdf *bsdfs;

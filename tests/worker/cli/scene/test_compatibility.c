@@ -33,6 +33,19 @@ static void test_page(void **state)
 	assert_non_null(strstr(text, "\n| emitter | `astroobject` |"));
 	assert_non_null(strstr(text, "\n| any | `max_depth`"));
 	assert_null(strstr(text, "| bsdf | `diffuse` |"));
+	assert_non_null(strstr(text, "\n| `<blackbody>` | `name`, `temperature`, `scale` |"));
+	assert_non_null(strstr(text, "\n| `filename` | a file (`.spd`)"));
+	assert_non_null(strstr(text, "\n| `irregular` | `wavelengths`, `values` |"));
+	assert_non_null(strstr(
+		text, "\n| `direct`, `direct_projective` | light that is scattered once, with a note; no media"));
+	assert_non_null(strstr(
+		text, "`ptracer`, `bdpt`, `mlt`, `pssmlt`, `erpt`, `hslt`, `adaptive`, `motion` | all light |\n"));
+	assert_non_null(strstr(text, "`halton`, `hammersley`"));
+	assert_null(strstr(text, "| sampler | `halton`"));
+	assert_non_null(strstr(text, "\n| `singlescatter` | nothing"));
+	assert_non_null(strstr(text, "\n| bsdf `disney` | `principled` | 2.x and 3.x |"));
+	assert_non_null(
+		strstr(text, "\n| `diffuse_reflectance` of the bsdf `diffuse` | `reflectance` | 0.5 and 0.6 |"));
 	fclose(page);
 	free(text);
 }

@@ -93,7 +93,7 @@ static struct client *connect_client(void)
 	return cl;
 }
 
-static int send_to(struct client *cl, const struct scene_bundle *b, struct submitted *job, struct error *e)
+static int send_to(struct client *cl, const struct scene_files *b, struct submitted *job, struct error *e)
 {
 	static struct render_arguments args;
 	char text[PLAN_TEXT];
@@ -103,7 +103,7 @@ static int send_to(struct client *cl, const struct scene_bundle *b, struct submi
 }
 
 /* The error, "" when it was taken. */
-static const char *submit_error(const struct scene_bundle *b)
+static const char *submit_error(const struct scene_files *b)
 {
 	static struct error e;
 	struct submitted job = {0};
@@ -116,7 +116,7 @@ static const char *submit_error(const struct scene_bundle *b)
 	return e.text;
 }
 
-static void expect_error(const struct scene_bundle *b, const char *text)
+static void expect_error(const struct scene_files *b, const char *text)
 {
 	const char *said = submit_error(b);
 	if (!strstr(said, text))
@@ -126,14 +126,14 @@ static void expect_error(const struct scene_bundle *b, const char *text)
 static void what_was_checked_is_sent(void **state)
 {
 	(void)state;
-	struct scene_bundle b;
+	struct scene_files b;
 	static struct render_arguments o; /* large */
 	o.render.max_depth = 4;
 	struct error e;
-	assert_int_equal(scene_bundle_read(&b, scene, &o, &none, &e), 0);
+	assert_int_equal(scene_files_read(&b, scene, &o, &none, &e), 0);
 	assert_int_equal(b.count, 2);
-	assert_string_equal(b.files[0].name, "box.xml");
-	assert_string_equal(b.files[1].name, "meshes/wedge.obj");
+	assert_string_equal(b.list[0].name, "box.xml");
+	assert_string_equal(b.list[1].name, "meshes/wedge.obj");
 	assert_int_equal(rename(mesh, kept), 0);
 	assert_int_equal(symlink(secret, mesh), 0);
 	expect_error(&b, "meshes/wedge.obj: leads out of the scene's folder");
@@ -142,14 +142,14 @@ static void what_was_checked_is_sent(void **state)
 	expect_error(&b, "meshes/wedge.obj has changed meanwhile");
 	assert_int_equal(rename(kept, mesh), 0);
 	assert_string_equal(submit_error(&b), "");
-	scene_bundle_fini(&b);
+	scene_files_fini(&b);
 }
 
 /* A library of meshes beside the scene's folder (--path): under the same name. */
 static void what_is_elsewhere_is_sent_too(void **state)
 {
 	(void)state;
-	struct scene_bundle b;
+	struct scene_files b;
 	static struct render_arguments o; /* large */
 	struct error e;
 	char library[256], moved[300];
@@ -160,13 +160,13 @@ static void what_is_elsewhere_is_sent_too(void **state)
 	snprintf(moved, sizeof moved, "%s/meshes/wedge.obj", library);
 	assert_int_equal(rename(mesh, moved), 0);
 	o.render.max_depth = 4;
-	assert_int_equal(scene_bundle_read(&b, scene, &o, &none, &e), -ENOENT);
+	assert_int_equal(scene_files_read(&b, scene, &o, &none, &e), -ENOENT);
 	o.paths[o.path_count++] = library;
-	assert_int_equal(scene_bundle_read(&b, scene, &o, &none, &e), 0);
+	assert_int_equal(scene_files_read(&b, scene, &o, &none, &e), 0);
 	assert_int_equal(b.count, 2);
-	assert_string_equal(b.files[1].name, "meshes/wedge.obj");
+	assert_string_equal(b.list[1].name, "meshes/wedge.obj");
 	assert_string_equal(submit_error(&b), "");
-	scene_bundle_fini(&b);
+	scene_files_fini(&b);
 	assert_int_equal(rename(moved, mesh), 0);
 }
 
@@ -188,10 +188,10 @@ static const char *type_of(const struct scene *s, const char *id)
 	return "";
 }
 
-static bool is_in(const struct scene_bundle *b, const char *name)
+static bool is_in(const struct scene_files *b, const char *name)
 {
 	for (size_t i = 0; i < b->count; i++)
-		if (strcmp(b->files[i].name, name) == 0)
+		if (strcmp(b->list[i].name, name) == 0)
 			return true;
 	return false;
 }
@@ -224,12 +224,12 @@ static void what_included_files_name_is_sent(void **state)
 		"s.xml",	 "own.xml",	"parts/a.xml", "parts/deep/b.xml", "parts/deep/both.xml",
 		"parts/eta.spd", "parts/up.xml"};
 	enum { SENT = sizeof sent_names / sizeof *sent_names };
-	struct scene_bundle b;
+	struct scene_files b;
 	static struct render_arguments o; /* large */
 	struct error e;
 	o.render.max_depth = 4;
 	snprintf(path, sizeof path, "%s/nested/s.xml", folder);
-	if (scene_bundle_read(&b, path, &o, &(struct output_files){0}, &e))
+	if (scene_files_read(&b, path, &o, &(struct output_files){0}, &e))
 		fail_msg("%s", e.text);
 	struct memory_file files[SENT + 1] = {{0}};
 	char *bytes[SENT];
@@ -243,7 +243,7 @@ static void what_included_files_name_is_sent(void **state)
 		files[i] = (struct memory_file){sent_names[i], bytes[i], fread(bytes[i], 1, 1023, f)};
 		assert_int_equal(fclose(f), 0);
 	}
-	scene_bundle_fini(&b);
+	scene_files_fini(&b);
 	struct scene s;
 	struct asset_source store = memory_assets(files);
 	if (scene_read(&s, &store, "s.xml", render_plugins(), NULL, 0, &e))
@@ -255,7 +255,7 @@ static void what_included_files_name_is_sent(void **state)
 	/* What is there, but not below the scene's folder, stays closed. */
 	write_file("parts/own.xml", PART("<include filename='../../box/box.xml'/>"));
 	snprintf(path, sizeof path, "%s/nested/s.xml", folder);
-	assert_int_equal(scene_bundle_read(&b, path, &o, &(struct output_files){0}, &e), -EINVAL);
+	assert_int_equal(scene_files_read(&b, path, &o, &(struct output_files){0}, &e), -EINVAL);
 	assert_non_null(strstr(e.text, "../box/box.xml: leads out of the scene's folder"));
 	scene_fini(&s);
 	for (size_t i = 0; i < SENT; i++)
@@ -291,14 +291,14 @@ static int wait_for(struct client **cl, const struct submitted *job, struct subm
 static void one_job_is_waited_for(void **state)
 {
 	(void)state;
-	struct scene_bundle b;
+	struct scene_files b;
 	static struct render_arguments o; /* large */
 	o.render.max_depth = 4;
 	struct submit_end end;
 	struct submitted job, other;
 	struct error e;
 	char same[32];
-	assert_int_equal(scene_bundle_read(&b, scene, &o, &none, &e), 0);
+	assert_int_equal(scene_files_read(&b, scene, &o, &none, &e), 0);
 	struct client *cl = connect_client(), *later = connect_client();
 	assert_int_equal(send_to(cl, &b, &job, &e), 0);
 	snprintf(same, sizeof same, "%s", address);
@@ -322,7 +322,7 @@ static void one_job_is_waited_for(void **state)
 	assert_int_equal(client_exit_code(-ESTALE), 1);
 	client_close(cl);
 	client_close(later);
-	scene_bundle_fini(&b);
+	scene_files_fini(&b);
 }
 
 int main(void)

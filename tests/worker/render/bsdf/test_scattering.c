@@ -371,7 +371,8 @@ static void test_grey_is_the_same_without_wavelengths(void **state)
 {
 	(void)state;
 	const struct wavelengths grey = {.grey = true, .nm = {NAN, NAN, NAN, NAN}};
-	const struct bsdf_point in_grey = {.w = &grey}, in_colour = point_of(TRANSPORT_RADIANCE);
+	const struct bsdf_point in_colour = point_of(TRANSPORT_RADIANCE),
+				in_grey = {.where = in_colour.where, .w = &grey};
 	for (int k = 0; k < BSDF_CASES; k++) {
 		struct arena a = {0};
 		struct bsdf b;

@@ -188,7 +188,8 @@ static void test_unknown_names(void **state)
 	refuses(S "<shape type='cube'>\n<subsurface type='dipole'/></shape>" END, "subsurface scattering is not");
 	refuses(S "<bdsf type='diffuse'/>" END, "did you mean `bsdf`?");
 	refuses(S "<luminaire type='area'/>" END, "<luminaire");
-	refuses(S "<float name='a' value='1'/>" END, "<float>: has no place in <scene>");
+	refuses(S "<float name='radius' value='1'/>" END, "<float>: has no place in <scene>");
+	refuses(S "<float value='1'/>" END, "<float>: has no place in <scene>");
 	refuses(S "<light type='point'/>" END, "there is no element of this name; did you mean `emitter`?");
 	refuses(BSDF("<int name='a' value='1'/>"), "there is no element of this name; did you mean `integer`?");
 	refuses(S "<bsdf/>" END, "needs an attribute `type`");
@@ -418,7 +419,7 @@ static void test_misplaced_parameters(void **state)
 	(void)state;
 	refuses(S "<sensor type='perspective'><float name='fovv' value='1'/></sensor>" END, "did you mean `fov`?");
 	refuses(S "<shape type='cube'><float name='radius' value='1'/></shape>" END, "has no `radius`");
-	refuses(BSDF("<float name='num_parameters' value='1'/>"), "has no `num_parameters`");
+	refuses(BSDF("<texture name='num_parameters' type='checkerboard'/>"), "has no `num_parameters`");
 	refuses(S "<shape type='cube'><texture name='displacment' type='checkerboard'/></shape>" END,
 		"did you mean `displacement`?");
 	refuses(S "<emitter type='area'><texture name='num_parameters' type='checkerboard'/></emitter>" END,

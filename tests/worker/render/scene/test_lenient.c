@@ -234,6 +234,7 @@ static void test_covers(void **state)
 	} covers[] = {
 		{"coating | diffuse", false},
 		{"coating | difftrans", true},
+		{"coating | hk", true},
 		{"twosided | polarizer", true},
 		{"roughcoating | principledthin spec_trans=0.5", true},
 		{"mask | diffuse", false},

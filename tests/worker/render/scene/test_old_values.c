@@ -242,8 +242,6 @@ static void test_unknown_names(void **state)
 	scene_fini(&s);
 	refuses("0.6.0", "<emitter type='sky'><float name='turbidit' value='3'/></emitter>",
 		"did you mean `turbidity`?");
-	refuses("3.0.0", "<bsdf type='diffuse'><string name='guiding_file' value='x'/></bsdf>",
-		"has no `guiding_file` (supported: reflectance)");
 	refuses("3.0.0", "<integer name='max_depth' value='10'/>", "has no place in <scene>");
 	refuses("0.6.0", "<bsdf type='diffuse'><spectrum name='reflectance' type='bitmap'/></bsdf>",
 		"there is no spectrum of this type");
@@ -271,9 +269,6 @@ static void test_unknown_names_of_all_classes(void **state)
 	struct scene s = read_old("<integrator type='path'><string name='guidingFile' value='x'/></integrator>",
 				  "is ignored except for");
 	scene_fini(&s);
-	refuses("3.0.0", INSIDE("<phase type='hg'><string name='guiding_file' value='x'/></phase>"),
-		"has no `guiding_file`");
-	refuses("3.0.0", INSIDE("<string name='guiding_file' value='x'/>"), "has no `guiding_file`");
 	refuses("0.6.0", INSIDE("<float name='sigmaT1' value='x'/>"), "has no `sigmaT1`; did you mean `sigma_t`?");
 #undef INSIDE
 #undef SENSOR

@@ -52,6 +52,51 @@ static void test_notes(void **state)
 	check("<emitter type='directional'><float name='angle' value='0.0'/></emitter>", NULL);
 }
 
+/* Those of an object share a line, each kind once: a second film adds what the first did not have. */
+static void test_lines_of_objects(void **state)
+{
+	(void)state;
+	/* clang-format off */
+	static const char xml[] =
+		"<scene version='0.6.0'>\n"
+			"<sensor type='perspective'><float name='focusDistance' value='1'/>\n"
+				"<film type='hdrfilm'>"
+					"<boolean name='banner' value='false'/>\n"
+					"<string name='pixelFormat' value='rgb'/>"
+					"<string name='fork' value='x'/>\n"
+					"<string name='componentFormat' value='float16'/>"
+				"</film>"
+			"</sensor>\n"
+			"<sensor type='perspective'>"
+				"<film type='hdrfilm'>"
+					"<string name='pixelFormat' value='rgb'/>\n"
+					"<string name='fileFormat' value='openexr'/>"
+				"</film>"
+			"</sensor>"
+		"</scene>";
+	/* clang-format on */
+	static const char *const notes[] = {
+		"s.xml:2: <sensor type=\"perspective\">: `focusDistance` has no effect on light and is ignored",
+		"s.xml:3: <film type=\"hdrfilm\">: `banner`, `pixelFormat`, `componentFormat` have no effect on light and "
+		"are ignored",
+		"s.xml:4: <film type=\"hdrfilm\">: `fork` is not known and is ignored",
+		"s.xml:7: <film type=\"hdrfilm\">: `fileFormat` has no effect on light and is ignored"};
+	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {0}};
+	struct asset_source assets = memory_assets(files);
+	struct scene s;
+	struct error e;
+	if (scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e))
+		fail_msg("%s", e.text);
+	for (size_t i = 0; i < sizeof notes / sizeof *notes; i++)
+		if (!scene_has_note(&s, notes[i]))
+			fail_msg("there is no %s", notes[i]);
+	unsigned about = 0;
+	for (uint32_t i = 0; i < s.note_count; i++)
+		about += strstr(s.notes[i], "no effect on light") != NULL;
+	assert_int_equal(about, 3);
+	scene_fini(&s);
+}
+
 /* What is ignored as a whole may hold the depth of paths, which is visible in the image. */
 static void test_depths(void **state)
 {
@@ -172,6 +217,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_notes),
+		cmocka_unit_test(test_lines_of_objects),
 		cmocka_unit_test(test_depths),
 		cmocka_unit_test(test_names_of_integrators),
 		cmocka_unit_test(test_known_integrators),

@@ -209,6 +209,33 @@ static void refuses(const char *content, const char *sentence)
 	built_shape_release(&b);
 }
 
+/* The bitmap may have any name, and stand elsewhere. */
+static void test_named(void **state)
+{
+	(void)state;
+#define ELSEWHERE(inside) "</shape><texture id='t' type='bitmap'>" FILENAME "</texture>" inside "<shape type='sphere'>"
+	static const char *const ways[] = {
+		"<texture type='bitmap' name='heights'>" FILENAME "</texture>",
+		"<ref id='t'/>" ELSEWHERE(""),
+		"<ref id='t' name='texture'/>" ELSEWHERE(""),
+		"<ref id='s'/>" ELSEWHERE("<texture id='s' type='scale'><ref id='t' name='x'/></texture>"),
+		"<ref id='t'/><bsdf type='diffuse'><ref id='t' name='reflectance'/></bsdf>" ELSEWHERE(""),
+	};
+	struct pictures p = {0};
+	take_picture(&p, WIDTH, HEIGHT, height);
+	struct built_shape wanted = build_ok("heightfield", FILENAME);
+	for (size_t i = 0; i < sizeof ways / sizeof *ways; i++) {
+		struct built_shape b = build_ok("heightfield", ways[i]);
+		assert_int_equal(b.g.mesh.vertex_count, wanted.g.mesh.vertex_count);
+		for (uint32_t k = 0; k < b.g.mesh.vertex_count; k++)
+			assert_memory_equal(b.g.mesh.position[k], wanted.g.mesh.position[k],
+					    sizeof b.g.mesh.position[k]);
+		built_shape_release(&b);
+	}
+	built_shape_release(&wanted);
+	pictures_fini(&p);
+}
+
 static void test_bad_input(void **state)
 {
 	(void)state;
@@ -229,8 +256,8 @@ static void test_bad_input(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_as_obj), cmocka_unit_test(test_normals),
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_as_obj),   cmocka_unit_test(test_normals),
 					   cmocka_unit_test(test_decoding), cmocka_unit_test(test_scaled),
-					   cmocka_unit_test(test_bad_input)};
+					   cmocka_unit_test(test_named),    cmocka_unit_test(test_bad_input)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

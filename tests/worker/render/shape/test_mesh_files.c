@@ -229,7 +229,7 @@ static void test_bad_ply(void **state)
 		{HEAD "what\nend_header\n", "m:3: neither comment"},
 		{"ply\nelement vertex 1\nproperty float x\nend_header\n1", "names no format"},
 		{HEAD "end_header\n", "m: has no vertices with x, y and z"},
-		{QUAD "end_header\n0 0 0 1 0 0 1 1 0 0 1 0", "has no faces"},
+		{QUAD "element strip 1\nproperty int n\nend_header\n0 0 0 1 0 0 1 1 0 0 1 0 1", "has no faces"},
 		{QUAD "element face 1\nproperty list uchar float vertex_indices\nend_header\n",
 		 "indices must be whole numbers"},
 		{QUAD

@@ -228,6 +228,11 @@ static void test_bounces_multiply_spectra(void **state)
 	}
 }
 
+static spectrum at_unbounded(const void *rgb, const struct wavelengths *w)
+{
+	return color_eval_rgb_unbounded(rgb, w);
+}
+
 static void test_unbounded_keeps_its_rgb(void **state)
 {
 	(void)state;
@@ -238,6 +243,14 @@ static void test_unbounded_keeps_its_rgb(void **state)
 	rgb_of(at_color, &c, true, rgb);
 	for (int i = 0; i < 3; i++)
 		assert_true(fabs(rgb[i] - k[i]) < 1e-4 * k[0]);
+	/* and so it does in textures */
+	rgb_of(at_unbounded, k, true, rgb);
+	for (int i = 0; i < 3; i++)
+		assert_true(fabs(rgb[i] - k[i]) < COLOR_UNBOUNDED_OVER * 0.005 * k[0]); /* the table's error */
+	const struct wavelengths w = wavelengths_sample(0.1);
+	const double grey[3] = {7, 7, 7}, black[3] = {0, 0, 0};
+	assert_true(color_eval_rgb_unbounded(grey, &w).v[0] == 7);
+	assert_true(color_eval_rgb_unbounded(black, &w).v[0] == 0);
 }
 
 static void test_bounds_hold(void **state)

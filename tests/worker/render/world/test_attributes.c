@@ -302,6 +302,60 @@ static void test_roughness(void **state)
 	world_free(w);
 }
 
+/* What may exceed 1 is the attribute's number: the index of a metal, an exponent, an absorption. */
+static void test_beyond_one(void **state)
+{
+	(void)state;
+#define TEN(property)                                                                                \
+	"<texture type='mesh_attribute' name='" property "'><string name='name' value='face_heat'/>" \
+	"<float name='scale' value='10'/></texture>"
+#define NUMBER(property, value) "<float name='" property "' value='" value "'/>"
+	static const char *const of[][2] = {
+		{"<bsdf type='conductor'>" TEN("eta") NUMBER("k", "3") "</bsdf>",
+		 "<bsdf type='conductor'>" NUMBER("eta", "6") NUMBER("k", "3") "</bsdf>"},
+		{"<bsdf type='roughconductor'>" TEN("k") NUMBER("eta", "0.2") "</bsdf>",
+		 "<bsdf type='roughconductor'>" NUMBER("k", "6") NUMBER("eta", "0.2") "</bsdf>"},
+		{"<bsdf type='phong'>" TEN("exponent") "</bsdf>",
+		 "<bsdf type='phong'>" NUMBER("exponent", "6") "</bsdf>"},
+		{"<bsdf type='principledthin'>" NUMBER("spec_trans", "0.5") TEN("eta") "</bsdf>",
+		 "<bsdf type='principledthin'>" NUMBER("spec_trans", "0.5") NUMBER("eta", "6") "</bsdf>"},
+		{"<bsdf type='coating'>" TEN("sigma_a") "<bsdf type='diffuse'/></bsdf>",
+		 "<bsdf type='coating'>" NUMBER("sigma_a", "6") "<bsdf type='diffuse'/></bsdf>"},
+	};
+	for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
+		char text[4096];
+		snprintf(text, sizeof text, SKY PLY("h3", "%s") PLY("h3", "%s"), of[i][0], of[i][1]);
+		struct world *w = world_of(text);
+		const struct bsdf *got = &w->bsdfs[w->parts[0].bsdf], *want = &w->bsdfs[w->parts[1].bsdf];
+		assert_true(got->shape == want->shape && got->textured);
+		assert_true(fabs(got->alpha - want->alpha) <= 1e-6 * want->alpha || got->alpha == want->alpha);
+		struct surface_point x;
+		surface_on_triangle(&w->shapes[0], (struct prim_ref){0, 0, 0}, 0.2, 0.3, &x);
+		struct bsdf_point p = world_bsdf_point(&x, &colour, TRANSPORT_RADIANCE);
+		const vec3 wo = vec3_normalize((vec3){0.3, 0.1, 0.8}), wi = vec3_normalize((vec3){-0.2, 0.1, 0.7});
+		spectrum a, b;
+		if (got->has_delta) {
+			vec3 mirrored;
+			double chance;
+			a = bsdf_eval_delta(got, &p, wo, BSDF_REFLECT, &mirrored, &chance);
+			b = bsdf_eval_delta(want, &p, wo, BSDF_REFLECT, &mirrored, &chance);
+			assert_true(a.v[0] > 0);
+			assert_close(a, b, 1e-6);
+		}
+		a = got->ops->eval(got, &p, wo, wi);
+		b = want->ops->eval(want, &p, wo, wi);
+		assert_true(a.v[0] > 0 || !got->has_smooth);
+		assert_close(a, b, 1e-6);
+		world_free(w);
+	}
+	/* Colours as those of other parameters. */
+	struct world *w = world_of(
+		SKY PLY("linear.ply",
+			"<bsdf type='coating'>" FIELD("sigma_a", "vertex_color") "<bsdf type='diffuse'/></bsdf>"));
+	assert_true(w->bsdfs[0].shape == COLOR_SHAPE_OTHER);
+	world_free(w);
+}
+
 /* 0.6 takes floats at vertices as sRGB, unless the shape says that they are not. */
 static void test_vertexcolors(void **state)
 {
@@ -411,7 +465,7 @@ int main(void)
 		cmocka_unit_test(test_linear),	    cmocka_unit_test(test_instances),	 cmocka_unit_test(test_picture),
 		cmocka_unit_test(test_coordinates), cmocka_unit_test(test_faces),	 cmocka_unit_test(test_light),
 		cmocka_unit_test(test_roughness),   cmocka_unit_test(test_vertexcolors), cmocka_unit_test(test_shared),
-		cmocka_unit_test(test_refused),
+		cmocka_unit_test(test_refused),	    cmocka_unit_test(test_beyond_one),
 	};
 	return cmocka_run_group_tests(tests, NULL, teardown);
 }

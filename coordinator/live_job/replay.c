@@ -1,0 +1,253 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Reads what was merged of a job from the disk into its films.
+ *
+ * replay_films reads the checkpoint, if there is one, and then the journal that follows it. Each result goes through
+ * the same code as live ones. One whose predecessor is missing is noted (late.h) and tried again at the end. Other
+ * records restore fingerprint, times, estimates of the error and counters.
+ *
+ * A damaged record is skipped, counted and logged in the job's log: its lease is computed again. A damaged checkpoint
+ * is -EBADMSG; an undamaged record that makes no sense was written by another version: -EPROTO. The job must then be
+ * dropped. A stop requested by another thread is -ECANCELED.
+ */
+#include "coordinator/live_job/replay.h"
+
+#include "common/base/mem.h"
+#include "common/base/text.h"
+#include "coordinator/live_job/rollback.h"
+#include "coordinator/live_job/checkpoint_file.h"
+#include "coordinator/live_job/late.h"
+#include "coordinator/live_job/stored.h"
+#include "coordinator/store/journal_file.h"
+
+#include <string.h>
+
+enum { DAMAGED_MOST = 16 /* leases named in the log */ };
+
+struct replay {
+	struct live_job *job;
+	struct replay_progress *progress; /* NULL: nobody watches */
+	double elapsed;
+	uint64_t batches;
+	struct lease_key damaged[DAMAGED_MOST]; /* of records that are to be computed again */
+	size_t damaged_count;
+};
+
+/* ---- the journal */
+
+enum replay_place replay_place(const struct live_job *job, const struct lease_key *k)
+{
+	if (k->kind == LEASE_BOOTSTRAP) {
+		bool merged = !job->bootstrap || bootstrap_has(job->bootstrap, k->group, k->part);
+		return merged ? REPLAY_MERGED : REPLAY_FITS;
+	}
+	if (job->bootstrap)
+		return REPLAY_LATE;
+	if (canvas_has(job->canvas, k))
+		return REPLAY_MERGED;
+	struct lease_key before = *k;
+	before.epoch--;
+	bool open = k->epoch <= canvas_rounds(job->canvas) + 1;
+	return open && (k->epoch == 0 || canvas_has(job->canvas, &before)) ? REPLAY_FITS : REPLAY_LATE;
+}
+
+static int merge(struct replay *r, struct batch *b, struct error *e)
+{
+	struct live_job *job = r->job;
+	uint64_t rounds = live_job_rounds(job);
+	int rc = live_job_merge(job, b, e);
+	if (rc == -EEXIST || rc == -EAGAIN) /* an error of the films, not of the machine */
+		rc = error_prefix(e, -EBADMSG, "a batch out of order");
+	live_job_note_times(job, r->elapsed, rounds);
+	if (!rc && job->bootstrap && bootstrap_missing(job->bootstrap) == 0)
+		rc = live_job_prepare(job, job->film_folder, e);
+	r->batches++;
+	return rc;
+}
+
+/* An undamaged record that another version wrote: it must not be thrown away. */
+static int strange(const struct replay *r, const char *what, size_t size, struct error *e)
+{
+	return error_set(
+		e, EPROTO,
+		"the journal of j%llu has %s of %zu bytes that mean nothing here: another coordinator wrote it",
+		(unsigned long long)r->job->id, what, size);
+}
+
+/* The same for estimates and counters; e says what is wrong. */
+static int strange_note(const struct replay *r, int rc, struct error *e)
+{
+	return rc == -EPROTO ? error_prefix(e, rc, "the journal of j%llu: another coordinator wrote it",
+					    (unsigned long long)r->job->id)
+			     : rc;
+}
+
+static int take_batch(struct replay *r, const struct journal_item *item, struct error *e)
+{
+	struct envelope env;
+	struct batch batch = {0};
+	const unsigned char *payload;
+	size_t payload_size;
+	int rc = envelope_unpack_frame(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, item->body, item->size, &payload,
+				       &payload_size, e);
+	if (rc)
+		return rc == -EBADMSG ? strange(r, "a result", item->size, e) : rc;
+	rc = batch_unpack(&batch, &r->job->plan, env.message->lease_result, payload, payload_size, e);
+	if (rc == -EBADMSG)
+		rc = strange(r, "a result", item->size, e);
+	if (!rc && item->kind == JOURNAL_AGAIN)
+		rc = rollback_replay(r->job, item->journal, &batch.key, e);
+	if (!rc && item->kind == JOURNAL_KEPT) {
+		r->job->kept_bytes += item->size;
+		rollback_note(r->job, &batch.key, item->at, env.message->lease_result->maker);
+		batch_fini(&batch);
+		envelope_fini(&env);
+		return 0;
+	}
+	enum replay_place place = rc ? REPLAY_MERGED : replay_place(r->job, &batch.key);
+	if (place == REPLAY_FITS)
+		rc = merge(r, &batch, e);
+	if (place == REPLAY_FITS && !rc)
+		rollback_note(r->job, &batch.key, item->at, env.message->lease_result->maker);
+	else if (place == REPLAY_LATE)
+		rc = late_add(r->job, &batch.key, item->at, e);
+	batch_fini(&batch);
+	envelope_fini(&env);
+	return rc;
+}
+
+static void note_damage(struct replay *r, const struct journal_item *item)
+{
+	if ((item->kind == JOURNAL_BATCH || item->kind == JOURNAL_AGAIN) && r->damaged_count < DAMAGED_MOST)
+		r->damaged[r->damaged_count++] = item->lease;
+}
+
+static int report_progress(void *user, size_t bytes, struct error *e)
+{
+	struct replay_progress *p = ((struct replay *)user)->progress;
+	if (!p)
+		return 0;
+	atomic_fetch_add(&p->read, bytes);
+	return atomic_load(&p->stop) ? error_set(e, ECANCELED, "the coordinator stops") : 0;
+}
+
+static int take_record(void *user, const struct journal_item *item, struct error *e)
+{
+	struct replay *r = user;
+	struct live_job *job = r->job;
+	struct forecast_look look;
+	const unsigned char *body = item->body;
+	size_t size = item->size;
+	int rc = report_progress(r, size, e);
+	if (rc)
+		return rc;
+	if (item->missing) {
+		note_damage(r, item);
+		return item->kind == JOURNAL_AGAIN ? rollback_replay(job, item->journal, &item->lease, e) : 0;
+	}
+	r->elapsed = item->elapsed;
+	switch (item->kind) {
+	case JOURNAL_BATCH:
+	case JOURNAL_AGAIN:
+	case JOURNAL_KEPT:
+		return take_batch(r, item, e);
+	case JOURNAL_PINNED:
+		if (size >= sizeof job->fingerprint)
+			return strange(r, "a fingerprint", size, e);
+		memcpy(job->fingerprint, body, size);
+		job->fingerprint[size] = 0;
+		return 0;
+	case JOURNAL_LOOK:
+	case JOURNAL_OLD_LOOK:
+		rc = (item->kind == JOURNAL_LOOK ? stored_unpack_look : stored_old_look)(body, size, &look, e);
+		if (rc)
+			return strange_note(r, rc, e);
+		forecast_add_look(&job->record.looks, &look);
+		job->look_written = look.work;
+		return 0;
+	case JOURNAL_COUNTS:
+	case JOURNAL_OLD_COUNTS:
+		rc = item->kind == JOURNAL_COUNTS ? stored_unpack_counts(body, size, &job->record.counts, e)
+						  : stored_old_counts(body, size, &job->record.counts, e);
+		return rc ? strange_note(r, rc, e) : 0;
+	default:
+		return strange(r, "a record", size, e);
+	}
+}
+
+/* Those that waited for later records in the file. */
+static int take_late(struct replay *r, struct error *e)
+{
+	struct live_job *job = r->job;
+	size_t kept = 0;
+	int rc = 0;
+	late_sort(job);
+	for (size_t i = 0; i < job->late_count; i++) {
+		struct late_result l = job->late[i];
+		struct journal_item item = {.kind = JOURNAL_BATCH, .at = l.at};
+		unsigned char *body = NULL;
+		enum replay_place place = rc ? REPLAY_LATE : replay_place(job, &l.key);
+		if (place == REPLAY_FITS && (rc = journal_body(job->journal, l.at, &body, &item.size, e)) == 0) {
+			item.body = body;
+			rc = take_batch(r, &item, e);
+			mem_free(body);
+		}
+		if (place == REPLAY_LATE)
+			job->late[kept++] = l;
+	}
+	job->late_count = kept;
+	return rc;
+}
+
+/* Which of the damaged results are to be computed again; those computed since are merged. */
+static void say_damage(const struct replay *r, const struct journal_found *found)
+{
+	struct live_job *job = r->job;
+	char text[400] = "";
+	struct text t = {text, sizeof text};
+	uint64_t open = 0;
+	for (size_t i = 0; i < r->damaged_count; i++) {
+		const struct lease_key *k = &r->damaged[i];
+		if (replay_place(job, k) == REPLAY_MERGED)
+			continue;
+		text_put(&t, "%s%s " LEASE_WORDS, open++ ? ", " : ": ", LEASE_VALUES(k));
+	}
+	live_job_log(
+		job, LOG_SPOOL_FAULT,
+		"damaged=%llu waiting=%zu text=\"the journal is damaged: %llu stored records are lost; computed again%s\"",
+		(unsigned long long)found->damaged, job->late_count, (unsigned long long)found->lost,
+		*text ? text : ": none any more");
+}
+
+int replay_films(const struct spool *spool, struct live_job *job, struct replay_progress *p, struct error *e)
+{
+	struct replay r = {.job = job, .progress = p};
+	struct journal_found found;
+	char folder[SPOOL_PATH_MAX];
+	uint64_t generation = 0;
+	spool_job_path(spool, job->id, NULL, folder);
+	int rc = checkpoint_load(spool, job, &generation, report_progress, &r, e);
+	if (rc && rc != -ENOENT)
+		return rc;
+	rc = journal_open(&job->journal, folder, job->id, generation, take_record, &r, &found, e);
+	if (rc == -ENOENT) { /* its batches can be computed again */
+		live_job_log(job, LOG_SPOOL_FAULT, "text=\"%s/journal.%llu is gone: what it held is computed again\"",
+			     folder, (unsigned long long)generation);
+		rc = journal_create(&job->journal, folder, job->id, generation, e);
+	}
+	if (!rc && job->late_count)
+		rc = take_late(&r, e);
+	if (rc)
+		return rc;
+	if (found.lost)
+		say_damage(&r, &found);
+	journal_clear(folder, generation);
+	job->pinned = *job->fingerprint != 0;
+	live_job_log(
+		job, LOG_JOB_STATE,
+		"state=restored batches=%llu rounds=%llu elapsed=%.3f checkpoint=%llu journal=%llu cut=%llu damaged=%llu",
+		(unsigned long long)r.batches, (unsigned long long)live_job_rounds(job), job->times.elapsed,
+		(unsigned long long)job->checkpoint_bytes, (unsigned long long)journal_bytes(job->journal),
+		(unsigned long long)found.cut, (unsigned long long)found.damaged);
+	return 0;
+}

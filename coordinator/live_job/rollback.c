@@ -1,0 +1,194 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "coordinator/live_job/rollback.h"
+
+#include "common/base/list.h"
+#include "common/base/mem.h"
+#include "common/base/text.h"
+#include "coordinator/live_job/late.h"
+
+#include <assert.h>
+#include <string.h>
+
+static uint32_t slot_of(const struct live_job *job, const struct lease_key *k)
+{
+	return k->group * job->plan.parts + k->part;
+}
+
+static struct lease_key key_of(const struct live_job *job, const struct merged_record *r)
+{
+	return (struct lease_key){job->id, LEASE_RENDER, r->slot / job->plan.parts, r->slot % job->plan.parts,
+				  r->epoch};
+}
+
+static void take_maker(struct live_job_maker *to, const Farm__Maker *from)
+{
+	*to = (struct live_job_maker){0};
+	if (!from)
+		return;
+	text_copy(to->name, sizeof to->name, from->name);
+	text_copy(to->certificate, sizeof to->certificate, from->certificate);
+	text_copy(to->home, sizeof to->home, from->home);
+	to->restarts = from->restarts;
+}
+
+void rollback_note(struct live_job *job, const struct lease_key *k, uint64_t at, const Farm__Maker *maker)
+{
+	if (job->plan.kind != PLAN_CHAINS || k->kind != LEASE_RENDER)
+		return;
+	struct merged_record *more = list_room(job->merged, job->merged_count, sizeof *more);
+	if (!more)
+		return;
+	job->merged = more;
+	job->merged[job->merged_count++] = (struct merged_record){slot_of(job, k), k->epoch, at};
+	take_maker(&job->makers[slot_of(job, k)], maker);
+}
+
+/* SIZE_MAX: not found. */
+static size_t find(const struct live_job *job, uint32_t slot, uint64_t epoch)
+{
+	for (size_t i = job->merged_count; i-- > 0;)
+		if (job->merged[i].slot == slot && job->merged[i].epoch == epoch)
+			return i;
+	return SIZE_MAX;
+}
+
+static int read_batch(const struct live_job *job, struct journal *j, const struct lease_key *k, struct batch *b,
+		      struct live_job_maker *maker, struct error *e)
+{
+	size_t i = find(job, slot_of(job, k), k->epoch), size, payload_size;
+	unsigned char *body;
+	const unsigned char *payload;
+	struct envelope env;
+	if (i == SIZE_MAX)
+		return error_set(e, ENOENT, "the batch of an epoch is not in the journal");
+	int rc = journal_body(j, job->merged[i].at, &body, &size, e);
+	if (rc)
+		return rc;
+	rc = envelope_unpack_frame(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, body, size, &payload, &payload_size, e);
+	if (!rc) {
+		rc = batch_unpack(b, &job->plan, env.message->lease_result, payload, payload_size, e);
+		take_maker(maker, env.message->lease_result->maker);
+		envelope_fini(&env);
+	}
+	mem_free(body);
+	if (!rc && !lease_key_equal(&b->key, k))
+		rc = error_set(e, EBADMSG, "the journal has another batch there");
+	return rc;
+}
+
+int rollback_read(const struct live_job *job, struct journal *j, const struct lease_key *k, struct rollback *b,
+		  struct error *e)
+{
+	struct lease_key last = *k;
+	struct batch before = {0};
+	*b = (struct rollback){0};
+	last.epoch--;
+	if (job->plan.kind != PLAN_CHAINS || k->kind != LEASE_RENDER || k->group >= job->plan.groups ||
+	    k->part >= job->plan.parts || k->epoch == 0 || !job->canvas || canvas_has(job->canvas, k) ||
+	    !canvas_has(job->canvas, &last))
+		return error_set(e, ENOENT, "not the lease that is next");
+	int rc = read_batch(job, j, &last, &b->batch, &b->maker, e);
+	b->maker = (struct live_job_maker){0};
+	if (!rc && last.epoch > 0) {
+		last.epoch--;
+		rc = read_batch(job, j, &last, &before, &b->maker, e);
+		b->states = before.states;
+		before.states = NULL;
+		before.state_count = 0;
+	}
+	batch_fini(&before);
+	if (rc)
+		rollback_fini(b);
+	return rc;
+}
+
+void rollback_take(struct live_job *job, struct rollback *b)
+{
+	const struct lease_key *k = &b->batch.key;
+	uint32_t slot = slot_of(job, k);
+	size_t i = find(job, slot, k->epoch);
+	assert(i != SIZE_MAX);
+	memmove(&job->merged[i], &job->merged[i + 1], (--job->merged_count - i) * sizeof *job->merged);
+	canvas_take_back(job->canvas, &b->batch);
+	live_job_set_states(job, slot, b->states);
+	b->states = NULL;
+	job->makers[slot] = b->maker;
+	job->again[slot] = true;
+	job->record.cpu_seconds -= b->batch.cpu_seconds;
+}
+
+void rollback_fini(struct rollback *b)
+{
+	if (b->states)
+		states_fini(b->states, b->batch.state_count);
+	batch_fini(&b->batch);
+	*b = (struct rollback){0};
+}
+
+int rollback_replay(struct live_job *job, struct journal *j, const struct lease_key *k, struct error *e)
+{
+	int rc = 0;
+	late_forget(job, k);
+	if (!job->canvas || k->group >= job->plan.groups || k->part >= job->plan.parts)
+		return 0;
+	while (!rc && canvas_has(job->canvas, k)) {
+		struct lease_key next = *k;
+		struct rollback b;
+		do
+			next.epoch++;
+		while (canvas_has(job->canvas, &next));
+		rc = rollback_read(job, j, &next, &b, e);
+		if (rc) /* an undamaged journal has all of them */
+			return rc == -ENOENT ? error_set(e, EBADMSG, "a batch that was replaced is not in the journal")
+					     : rc;
+		rollback_take(job, &b);
+		rollback_fini(&b);
+		job->again[slot_of(job, k)] = false;
+	}
+	return rc;
+}
+
+static uint64_t copy_one(const struct live_job *job, struct journal *to, const struct merged_record *r, uint64_t most,
+			 struct merged_record *out)
+{
+	struct error e;
+	unsigned char *body;
+	size_t size;
+	struct lease_key k = key_of(job, r);
+	if (journal_body(job->journal, r->at, &body, &size, &e))
+		return 0;
+	*out = (struct merged_record){r->slot, r->epoch, journal_bytes(to)};
+	bool copied = size <= most &&
+		      journal_append(to, JOURNAL_KEPT, &k, job->times.elapsed, body, size, NULL, &e) == 0 &&
+		      journal_write(to, &e) == 0;
+	mem_free(body);
+	return copied ? size : 0;
+}
+
+void rollback_copy(const struct live_job *job, struct journal *to, uint64_t most, struct merged_record **list,
+		   size_t *count)
+{
+	enum { LAST = 2 };
+	uint32_t slots = job->plan.groups * job->plan.parts;
+	struct error e;
+	*list = NULL;
+	*count = 0;
+	if (journal_write(job->journal, &e)) /* the waiting records cannot be read */
+		return;
+	for (uint32_t s = 0; s < slots; s++) {
+		uint64_t next = 0;
+		for (size_t i = 0; i < job->merged_count; i++)
+			if (job->merged[i].slot == s && job->merged[i].epoch >= next)
+				next = job->merged[i].epoch + 1;
+		for (uint64_t epoch = next < LAST ? 0 : next - LAST; epoch < next; epoch++) {
+			size_t i = find(job, s, epoch);
+			struct merged_record *more = i == SIZE_MAX ? NULL : list_room(*list, *count, sizeof *more);
+			if (!more)
+				continue;
+			*list = more;
+			uint64_t size = copy_one(job, to, &job->merged[i], most, &more[*count]);
+			*count += size > 0;
+			most -= size;
+		}
+	}
+}

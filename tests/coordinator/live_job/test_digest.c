@@ -1,0 +1,102 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* What decides bits is in the digest of a batch, and the time that it took is not. */
+#include "coordinator/live_job/digest.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { TILES = 2, STATES = 2, WEIGHTS = 3, MOMENTS = 4 };
+
+struct sample {
+	struct batch batch;
+	struct tile tiles[TILES];
+	float pixels[TILES][2 * 2 * TILE_CHANNELS];
+	struct chain_state states[STATES];
+	uint8_t bytes[STATES][5];
+	float weights[WEIGHTS], moments[MOMENTS];
+};
+
+static void begin(struct sample *s)
+{
+	memset(s, 0, sizeof *s);
+	s->batch = (struct batch){.key = {7, LEASE_RENDER, 1, 2, 3},
+				  .strategy_count = 2,
+				  .tile_count = TILES,
+				  .tiles = s->tiles,
+				  .state_count = STATES,
+				  .states = s->states,
+				  .weight_count = WEIGHTS,
+				  .weights = s->weights,
+				  .moment_count = MOMENTS,
+				  .moments = s->moments,
+				  .cpu_seconds = 1};
+	for (uint32_t i = 0; i < TILES; i++)
+		s->tiles[i] = (struct tile){.x = 64 * i, .width = 2, .height = 2, .xyz = s->pixels[i]};
+	for (int i = 0; i < STATES; i++)
+		s->states[i] = (struct chain_state){s->bytes[i], 5};
+}
+
+static void check(const struct sample *s, bool same)
+{
+	static struct sample plain;
+	struct batch_digest a, b;
+	struct error e;
+	begin(&plain);
+	assert_int_equal(digest_batch(&plain.batch, &a, &e), 0);
+	assert_int_equal(digest_batch(&s->batch, &b, &e), 0);
+	assert_int_equal(memcmp(&a, &b, sizeof a) == 0, same);
+}
+
+static void every_number_counts(void **state)
+{
+	(void)state;
+	static struct sample s;
+#define CHANGED(what)             \
+	do {                      \
+		begin(&s);        \
+		what;             \
+		check(&s, false); \
+	} while (0)
+	begin(&s);
+	check(&s, true);
+	s.batch.cpu_seconds = 2;
+	s.batch.strategy[2][0] = 1; /* beyond those that the plan has */
+	check(&s, true);
+	CHANGED(s.batch.key.job = 8);
+	CHANGED(s.batch.key.kind = LEASE_BOOTSTRAP);
+	CHANGED(s.batch.key.group = 0);
+	CHANGED(s.batch.key.part = 0);
+	CHANGED(s.batch.key.epoch = 4);
+	for (int i = 0; i < BATCH_COUNTERS; i++)
+		CHANGED(s.batch.counters[i] = 1);
+	for (int i = 0; i < STRATEGY_COUNTERS; i++)
+		CHANGED(s.batch.strategy[1][i] = 1);
+	for (int i = 0; i < PATH_CLASSES; i++)
+		CHANGED(s.batch.classes[i] = 1);
+	CHANGED(s.batch.independent_sum = -0.0);
+	CHANGED(s.batch.independent_square = 1);
+	CHANGED(s.batch.beyond_sum = 1);
+	CHANGED(s.batch.strategy_count = 1);
+	CHANGED(s.batch.tile_count = 1);
+	CHANGED(s.batch.state_count = 1);
+	CHANGED(s.batch.weight_count = 2);
+	CHANGED(s.batch.moment_count = 3);
+	CHANGED(s.tiles[1].x = 0);
+	CHANGED(s.tiles[1].y = 1);
+	CHANGED((s.tiles[1].width = 1, s.tiles[1].height = 4));
+	CHANGED(s.pixels[0][0] = 1e-45f);
+	CHANGED(s.pixels[1][2 * 2 * TILE_CHANNELS - 1] = 1);
+	CHANGED(s.bytes[1][4] = 1);
+	CHANGED(s.states[0].size = 4);
+	CHANGED(s.weights[2] = 1);
+	CHANGED(s.moments[3] = 1);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(every_number_counts)};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

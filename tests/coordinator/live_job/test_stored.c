@@ -1,0 +1,210 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* What is stored of a job comes back; what another version wrote is refused; what earlier ones wrote is read. */
+#include "coordinator/live_job/stored.h"
+
+#include "common/base/bytes.h"
+#include "tests/support/failing_memory.h"
+
+#include <errno.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static const unsigned char unknown[] = {0xc0, 0x0c, 1}; /* field 200 of any message: a 1 */
+static struct error e;
+
+static struct job_counts make_counts(void)
+{
+	struct job_counts c;
+	uint64_t n = UINT64_MAX;
+#define COUNTER(member, key, wire) c.member = n--;
+	JOB_COUNTERS(COUNTER)
+#undef COUNTER
+	return c;
+}
+
+static struct forecast_look make_look(double work)
+{
+	return (struct forecast_look){work, 0.1, 1.0 / 3, 1e-300, INFINITY, NAN, 7};
+}
+
+static void assert_look(const struct forecast_look *l, double work)
+{
+	struct forecast_look want = make_look(work);
+	assert_memory_equal(l, &want, sizeof want);
+}
+
+static void counts_come_back(void **state)
+{
+	(void)state;
+	unsigned char bytes[STORED_NOTE_MOST];
+	struct job_counts c = make_counts(), back = {0};
+	size_t size = stored_pack_counts(&c, bytes);
+	assert_int_equal(stored_unpack_counts(bytes, size, &back, &e), 0);
+	assert_memory_equal(&back, &c, sizeof c);
+	memcpy(bytes + size, unknown, sizeof unknown);
+	assert_int_equal(stored_unpack_counts(bytes, size + sizeof unknown, &back, &e), -EPROTO);
+	assert_int_equal(stored_unpack_counts(bytes, size - 1, &back, &e), -EPROTO);
+	mem_fail_after(0);
+	assert_int_equal(stored_unpack_counts(bytes, size, &back, &e), -ENOMEM);
+	mem_fail_after(-1);
+}
+
+static void looks_come_back(void **state)
+{
+	(void)state;
+	unsigned char bytes[STORED_NOTE_MOST];
+	struct forecast_look l = make_look(1e9), back;
+	size_t size = stored_pack_look(&l, bytes);
+	assert_int_equal(stored_unpack_look(bytes, size, &back, &e), 0);
+	assert_look(&back, 1e9);
+	memcpy(bytes + size, unknown, sizeof unknown);
+	assert_int_equal(stored_unpack_look(bytes, size + sizeof unknown, &back, &e), -EPROTO);
+}
+
+/* Of which every number is another. */
+static struct checkpoint_head make_head(void)
+{
+	struct checkpoint_head h = {.job = 12,
+				    .generation = 1ull << 40,
+				    .worker_count = 3,
+				    .cpu_seconds = 1.5,
+				    .bootstrap_cpu_seconds = 2.5,
+				    .look_written = 3.5,
+				    .times = {4.5, 5.5, NAN},
+				    .lit = {.b_pooled = 6.5, .beyond_share = 7.5, .black = true},
+				    .counts = make_counts()};
+	for (int i = 0; i < PLAN_MAX_GROUPS; i++)
+		h.lit.b[i] = 1.0 / (1 + i);
+	for (; h.looks.count < FORECAST_LOOKS; h.looks.count++)
+		h.looks.looks[h.looks.count] = make_look(h.looks.count);
+	snprintf(h.fingerprint, sizeof h.fingerprint, "%0255d", 9);
+	return h;
+}
+
+static void assert_head(const struct checkpoint_head *h)
+{
+	struct checkpoint_head want = make_head();
+	assert_true(h->job == want.job && h->generation == want.generation && h->worker_count == want.worker_count);
+	assert_true(h->cpu_seconds == 1.5 && h->bootstrap_cpu_seconds == 2.5 && h->look_written == 3.5);
+	assert_true(h->times.elapsed == 4.5 && h->times.opened == 5.5 && isnan(h->times.completed));
+	assert_memory_equal(h->lit.b, want.lit.b, sizeof want.lit.b);
+	assert_true(h->lit.b_pooled == 6.5 && h->lit.beyond_share == 7.5 && h->lit.black);
+	assert_int_equal(h->looks.count, FORECAST_LOOKS);
+	for (uint32_t i = 0; i < h->looks.count; i++)
+		assert_look(&h->looks.looks[i], i);
+	assert_string_equal(h->fingerprint, want.fingerprint);
+}
+
+static unsigned char bytes[STORED_HEAD_MOST + 64];
+
+static void heads_come_back(void **state)
+{
+	(void)state;
+	struct checkpoint_head h = make_head(), back;
+	size_t size = stored_pack_head(&h, bytes);
+	assert_int_equal(stored_unpack_head(bytes, size, &back, &e), 0);
+	assert_head(&back);
+	assert_memory_equal(&back.counts, &h.counts, sizeof h.counts);
+	assert_int_equal(stored_unpack_head(bytes, size - 1, &back, &e), -EPROTO);
+	assert_int_equal(stored_unpack_head(bytes, 0, &back, &e), -EPROTO);
+	/* More than a job has: a 65th group, a 65th look. More than is known: of the head, of its last look. */
+	static const unsigned char more[][12] = {{0x52, 8}, {0x72, 0}, {0xc0, 0x0c, 1}, {0x72, 3, 0xc0, 0x0c, 1}};
+	static const size_t sizes[] = {10, 2, 3, 5};
+	h.looks.count--;
+	for (int i = 0; i < 4; i++) {
+		h.looks.count = i == 1 ? FORECAST_LOOKS : 1;
+		size = stored_pack_head(&h, bytes);
+		memcpy(bytes + size, more[i], sizes[i]);
+		assert_int_equal(stored_unpack_head(bytes, size + sizes[i], &back, &e), -EPROTO);
+	}
+}
+
+/* ---- as earlier versions wrote it: little endian, one number behind the other ---- */
+
+static size_t put_all(size_t at, const double *v, size_t count)
+{
+	copy_numbers(bytes + at, v, sizeof *v, count);
+	return at + count * sizeof *v;
+}
+
+static size_t put_look(size_t at, double work)
+{
+	struct forecast_look l = make_look(work);
+	at = put_all(at, (double[6]){l.work, l.cpu_seconds, l.seconds, l.rel_mse, l.rel_mse_upper, l.degrees}, 6);
+	put64(bytes + at, l.doubtful);
+	return at + 8;
+}
+
+static size_t put_counts(size_t at)
+{
+	for (uint64_t n = 1; n <= 8; n++, at += 8)
+		put64(bytes + at, n);
+	return at;
+}
+
+static void assert_old_counts(const struct job_counts *c)
+{
+	assert_true(c->repeats == 1 && c->refused == 2 && c->faults == 3 && c->failures == 4 && c->timeouts == 5 &&
+		    c->duplicates == 6 && c->verified == 7 && c->mismatched == 8);
+}
+
+static void old_notes_are_read(void **state)
+{
+	(void)state;
+	struct job_counts back = {0};
+	struct forecast_look read;
+	size_t size = put_counts(0);
+	assert_int_equal(stored_old_counts(bytes, size, &back, &e), 0);
+	assert_old_counts(&back);
+	assert_int_equal(stored_old_counts(bytes, size + 8, &back, &e), -EPROTO);
+	assert_int_equal(stored_old_counts(bytes, size - 1, &back, &e), -EPROTO);
+	size = put_look(0, 5);
+	assert_int_equal(stored_old_look(bytes, size, &read, &e), 0);
+	assert_look(&read, 5);
+	assert_int_equal(stored_old_look(bytes, size - 8, &read, &e), -EPROTO);
+	assert_int_equal(stored_old_look(bytes, size + 1, &read, &e), -EPROTO);
+}
+
+static void old_heads_are_read(void **state)
+{
+	(void)state;
+	struct checkpoint_head h = make_head(), back;
+	put64(bytes, h.job);
+	put64(bytes + 8, h.generation);
+	size_t at = put_all(16, (double[6]){1.5, 2.5, 3.5, 4.5, 5.5, NAN}, 6);
+	at = put_all(at, h.lit.b, 64);
+	at = put_all(at, (double[2]){6.5, 7.5}, 2);
+	put64(bytes + at, 1); /* black */
+	put64(bytes + at + 8, 64);
+	at += 16;
+	for (int i = 0; i < 64; i++)
+		at = put_look(at, i);
+	at = put_counts(at);
+	memcpy(bytes + at, h.fingerprint, 256);
+	assert_int_equal(at + 256, STORED_OLD_HEAD);
+	stored_old_head(bytes, 3, &back);
+	assert_head(&back);
+	assert_old_counts(&back.counts);
+	memset(bytes + 600, 0xff, 4); /* no more looks than there can be */
+	memset(bytes + at, 'a', 256);
+	stored_old_head(bytes, 3, &back);
+	assert_int_equal(back.looks.count, 64);
+	assert_int_equal(strlen(back.fingerprint), 255);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(counts_come_back),   cmocka_unit_test(looks_come_back),
+		cmocka_unit_test(heads_come_back),    cmocka_unit_test(old_notes_are_read),
+		cmocka_unit_test(old_heads_are_read),
+	};
+	return cmocka_run_group_tests_name("coordinator/live_job/test_stored", tests, NULL, NULL);
+}

@@ -1,0 +1,213 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A thin layer of a medium between two parallel sides that refract nothing: light passes straight through, or is
+ * scattered once (Hanrahan and Krueger 1993, Reflection from Layered Surfaces due to Subsurface Scattering, sec. 4).
+ * Light that would be scattered twice is lost. With t the optical thickness, sigma_t times the layer's, a and c the
+ * cosines |wo.z| and |wi.z|, A the share sigma_s / sigma_t and p the phase function, the integrals over the depth of
+ * the event are
+ *
+ *   reflected    f = A p(wo, wi) (1 - exp(-t / a - t / c)) / (a + c)
+ *   transmitted  f = A p(wo, wi) (exp(-t / a) - exp(-t / c)) / (a - c)
+ *   straight     exp(-t / a), a specular lobe
+ *
+ * Both are the same with wo and wi exchanged. Coefficients are those of a medium of 0.6: sigma_s and sigma_a, or
+ * sigma_t and albedo, or by the name of a measured material, skin1 where the file says nothing.
+ *
+ * Failures: coefficients in two ways, a name of no material, microflakes, whose extinction depends on the direction.
+ */
+#include "worker/render/bsdf/create.h"
+#include "worker/render/math/measured_media.h"
+#include "worker/render/medium/phase.h"
+
+#include <math.h>
+#include <string.h>
+
+/* What is divided by the cosines stays finite. */
+#define COSINE_MIN 0x1p-1000
+
+struct layer {
+	struct texture first, second; /* sigma_a and sigma_s, or sigma_t and albedo */
+	bool by_albedo;
+	double thickness;
+	struct phase phase;
+};
+
+/* The optical thickness at a point, and the share of what is taken out of the ray that is scattered. */
+static spectrum depth_at(const struct layer *l, const struct bsdf_point *p, spectrum *scattered)
+{
+	spectrum first = texture_eval(&l->first, &p->where, p->w), second = texture_eval(&l->second, &p->where, p->w);
+	spectrum depth;
+	for (int i = 0; i < SPECTRUM_LANES; i++) {
+		double s = second.v[i], t = l->by_albedo ? first.v[i] : first.v[i] + s;
+		depth.v[i] = t * l->thickness;
+		scattered->v[i] = (1 - l->phase.absorbed) * (l->by_albedo ? s : t > 0 ? s / t : 0);
+	}
+	return depth;
+}
+
+/* exp(-t / cosine) */
+static double passed(double t, double cosine)
+{
+	return exp(-t / cosine);
+}
+
+/* (exp(-t / a) - exp(-t / c)) / (a - c): with d = t / min - t / max, what passes at the larger cosine times
+ * (1 - exp(-d)) / (max - min), which is t / (a c) where both are equal. */
+static double transmitted(double t, double a, double c)
+{
+	double most = fmax(a, c), least = fmin(a, c), d = t * ((most - least) / most / least);
+	double direct = passed(t, most);
+	if (!(direct > 0))
+		return 0;
+	if (d > 1)
+		return direct * -expm1(-d) / (most - least);
+	return direct * (d > 0 ? -expm1(-d) / d : 1) * (t / most / least);
+}
+
+static double reflected(double t, double a, double c)
+{
+	return -expm1(-t / a - t / c) / (a + c);
+}
+
+static spectrum hk_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct layer *l = b->data;
+	double a = fabs(wo.z), c = fabs(wi.z);
+	if (!(a >= COSINE_MIN && c >= COSINE_MIN))
+		return spectrum_of(0);
+	spectrum f, depth = depth_at(l, p, &f);
+	bool same_side = wo.z * wi.z > 0;
+	double phase = phase_eval(&l->phase, p->where.p, wo, wi);
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		f.v[i] *= phase * (same_side ? reflected : transmitted)(depth.v[i], a, c);
+	return f;
+}
+
+/* Light that goes straight through, as a share of all that the layer lets out, were it scattered into no other layer.
+ */
+static double straight_chance(const struct bsdf *b, const struct bsdf_point *p, vec3 wo)
+{
+	double straight = 0, other = 0;
+	spectrum scattered, depth = depth_at(b->data, p, &scattered);
+	for (int i = 0; i < SPECTRUM_LANES; i++) {
+		double direct = passed(depth.v[i], fabs(wo.z));
+		straight += direct;
+		other += scattered.v[i] * (1 - direct);
+	}
+	return other > 0 ? straight / (straight + other) : 1;
+}
+
+static double hk_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct layer *l = b->data;
+	if (!(fabs(wo.z) >= COSINE_MIN && fabs(wi.z) >= COSINE_MIN))
+		return 0;
+	return (1 - straight_chance(b, p, wo)) * phase_eval(&l->phase, p->where.p, wo, wi);
+}
+
+static spectrum hk_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
+			      double *chance)
+{
+	if (!(mode & BSDF_STRAIGHT) || !(fabs(wo.z) >= COSINE_MIN))
+		return spectrum_of(0);
+	spectrum unused, f = depth_at(b->data, p, &unused);
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		f.v[i] = passed(f.v[i], fabs(wo.z));
+	*wi = vec3_neg(wo);
+	*chance = straight_chance(b, p, wo);
+	return f;
+}
+
+static bool hk_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+		      struct bsdf_sample *out)
+{
+	const struct layer *l = b->data;
+	double unused;
+	if (!(fabs(wo.z) >= COSINE_MIN))
+		return false;
+	if (u[2] < straight_chance(b, p, wo))
+		return bsdf_sample_delta(b, p, wo, BSDF_TRANSMIT | BSDF_STRAIGHT, out);
+	return bsdf_sample_smooth(b, p, wo, phase_sample(&l->phase, p->where.p, wo, u, &unused), out);
+}
+
+/* A coefficient of the file, or else the measured one. */
+static int read_coefficient(struct texture *t, struct bsdf *b, const struct scene_node *n, const char *name,
+			    const double measured[3], const struct bsdf_build *build, struct error *e)
+{
+	const struct texture_build inner = bsdf_texture_build(build);
+	enum color_role role = strcmp(name, "albedo") == 0 ? COLOR_REFLECTANCE : COLOR_UNBOUNDED;
+	int code;
+	*t = (struct texture){.ops = NULL};
+	if (node_find(n, name))
+		code = texture_from_node(t, n, name, 0, role, &inner, e);
+	else
+		code = color_from_rgb(measured, role, &t->color);
+	if (code)
+		return code;
+	bsdf_add_shape(b, texture_shape(t));
+	b->textured |= !texture_is_constant(t);
+	return 0;
+}
+
+static int read_coefficients(struct layer *l, struct bsdf *b, const struct scene_node *n,
+			     const struct bsdf_build *build, struct error *e)
+{
+	bool apart = node_find(n, "sigma_s") || node_find(n, "sigma_a");
+	l->by_albedo = node_find(n, "sigma_t") || node_find(n, "albedo");
+	if (l->by_albedo && (apart || !(node_find(n, "sigma_t") && node_find(n, "albedo"))))
+		return node_error(n, e, EINVAL, "either sigma_s and sigma_a, or sigma_t and albedo");
+	char list[300];
+	const char *name = node_string(n, "material", MEASURED_DEFAULT);
+	const struct measured_medium *m = measured_find(name, list, sizeof list);
+	if (!m)
+		return node_error(n, e, EINVAL, "there is no material '%.64s' (supported: %s)", name, list);
+	double a[3], s[3];
+	for (int k = 0; k < 3; k++) {
+		a[k] = MEASURED_SCALE * m->sigma_a[k];
+		s[k] = MEASURED_SCALE * m->sigma_s[k] * (1 - m->g[k]);
+	}
+	int code = read_coefficient(&l->first, b, n, l->by_albedo ? "sigma_t" : "sigma_a", a, build, e);
+	return code ? code : read_coefficient(&l->second, b, n, l->by_albedo ? "albedo" : "sigma_s", s, build, e);
+}
+
+static int hk_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+{
+	struct layer *l = b->data;
+	const struct volume_build alone = {
+		.assets = build->assets, .arena = build->arena, .dialect_3 = build->dialect_3, .scale = 1};
+	int code = read_coefficients(l, b, n, build, e);
+	if (!code)
+		code = phase_create(&l->phase, node_child(n, PLUGIN_PHASE, 0), build->volumes ? build->volumes : &alone,
+				    e);
+	if (!code && l->phase.ops->area)
+		code = node_error(n, e, ENOTSUP, "microflakes are not supported in a layer");
+	if (code)
+		return code;
+	l->thickness = node_float(n, "thickness", 1);
+	b->modes = BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA | BSDF_STRAIGHT;
+	b->has_smooth = true;
+	b->has_delta = true;
+	b->two_sided = true;
+	b->alpha_mean = 1;
+	return 0;
+}
+
+#define COEFFICIENT(NAME)                                                  \
+	{                                                                  \
+		.name = NAME, .types = VALUE_TEXTURE, .min = 0, .max = 1e9 \
+	}
+
+const struct bsdf_ops bsdf_ops_hk = {
+	.decl = {PLUGIN_BSDF, "hk",
+		 PARAMS(COEFFICIENT("sigma_s"), COEFFICIENT("sigma_a"), COEFFICIENT("sigma_t"),
+			{.name = "albedo", .types = VALUE_TEXTURE, .min = 0, .max = 1},
+			{"material", UNDERSTOOD(VALUE_STRING)},
+			{.name = "thickness", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1e30}),
+		 1u << PLUGIN_PHASE, PARAM_UNDERSTOOD},
+	.data_size = sizeof(struct layer),
+	.create = hk_create,
+	.eval = hk_eval,
+	.pdf_solid = hk_pdf,
+	.eval_delta = hk_eval_delta,
+	.sample = hk_sample,
+};

@@ -1,0 +1,136 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/scene/over_one.h"
+
+#include "common/base/arena.h"
+#include "worker/render/scene/value.h"
+
+#include <errno.h>
+#include <math.h>
+#include <string.h>
+
+static bool is_share(enum plugin_class cls, const struct param *p)
+{
+	bool colour = p->types & VALUE_RGB;
+	return (p->types & VALUE_FLOAT) && (cls == PLUGIN_BSDF || colour) && p->min == 0 && p->max == 1;
+}
+
+/* The largest number, if all are finite and none is below 0; otherwise 0. */
+static double largest(const struct value *v)
+{
+	double scratch[3], most = 0;
+	uint32_t count;
+	const double *x = value_numbers(v, scratch, &count);
+	for (uint32_t i = 0; i < count; i++) {
+		if (!(x[i] >= 0 && isfinite(x[i])))
+			return 0;
+		most = fmax(most, x[i]);
+	}
+	return most;
+}
+
+bool over_one(enum plugin_class cls, const struct param *p, const struct value *v)
+{
+	return is_share(cls, p) && largest(v) > 1;
+}
+
+static int limit(struct value *v, struct arena *arena)
+{
+	if (v->type == VALUE_INT)
+		v->as.integer = 1;
+	if (v->type == VALUE_FLOAT)
+		v->as.number = 1;
+	for (int i = 0; v->type == VALUE_RGB && i < 3; i++)
+		v->as.rgb[i] = fmin(v->as.rgb[i], 1);
+	if (v->type != VALUE_SPECTRUM)
+		return 0;
+	double *limited = arena_alloc(arena, v->as.spectrum.count, sizeof *limited);
+	if (!limited)
+		return -ENOMEM;
+	for (uint32_t i = 0; i < v->as.spectrum.count; i++)
+		limited[i] = fmin(v->as.spectrum.value[i], 1);
+	v->as.spectrum.value = limited;
+	return 0;
+}
+
+static int out_of_memory(const struct notes *t)
+{
+	return error_set(t->error, ENOMEM, "out of memory");
+}
+
+int over_one_value(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
+		   enum plugin_class cls, const struct param *p, struct arena *arena, struct value *v)
+{
+	double most = largest(v);
+	if (!over_one(cls, p, v))
+		return 0;
+	if (limit(v, arena))
+		return out_of_memory(t);
+	const char *type = xml_attribute(owner, "type");
+	return note(t, owner, type, p->name,
+		    "%s:%d: <%.64s type=\"%.64s\">: %s=%g is above 1 and counts as 1 (lenient)", el->file, el->line,
+		    owner->name, type, element_spelling(el, p->name), most);
+}
+
+/* Textures that are made of colours, or of others. What `scale` makes of its own is limited where it is used. */
+static bool is_pattern(const char *type)
+{
+	return strcmp(type, "checkerboard") == 0 || strcmp(type, "gridtexture") == 0;
+}
+
+/* A colour of a texture, which is refused once, however many materials have it. */
+static int refuse_colour(const struct notes *t, const struct scene_node *texture, const struct property *p, double most)
+{
+	error_set(t->error, ERANGE, "%s:%d: <texture type=\"%.64s\">: %s=%g is above 1, which no reflectance is%s", texture->file,
+		  p->line, texture->type, p->name, most, OVER_ONE_HINT);
+	for (uint32_t i = 0; i < t->report->problem_count; i++)
+		if (strcmp(t->report->problems[i], t->error->text) == 0)
+			return REPORT_TOLD;
+	return -ERANGE;
+}
+
+/* Makes v, a colour of a texture that is above 1, 1 where it is more. */
+static int limit_colour(const struct notes *t, bool lenient, struct arena *arena, const struct xml_element *el,
+			const struct scene_node *texture, const struct property *p, struct value *v)
+{
+	double most = largest(v);
+	if (!lenient)
+		return refuse_colour(t, texture, p, most);
+	if (limit(v, arena))
+		return out_of_memory(t);
+	return note(t, el, texture->type, p->name,
+		    "%s:%d: <texture type=\"%.64s\">: %s=%g is above 1 and counts as 1 (lenient)", texture->file,
+		    p->line, texture->type, p->name, most);
+}
+
+static int limit_pattern(const struct notes *t, bool lenient, struct arena *arena, const struct xml_element *el,
+			 const struct scene_node **texture)
+{
+	static const char *const names[] = {"color0", "color1"};
+	for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+		const struct property *p = node_find(*texture, names[i]);
+		if (!p)
+			continue;
+		struct value v = p->value;
+		int r = 0;
+		if (v.type == VALUE_NODE && is_pattern(v.as.node->type))
+			r = limit_pattern(t, lenient, arena, el, &v.as.node);
+		else if (largest(&v) > 1)
+			r = limit_colour(t, lenient, arena, el, *texture, p, &v);
+		else
+			continue;
+		if (r)
+			return r;
+		if (v.type == VALUE_NODE && v.as.node == p->value.as.node)
+			continue;
+		*texture = node_with(*texture, names[i], v, arena);
+		if (!*texture)
+			return out_of_memory(t);
+	}
+	return 0;
+}
+
+int over_one_texture(const struct notes *t, enum plugin_class cls, const struct param *p, bool lenient,
+		     struct arena *arena, const struct xml_element *el, const struct scene_node **texture)
+{
+	return is_share(cls, p) && is_pattern((*texture)->type) ? limit_pattern(t, lenient, arena, el, texture) : 0;
+}
