@@ -163,7 +163,8 @@ static int take_ratio(const struct option_row *r, void *field, const char *arg, 
 	if (!text_ratio(arg, &x))
 		return error_set(e, EINVAL, "--%s takes something like 0.02 or 2%%, not '%s'", r->name, arg);
 	if (x > 1 && x <= 100)
-		return error_set(e, EINVAL, "--%s: %g %% is above 100 %%; did you mean %g%%?", r->name, 100 * x, x);
+		return error_set(e, EINVAL, "--%s: %.15g %% is above 100 %%; did you mean %.15g%%?", r->name, 100 * x,
+				 x);
 	if (!is_within(r, x))
 		return out_of_range(r, "a number", ", or percent", arg, e);
 	*(double *)field = x;

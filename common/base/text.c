@@ -135,7 +135,7 @@ bool text_ratio(const char *text, double *ratio)
 }
 
 /* A non-negative number, followed by at most one letter of `units`, which selects the factor at the same index. */
-static bool with_unit(const char *text, const char *units, const double *factors, double *value)
+static bool read_unit(const char *text, const char *units, const double *factors, double *number, double *factor)
 {
 	char *end;
 	if ((!(*text >= '0' && *text <= '9') && *text != '.') || text[strcspn(text, "xX")])
@@ -144,8 +144,18 @@ static bool with_unit(const char *text, const char *units, const double *factors
 	const char *unit = *end ? strchr(units, *end) : NULL;
 	if (end == text || (*end && (!unit || end[1])))
 		return false;
-	*value = unit ? x * factors[unit - units] : x;
-	return isfinite(*value);
+	*number = x;
+	*factor = unit ? factors[unit - units] : 1;
+	return isfinite(x * *factor);
+}
+
+static bool with_unit(const char *text, const char *units, const double *factors, double *value)
+{
+	double number, factor;
+	if (!read_unit(text, units, factors, &number, &factor))
+		return false;
+	*value = number * factor;
+	return true;
 }
 
 bool text_count(const char *text, uint64_t *count)
@@ -157,8 +167,12 @@ bool text_count(const char *text, uint64_t *count)
 		*count = n;
 		return *text && !errno;
 	}
-	double x;
-	if (!with_unit(text, "kKMG", thousands, &x) || x != floor(x) || x >= 0x1p63)
+	double number, factor;
+	if (!read_unit(text, "kKMG", thousands, &number, &factor))
+		return false;
+	/* 1.001 times 1000 is not 1001 in floating point, but 1001 is the whole number that is written as 1.001k. */
+	double x = rint(number * factor);
+	if ((x != number * factor && x / factor != number) || x >= 0x1p63)
 		return false;
 	*count = (uint64_t)x;
 	return true;

@@ -170,6 +170,7 @@ static void test_bounds(void **state)
 	refused("list -o x --share 2", "--share: 200 % is above 100 %; did you mean 2%?");
 	refused("list -o x --share 200%", "--share: 200 % is above 100 %; did you mean 2%?");
 	refused("list -o x --share 1.5", "--share: 150 % is above 100 %; did you mean 1.5%?");
+	refused("list -o x --share 100.0001%", "--share: 100.0001 % is above 100 %; did you mean 1.000001%?");
 	refused("list -o x --share 15000%", "--share takes a number from 0 to 1, or percent, not '15000%'");
 	refused("list -o x --share -1%", "--share takes a number from 0 to 1, or percent, not '-1%'");
 	refused("list -o x --share two", "--share takes something like 0.02 or 2%, not 'two'");

@@ -176,12 +176,14 @@ static void test_counts_with_units(void **state)
 		    {"0.25M", 250000},
 		    {"3G", 3000000000u},
 		    {".5k", 500},
+		    {"1.001k", 1001}, /* 1.001 * 1e3 < 1001 */
+		    {"2.01G", 2010000000},
 		    {"18446744073709551615", UINT64_MAX},
 		    {"9007199254740993", 9007199254740993u}};
-	static const char *const bad[] = {"",	   "k",	  "1.5", "1.2345k", "-1",
-					  "+1",	   " 1",  "1 ",	 "1kk",	    "1m",
-					  "1e400", "nan", "inf", "0x10k",   "18446744073709551616",
-					  "1e30G"};
+	static const char *const bad[] = {
+		"",	"k",   "1.5", "1.2345k", "1.0001k", "-1",  "+1",    " 1",
+		"1 ",	"1kk", "1m",  "1e400",	 "nan",	    "inf", "0x10k", "18446744073709551616",
+		"1e30G"};
 	uint64_t n;
 	for (size_t i = 0; i < sizeof good / sizeof *good; i++)
 		if (!text_count(good[i].text, &n) || n != good[i].count)
