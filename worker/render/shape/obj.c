@@ -62,7 +62,8 @@ static bool make_mesh(const struct obj_file *o, struct faces *f, struct arena *a
 	uint32_t *vertex_of = mem_alloc(n, sizeof *vertex_of);
 	if (!vertex_of)
 		return false;
-	qsort(c, n, sizeof *c, compare_corners);
+	if (n > 0) /* a file of vertices alone has no array to sort */
+		qsort(c, n, sizeof *c, compare_corners);
 	uint32_t vertices = 0;
 	bool normals = false, uv = false;
 	for (size_t i = 0; i < n; i++) {
