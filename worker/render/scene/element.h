@@ -31,8 +31,9 @@ struct xml_element {
 	uint32_t attribute_count;
 	struct xml_attribute *attributes;
 	struct xml_element *parent, *first, *last, *next;
-	const struct scene_node *node; /* for the interpreter: what it became */
-	struct xml_nesting nesting;    /* for the interpreter: of that node */
+	const struct scene_node *node;	  /* for the interpreter: what it became */
+	const struct scene_node *limited; /* for the interpreter: a texture with colours of 1 at most (over_one.h) */
+	struct xml_nesting nesting;	  /* for the interpreter: of that node */
 	bool busy, told; /* for the interpreter: being made into a node; cannot be, and that has been said */
 	bool counted;	 /* for the interpreter: among the objects of the scene */
 };

@@ -284,7 +284,7 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 		r = nesting_take(&d->nesting, d->node->cls, el, target, once, m->error);
 	if (r)
 		return r;
-	if (p && (r = over_one_texture(&m->notes, d->node->cls, p, m->lenient, m->arena, el, &child)))
+	if (p && (r = over_one_texture(&m->notes, d->node->cls, p, m->lenient, m->arena, target, &child)))
 		return r;
 	if (p)
 		return add_property(m, d, el, p, (struct value){.type = VALUE_NODE, .as.node = child});

@@ -80,8 +80,8 @@ static bool is_pattern(const char *type)
 /* A colour of a texture, which is refused once, however many materials have it. */
 static int refuse_colour(const struct notes *t, const struct scene_node *texture, const struct property *p, double most)
 {
-	error_set(t->error, ERANGE, "%s:%d: <texture type=\"%.64s\">: %s=%g is above 1, which no reflectance is%s", texture->file,
-		  p->line, texture->type, p->name, most, OVER_ONE_HINT);
+	error_set(t->error, ERANGE, "%s:%d: <texture type=\"%.64s\">: %s=%g is above 1, which no reflectance is%s",
+		  texture->file, p->line, texture->type, p->name, most, OVER_ONE_HINT);
 	for (uint32_t i = 0; i < t->report->problem_count; i++)
 		if (strcmp(t->report->problems[i], t->error->text) == 0)
 			return REPORT_TOLD;
@@ -130,7 +130,15 @@ static int limit_pattern(const struct notes *t, bool lenient, struct arena *aren
 }
 
 int over_one_texture(const struct notes *t, enum plugin_class cls, const struct param *p, bool lenient,
-		     struct arena *arena, const struct xml_element *el, const struct scene_node **texture)
+		     struct arena *arena, struct xml_element *el, const struct scene_node **texture)
 {
-	return is_share(cls, p) && is_pattern((*texture)->type) ? limit_pattern(t, lenient, arena, el, texture) : 0;
+	if (!is_share(cls, p) || !is_pattern((*texture)->type))
+		return 0;
+	if (!el->limited) {
+		int r = limit_pattern(t, lenient, arena, el, texture);
+		el->limited = r ? NULL : *texture;
+		return r;
+	}
+	*texture = el->limited;
+	return 0;
 }

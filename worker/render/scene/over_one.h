@@ -19,10 +19,10 @@ bool over_one(enum plugin_class cls, const struct param *p, const struct value *
 int over_one_value(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 		   enum plugin_class cls, const struct param *p, struct arena *arena, struct value *v);
 
-/* The same for the colours of a texture that p has: *texture becomes a copy, since another plug-in may take its numbers
- * for heights. Images have values up to 1 anyway. Without `lenient` such a colour is refused. 0, -ENOMEM, -ERANGE or
- * REPORT_TOLD. */
+/* The same for the colours of a texture that p has, made from `el`: *texture becomes a copy, since another plug-in may
+ * take its numbers for heights; there is one for all that refer to it. Images have values up to 1 anyway. Without
+ * `lenient` such a colour is refused. 0, -ENOMEM, -ERANGE or REPORT_TOLD. */
 int over_one_texture(const struct notes *t, enum plugin_class cls, const struct param *p, bool lenient,
-		     struct arena *arena, const struct xml_element *el, const struct scene_node **texture);
+		     struct arena *arena, struct xml_element *el, const struct scene_node **texture);
 
 #endif

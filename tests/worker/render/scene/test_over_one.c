@@ -145,6 +145,20 @@ static void test_a_texture_is_refused_once(void **state)
 	scene_fini(&s);
 }
 
+/* A scene may have many materials with a texture of many numbers. */
+static void test_materials_share_the_copy(void **state)
+{
+	(void)state;
+	struct scene s =
+		read_leniently("3.0.0", "<texture type='checkerboard' id='t'><float name='color0' value='2'/></texture>"
+					"<bsdf type='diffuse' id='b'><ref name='reflectance' id='t'/></bsdf>"
+					"<bsdf type='plastic' id='p'><ref name='diffuse_reflectance' id='t'/></bsdf>");
+	const struct scene_node *one = node_ref(scene_named(&s, "b"), "reflectance");
+	assert_true(node_float(one, "color0", 0) == 1);
+	assert_ptr_equal(one, node_ref(scene_named(&s, "p"), "diffuse_reflectance"));
+	scene_fini(&s);
+}
+
 /* Mitsuba 0.6 scales reflectances; only what it does not scale is left to leniency. */
 static void test_scaled_in_old_files(void **state)
 {
@@ -165,6 +179,7 @@ int main(void)
 		cmocka_unit_test(test_still_refused),
 		cmocka_unit_test(test_textures),
 		cmocka_unit_test(test_a_texture_is_refused_once),
+		cmocka_unit_test(test_materials_share_the_copy),
 		cmocka_unit_test(test_scaled_in_old_files),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
