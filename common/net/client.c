@@ -548,6 +548,10 @@ int client_fetch_preview(struct client *cl, uint64_t job, const char *path, bool
 	*kept = !t.through && *final && (strcmp(last_part(path), final) == 0 || strcmp(last_part(t.path), final) == 0);
 	if (*kept)
 		rc = client_preview_name(path, other, sizeof other, e);
+	if (!rc && *kept)
+		rc = target_find(&t, other, e);
+	if (!rc && *kept && strcmp(last_part(t.path), final) == 0)
+		rc = error_set(e, EEXIST, "%s: leads to %s, which is for the final image", other, t.path);
 	if (!rc)
 		rc = fetch_file(cl, &first, job, FARM__WHAT__WHAT_PREVIEW, *kept ? other : path, true, e);
 	client_message_fini(&first);

@@ -364,6 +364,23 @@ static void a_preview_never_takes_the_final_name(void **state)
 	}
 }
 
+/* The preview's own name may lead there, too. */
+static void a_preview_does_not_follow_a_link_to_the_final_name(void **state)
+{
+	(void)state;
+	struct coordinator c = {.name = "linked.exr"};
+	struct error e;
+	bool kept;
+	write_text("linked.exr");
+	assert_int_equal(symlink("linked.exr", "linked.preview.exr"), 0);
+	struct client *cl = connect_client(&c);
+	int rc = client_fetch_preview(cl, 1, "linked.exr", &kept, &e);
+	disconnect_client(&c, cl);
+	assert_int_equal(rc, -EEXIST);
+	assert_string_equal(e.text, "linked.preview.exr: leads to linked.exr, which is for the final image");
+	assert_false(file_holds("linked.exr", image, sizeof image));
+}
+
 static void a_file_of_another_size_is_another_file(void **state)
 {
 	(void)state;
@@ -574,6 +591,7 @@ int main(void)
 		cmocka_unit_test(previews_leave_the_name),
 		cmocka_unit_test(who_names_a_file_gets_it),
 		cmocka_unit_test(a_preview_never_takes_the_final_name),
+		cmocka_unit_test(a_preview_does_not_follow_a_link_to_the_final_name),
 		cmocka_unit_test(a_file_of_another_size_is_another_file),
 		cmocka_unit_test(a_signal_leaves_nothing_half_done),
 		cmocka_unit_test(a_dropped_fetch_begins_again),
