@@ -161,16 +161,20 @@ static int send_control(struct client *cl, const struct job_options *o, struct e
 			 o, e);
 }
 
-/* -o may name the final image, which a preview never takes: either file is checked before anything is fetched. */
+/* -o may name the final image, which a preview never takes: either file is checked before anything is fetched. A pipe
+ * or a device is no image. */
 static int fetch_preview(struct client *cl, const struct job_options *o, struct error *e)
 {
 	char other[TARGET_PATH];
+	struct target t;
 	bool kept = false;
 	int rc = client_local(client_preview_name(o->output, other, sizeof other, e));
 	const struct output_files outputs = {{{"-o", o->output, OUTPUT_EXR}}}, others = {{{"-o", other, OUTPUT_EXR}}};
 	if (!rc)
 		rc = client_local(output_files_check(&outputs, NULL, 0, e));
-	if (!rc && strcmp(o->output, TARGET_STDOUT) != 0)
+	if (!rc)
+		rc = client_local(target_find(&t, o->output, e));
+	if (!rc && !t.through)
 		rc = client_local(output_files_check(&others, NULL, 0, e));
 	if (!rc)
 		rc = client_fetch_preview(cl, o->job, o->output, &kept, e);

@@ -23,6 +23,8 @@ high=$(submit "$BOX" -o "$DIR/high.exr" $HIGH)
 	fail "a preview takes the name of the image"
 grep -qx "$low: preview, the image so far, in $DIR/low.preview.exr; $DIR/low.exr is for the final image" "$DIR/fetch.log" ||
 	fail "a preview under the name of the image: $(cat "$DIR/fetch.log")"
+"$BIN/hslt-job" fetch "$low" --preview -o /dev/fd/3 3>"$DIR/through.exr" && [ -s "$DIR/through.exr" ] ||
+	fail "a preview through a descriptor is checked like a file"
 "$BIN/hslt-job" fetch "$low" --preview -o - 2>"$DIR/fetch.log" | head -c 4 | od -An -tx1 | grep -q '76 2f 31 01' || fail "no preview on stdout"
 grep -qx "$low: preview, the image so far, in stdout" "$DIR/fetch.log" || fail "a preview on stdout: $(cat "$DIR/fetch.log")"
 ! "$BIN/hslt-job" fetch "$low" --preview -o - >/dev/full 2>"$DIR/fetch.log" || fail "a full disk holds a preview"
