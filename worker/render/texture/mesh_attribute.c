@@ -67,8 +67,9 @@ static int make_attribute(struct texture *t, const struct scene_node *n, const c
 				     .scale = node_float(n, "scale", 1),
 				     .role = role};
 	find_bounds(m, v);
-	if (role == COLOR_UNBOUNDED && !(m->max <= COLOR_UNBOUNDED_OVER * PARAM_METAL_MAX))
-		return node_error(n, e, ERANGE, "numbers of the attribute up to %g: must be within [0, %g]", m->max,
+	double most = v->grey ? m->max : m->max / COLOR_UNBOUNDED_OVER;
+	if (role == COLOR_UNBOUNDED && !(most <= PARAM_METAL_MAX))
+		return node_error(n, e, ERANGE, "numbers of the attribute up to %g: must be within [0, %g]", most,
 				  PARAM_METAL_MAX);
 	return 0;
 }

@@ -398,12 +398,18 @@ static void test_shared(void **state)
 	arena_fini(&arena);
 }
 
+static const char large_ply[] =
+	"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty float q\n"
+	"property float r\nproperty float g\nproperty float b\nelement face 1\nproperty list uchar int vertex_indices\n"
+	"end_header\n0 0 0 1.5e9 1.5e9 1 2\n1 0 0 3 3 4 5\n0 1 0 3 3 4 5\n3 0 1 2\n";
+
 static void refuses(const char *body, const char *sentence)
 {
 	static char xml[TEXT_MAX];
 	int n = snprintf(xml, sizeof xml, "<scene version='3.0.0'>" VIEW SKY "%s</scene>", body);
 	const struct memory_file files[] = {{"s.xml", xml, (size_t)n},
 					    {"grid.ply", grid, write_grid(grid, -1, false)},
+					    {"large.ply", large_ply, strlen(large_ply)},
 					    {"p0", pictures.file[0].bytes, pictures.file[0].size},
 					    {NULL, NULL, 0}};
 	struct asset_source assets = memory_assets(files);
@@ -448,6 +454,10 @@ static void test_refused(void **state)
 		"an attribute of a mesh cannot be a bump or normal map");
 	refuses(PLY("grid.ply", FIELD("displacement", "face_heat") "<integer name='displacement_level' value='1'/>"),
 		"an attribute of a mesh cannot displace a surface");
+	refuses(PLY("large.ply", "<bsdf type='conductor'>" FIELD("eta", "vertex_q") "</bsdf>"),
+		"numbers of the attribute up to 1.5e+09: must be within [0, 1e+09]");
+	refuses(PLY("large.ply", "<bsdf type='conductor'>" FIELD("eta", "vertex_color") "</bsdf>"),
+		"numbers of the attribute up to 1.5e+09: must be within [0, 1e+09]");
 	refuses("<emitter type='projector'>" FIELD("irradiance", "face_heat") "</emitter>",
 		"attributes are only available on a mesh");
 }
