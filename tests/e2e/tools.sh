@@ -76,6 +76,7 @@ grep -q 'are the same file, stdout' err.log || fail "-o - --stats -: $(cat err.l
 code 0 "$BIN/hslt-accuracy" box.xml -o - --parameters tolerance --rounds 2 --size 8x8 --epoch 1 --quiet && grep -qi '^<!doctype html' out && [ ! -e - ] ||
 	fail "hslt-accuracy -o -: $(head -n 3 out)"
 code 2 "$BIN/hslt-compare" a.exr again.exr --heatmap -
+code 2 "$BIN/hslt-compare" a.exr again.exr --heatmap /dev/stdout
 rm dash.exr
 # What is no regular file is written to and stays; of a link the file that it leads to is replaced.
 code 0 "$BIN/hslt-tonemap" a.exr b.png --exposure -1

@@ -8,6 +8,7 @@
  */
 #include "common/base/mem.h"
 #include "common/base/program.h"
+#include "common/base/target.h"
 #include "common/base/text.h"
 #include "common/estimate/stated_error.h"
 #include "common/exr/output_files.h"
@@ -67,7 +68,7 @@ static int check(void *target, struct error *e)
 	const struct arguments *a = target;
 	if (!a->path[1])
 		return error_set(e, EINVAL, "A.exr and B.exr are needed");
-	if (a->heatmap && strcmp(a->heatmap, "-") == 0)
+	if (a->heatmap && strcmp(target_of(a->heatmap), TARGET_STDOUT) == 0)
 		return error_set(e, EINVAL, "--heatmap takes the name of a file: the figures go to stdout");
 	if (a->exact && (a->trim > 0 || a->width || a->heatmap || a->most >= 0))
 		return error_set(e, EINVAL, "--exact can only be combined with --json");
