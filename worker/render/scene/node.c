@@ -2,6 +2,7 @@
 #include "worker/render/scene/node.h"
 
 #include "common/base/arena.h"
+#include "common/base/text.h"
 #include "worker/render/scene/plugin.h"
 
 #include <stdarg.h>
@@ -163,20 +164,23 @@ const char *node_place(const struct scene_node *n, char text[NODE_PLACE_MAX])
 {
 	enum { MOST = NODE_PLACE_MAX - 16 }; /* beside "...", ":", a line and the end of the string */
 	size_t length = strlen(n->file);
-	snprintf(text, NODE_PLACE_MAX, "%s%s:%d", length > MOST ? "..." : "",
-		 n->file + (length > MOST ? length - MOST : 0), n->line);
+	const char *end = n->file + (length > MOST ? length - MOST : 0);
+	while (end > n->file && ((unsigned char)*end & 0xC0) == 0x80) /* within a character of UTF-8 */
+		end++;
+	snprintf(text, NODE_PLACE_MAX, "%s%s:%d", length > MOST ? "..." : "", end, n->line);
 	return text;
 }
 
 const char *node_title(const struct scene_node *n, char text[NODE_TITLE_MAX])
 {
 	const char *material = node_string(n, "material", NULL);
-	char place[NODE_PLACE_MAX];
+	char place[NODE_PLACE_MAX], name[41];
 	node_place(n, place);
+	text_copy(name, sizeof name, n->id ? n->id : material ? material : "");
 	if (n->id)
-		snprintf(text, NODE_TITLE_MAX, "`%.40s` (%s)", n->id, place);
+		snprintf(text, NODE_TITLE_MAX, "`%s` (%s)", name, place);
 	else if (material && n->cls == PLUGIN_SHAPE)
-		snprintf(text, NODE_TITLE_MAX, "the %.24s in %s (`%.32s`)", n->type, place, material);
+		snprintf(text, NODE_TITLE_MAX, "the %.24s in %s (`%s`)", n->type, place, name);
 	else
 		snprintf(text, NODE_TITLE_MAX, "the %.24s in %s", n->type, place);
 	return text;

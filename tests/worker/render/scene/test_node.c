@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Nodes compared with each other, and by what name a user is told of one. */
+#include "common/base/text.h"
 #include "tests/support/memory_assets.h"
 #include "worker/render/render.h"
 
@@ -76,6 +77,19 @@ static void test_places(void **state)
 	n.file = "0123456789/0123456789/0123456789/0123456789/lamps.xml";
 	assert_string_equal(node_title(&n, text),
 			    "`lamp` (...56789/0123456789/0123456789/0123456789/lamps.xml:2147483647)");
+	/* whole characters, wherever names are cut: JSON and the wire take nothing else */
+	static const char e[] =
+		"\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9"
+		"\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9";
+	char id[80], file[80];
+	n.id = id;
+	n.file = file;
+	for (int shift = 0; shift < 2; shift++) {
+		snprintf(id, sizeof id, "%s%s", shift ? "x" : "", e);
+		snprintf(file, sizeof file, "%s%s", e, shift ? "x" : "");
+		if (!text_is_clean(node_title(&n, text)))
+			fail_msg("%s is cut within a character", text);
+	}
 }
 
 int main(void)
