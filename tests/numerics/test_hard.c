@@ -31,6 +31,7 @@ static void run_case(const struct hard_case *h)
 	static struct chains_result c;
 	char test[128], measured[800];
 	struct world *w = h->make(h->parameter);
+	stationary_keep_long_starts(w);
 	snprintf(test, sizeof test, "%s %s", h->topic, h->name);
 	unsigned more = test_full() ? 10 : 1;
 	struct stationary_how alone = {h->mutation, h->min_edges, h->max_edges,

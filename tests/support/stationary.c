@@ -15,7 +15,6 @@
 #include "worker/render/chain/path_place.h"
 #include "tests/support/path_check.h"
 #include "worker/render/halfvec/refract.h"
-#include "worker/render/path/integrate_bdpt.h"
 #include "worker/render/render.h"
 #include "worker/render/math/fptrap.h"
 #include "worker/render/mutation/mixture.h"
@@ -133,7 +132,7 @@ static double evaluate(struct group *g, uint64_t index)
 	static _Thread_local struct path_sample sample;
 	struct sampler_random s;
 	sampler_random_init(&s, g->start_seed, RNG_BOOTSTRAP, index, 0);
-	path_trace_both_ways(&g->context, &s.base, &sample);
+	path_bootstrap(&g->context, &s.base, &sample);
 	return sample.intensity;
 }
 
@@ -363,6 +362,11 @@ static void add_group(const struct group *from, struct stationary_result *out)
 		out->strategy[i] += from->strategy[i];
 	if (from->failure[0])
 		memcpy(out->failure, from->failure, sizeof out->failure);
+}
+
+void stationary_keep_long_starts(struct world *w)
+{
+	w->settings.roulette_depth = PATH_MAX_EDGES;
 }
 
 void stationary_run_from(const struct world *w, const char *test, const struct stationary_how *how,

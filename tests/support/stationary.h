@@ -53,6 +53,9 @@ struct stationary_result {
 	double seconds;	     /* CPU */
 };
 
+/* Before runs on paths of given lengths: the bootstrap's roulette would leave few of the long ones. */
+void stationary_keep_long_starts(struct world *w);
+
 /* What mutations on paths of the same world and the same lengths may start from together: finding the starts takes a
  * third of the time of a mutation. Begins as zeros; the first run finds them, with its own seed. */
 struct stationary_starts {

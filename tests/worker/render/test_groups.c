@@ -13,6 +13,7 @@
 #include "worker/render/render.h"
 #include "worker/render/math/rng.h"
 #include "worker/render/mutation/mixture.h"
+#include "worker/render/path/sampler.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -286,6 +287,90 @@ static void chains_start_from_the_samples_that_were_chosen(void **state)
 	world_free(w);
 }
 
+/* A room that no light leaves, in which sub-paths end by roulette alone, or after 40 edges. */
+static struct world *closed_room(void)
+{
+	/* clang-format off */
+	return world_of_text(24, 24,
+		SENSOR("0,0,2.5", "0,0,0")
+		"<shape type='cube'>"
+			"<transform name='to_world'><scale value='3'/></transform>"
+			"<boolean name='flip_normals' value='true'/>"
+			"<bsdf type='diffuse'><rgb name='reflectance' value='0.7'/></bsdf>"
+		"</shape>"
+		"<shape type='sphere'>"
+			"<point name='center' x='1' y='2' z='1'/>"
+			"<float name='radius' value='.3'/>"
+			"<emitter type='area'/>"
+		"</shape>");
+	/* clang-format on */
+}
+
+/* Blocks of a bootstrap sample's numbers that were asked for, as bits. */
+enum { BLOCKS_MOST = 4096 };
+static size_t blocks_of(uint64_t index, bool asked[BLOCKS_MOST])
+{
+	size_t count = 0;
+	memset(asked, 0, BLOCKS_MOST * sizeof *asked);
+	for (size_t k = 0; k < noted.count; k++) {
+		const struct number *n = &noted.all[k];
+		if (n->stream != RNG_BOOTSTRAP || n->index != index || n->step != 0)
+			continue;
+		assert_true(n->block < BLOCKS_MOST);
+		count += !asked[n->block];
+		asked[n->block] = true;
+	}
+	return count;
+}
+
+/* A chain of paths starts from the very sample that had the weight, with sub-paths of the same length: it asks for the
+ * same numbers, and for those that choose one of the sample's paths. */
+static void a_start_is_the_sample_again(void **state)
+{
+	(void)state;
+	enum { SAMPLES = 64 };
+	static bool before[SAMPLES][BLOCKS_MOST], after[BLOCKS_MOST];
+	const struct render_integrator *hslt = NULL;
+	for (size_t i = 0; render_integrator_at(i); i++)
+		if (render_integrator_at(i)->has_mutations)
+			hslt = render_integrator_at(i);
+	assert_non_null(hslt);
+	struct world *w = closed_room();
+	struct plan p = plan_of(w, hslt);
+	p.max_depth = 40;
+	uint64_t first = plan_bootstrap_range(&p, 1, 0).begin;
+	size_t longest = 0, lit = 0;
+	record_numbers(true);
+	struct batch boot = lease_done(w, &p, (struct lease_key){1, LEASE_BOOTSTRAP, 1, 0, 0}, NULL);
+	for (uint64_t n = 0; n < SAMPLES; n++) {
+		size_t asked = blocks_of(first + n, before[n]);
+		longest = asked > longest ? asked : longest;
+	}
+	record_numbers(false);
+	for (uint64_t n = 0; n < SAMPLES; n++) {
+		if (!(boot.weights[n] > 0))
+			continue;
+		const uint64_t seeds[CHAINS / GROUPS / PARTS] = {first + n, first + n};
+		size_t extra = 0;
+		record_numbers(true);
+		struct batch b =
+			lease_done(w, &p, (struct lease_key){1, LEASE_RENDER, 1, 0, 0},
+				   &(struct lease_input){.chain_count = CHAINS / GROUPS / PARTS, .seeds = seeds});
+		batch_fini(&b);
+		blocks_of(first + n, after);
+		record_numbers(false);
+		for (size_t k = 0; k < BLOCKS_MOST; k++) {
+			assert_true(!before[n][k] || after[k]);
+			extra += after[k] && !before[n][k];
+		}
+		assert_int_equal(extra, SAMPLER_BLOCK / 4);
+		lit++;
+	}
+	batch_fini(&boot);
+	assert_true(longest > 20 && lit > SAMPLES / 2);
+	world_free(w);
+}
+
 /* Resampling's own random number differs, too, or all groups would take seeds at the same quantiles. */
 static void groups_resample_by_themselves(void **state)
 {
@@ -400,6 +485,7 @@ int main(void)
 		cmocka_unit_test(groups_share_no_random_number),
 		cmocka_unit_test(chains_start_from_their_groups_bootstrap),
 		cmocka_unit_test(chains_start_from_the_samples_that_were_chosen),
+		cmocka_unit_test(a_start_is_the_sample_again),
 		cmocka_unit_test(groups_resample_by_themselves),
 		cmocka_unit_test(zeros_are_counted),
 		cmocka_unit_test(each_group_has_its_own_b),

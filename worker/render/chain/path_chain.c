@@ -17,7 +17,6 @@
 #include "worker/render/chain/path_place.h"
 #include "worker/render/mutation/mixture.h"
 #include "worker/render/path/classes.h"
-#include "worker/render/path/integrate_bdpt.h"
 #include "worker/render/path/integrator.h"
 
 #include <string.h>
@@ -195,6 +194,6 @@ static const struct chain_ops chain_path = {
 const struct integrator integrator_hslt = {
 	.face = {"hslt", PLAN_CHAINS, FULL_PATH_MAX_EDGES, .has_mutations = true, .to_emitters = true},
 	.stream = RNG_BOOTSTRAP,
-	.evaluate = path_trace_candidates,
+	.evaluate = path_bootstrap,
 	.chain = &chain_path,
 };

@@ -2,6 +2,7 @@
 #include "worker/render/chain/path_place.h"
 
 #include "worker/render/path/ensemble.h"
+#include "worker/render/path/integrate_bdpt.h"
 
 #include <float.h>
 
@@ -33,6 +34,16 @@ bool path_place_is_sound(const struct path_context *c, double log_weight, bool b
 	return false;
 }
 
+void path_bootstrap(struct path_context *c, struct sampler *s, struct path_sample *out)
+{
+	const double roulette = c->roulette;
+	c->roulette = PATH_ROULETTE;
+	c->makes_all = true;
+	path_trace_candidates(c, s, out);
+	c->makes_all = false;
+	c->roulette = roulette;
+}
+
 bool path_start(struct path_context *c, uint64_t seed, uint64_t bootstrap_index, struct full_path *x)
 {
 	struct sampler_random s;
@@ -41,7 +52,10 @@ bool path_start(struct path_context *c, uint64_t seed, uint64_t bootstrap_index,
 	const struct ensemble_lengths all = ensemble_all_lengths(c);
 	sampler_random_init(&s, seed, RNG_BOOTSTRAP, bootstrap_index, 0);
 	sampler_fill(seed, RNG_BOOTSTRAP, bootstrap_index, 0, SIDE_CAMERA, PATH_MAX_EDGES + 2, choice);
+	const double roulette = c->roulette;
+	c->roulette = PATH_ROULETTE;
 	ensemble_draw(c, &s.base, &all, &candidates);
+	c->roulette = roulette;
 	if (candidates.count == 0)
 		return false;
 	/* On the very border of what is sampled the path that was drawn may lie outside when it is computed again: once

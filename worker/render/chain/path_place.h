@@ -7,6 +7,7 @@
 #define WORKER_RENDER_CHAIN_PATH_PLACE_H
 
 #include "worker/render/mutation/mutation.h"
+#include "worker/render/path/path.h"
 
 /* A state with the weight that it has accumulated since it was splatted. */
 struct path_place {
@@ -20,6 +21,10 @@ void path_place_follow(struct full_path *proposal, const struct full_path *curre
 /* Whether a weight with this logarithm may go to the film: not NaN, not infinite, and if bounded within the range of a
  * float. Other weights are counted. */
 bool path_place_is_sound(const struct path_context *c, double log_weight, bool bounded);
+
+/* A bootstrap sample: what bdpt makes of it, with the roulette that chains do without. Without it, a sample of a scene
+ * whose paths may have 128 edges costs 128 x 128 connections. */
+void path_bootstrap(struct path_context *c, struct sampler *s, struct path_sample *out);
 
 /* One of the paths that bdpt makes of a bootstrap sample, chosen in proportion to what it contributes there: drawing
  * samples in proportion to their sums and then paths like this gives paths in proportion to f. false: the sample is

@@ -66,10 +66,10 @@ static void join_light_to_lens(struct path_context *c, struct sampler *s, unsign
 }
 
 /* Light found by the camera sub-path alone is what connections are measured against: it does not depend on which of
- * them are made. Where it finds none, all are. */
+ * them are made. Where it finds none, all are, and for the weights from which chains begin (makes_all). */
 static double faint_beside(const struct path_context *c, spectrum found)
 {
-	return c->roulette > 0 ? faint_share * spectrum_mean(found) : 0;
+	return c->roulette > 0 && !c->makes_all ? faint_share * spectrum_mean(found) : 0;
 }
 
 void path_trace_candidates(struct path_context *c, struct sampler *s, struct path_sample *out)

@@ -102,6 +102,7 @@ struct path_context {
 	bool dispersed;	      /* by a vertex of the camera's sub-path that is not in it any more */
 	uint32_t light_every; /* one in so many samples has a light sub-path, for which it counts so many times; 0 or 1:
 				 all have */
+	bool makes_all;	      /* connections: none is left to chance, however faint */
 	double faint;	      /* what a connection of two surfaces must bring to be made for certain; 0: anything */
 	double faint_place;   /* of the next such connection in systematic sampling: see connect.c */
 	uint64_t *counters;   /* of enum batch_counter */

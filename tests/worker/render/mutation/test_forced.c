@@ -148,6 +148,7 @@ static void test_scene(void **state)
 	struct world *w = test_world(s->scene);
 	struct tally t = {0};
 	assert_non_null(w);
+	stationary_keep_long_starts(w);
 	if (test_full()) {
 		for (unsigned k = 2; k <= 6; k += k < 4 ? 1 : 2)
 			check_all(w, s->scene, k, &t);
@@ -182,6 +183,7 @@ static void test_planted(void **state)
 	static struct stationary_result r;
 	struct world *w = test_world("rough glass");
 	struct stationary_starts from = {.index = NULL};
+	stationary_keep_long_starts(w);
 	for (size_t i = 0; i < sizeof planted / sizeof *planted; i++) {
 		struct stationary_how how = {planted[i].mutation, 4, 4, STARTS, BOOTSTRAP, planted[i].fault};
 		stationary_run_from(w, "planted", &how, &from, &r);
