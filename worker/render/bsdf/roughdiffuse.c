@@ -8,6 +8,8 @@
 #include "worker/render/bsdf/diffuse.h"
 #include "worker/render/bsdf/warp.h"
 
+#include <float.h>
+
 struct grooves {
 	double a, b, c, d; /* C1, C2, C3 and the factor of light that bounces twice */
 };
@@ -35,6 +37,12 @@ static double cube(double x)
 	return x * x * x;
 }
 
+/* x / y > 0, which exceeds all numbers where both directions graze the surface by less than 1e-308. */
+static double ratio(double x, double y)
+{
+	return fmin(x / y, DBL_MAX);
+}
+
 /* Factors of the reflectance and of its square, times pi. */
 static void factors(const struct grooves *r, vec3 wo, vec3 wi, double *once, double *twice)
 {
@@ -42,7 +50,7 @@ static void factors(const struct grooves *r, vec3 wo, vec3 wi, double *once, dou
 	double across =
 		s > 0 ? fmin(fmax((wo.x * wi.x + wo.y * wi.y) / s, -1), 1) : 0; /* cosine of the azimuths' difference */
 	bool lower = wo.z < wi.z;						/* wo has the larger angle */
-	double sine = lower ? so : si, tangent = lower ? si / wi.z : so / wo.z;
+	double sine = lower ? so : si, tangent = lower ? ratio(si, wi.z) : ratio(so, wo.z);
 	if (r->c == 0) {
 		*once = r->a + r->b * fmax(across, 0) * sine * tangent;
 		*twice = 0;
@@ -51,7 +59,7 @@ static void factors(const struct grooves *r, vec3 wo, vec3 wi, double *once, dou
 	double alpha = acos(fmin(lower ? wo.z : wi.z, 1)), beta = acos(fmin(lower ? wi.z : wo.z, 1));
 	double b = r->b * (across > 0 ? sine : sine - cube(2 * beta / WARP_PI));
 	double q = 4 * alpha * beta / (WARP_PI * WARP_PI),
-	       half = (so + si) / (wo.z + wi.z); /* tan((alpha + beta) / 2) */
+	       half = ratio(so + si, wo.z + wi.z); /* tan((alpha + beta) / 2) */
 	*once = r->a + across * b * tangent + (1 - fabs(across)) * r->c * q * q * half;
 	*twice = r->d * (1 - across * (2 * beta / WARP_PI) * (2 * beta / WARP_PI));
 }

@@ -56,7 +56,7 @@ static double lobe_of(const struct ward *w, const struct microfacet *m, vec3 wo,
 		x = 0.25 * f.d * z2 * z2 / wo.z / wi.z;
 	else
 		x = 0.25 * f.d * z2 * z2 / sqrt(wo.z) / sqrt(wi.z);
-	return isfinite(x) ? x : 0;
+	return x < 0x1p960 ? x : 0; /* so that a sample's weight, divided by its density, is finite, too */
 }
 
 static spectrum ward_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
