@@ -58,6 +58,9 @@ done
 # what is wrong has its line; what is not supported is left out where that is asked for
 prism='"KHR_materials_transmission": {"transmissionFactor": 0.5}, "KHR_materials_dispersion": {"dispersion": 1}'
 sed "s/\"alphaMode\": \"BLEND\"/\"alphaMode\": \"BLEND\", \"extensions\": {$prism}/" "$DIR/files.gltf" >"$DIR/prism.gltf"
+code 0 "$BIN/hslt-scene" check "$DIR/prism.gltf"
+grep -q 'KHR_materials_dispersion of other materials is left out' "$DIR/out" || fail "$(cat "$DIR/out")"
+sed -i 's/^{/{"extensionsRequired": ["KHR_materials_dispersion"],/' "$DIR/prism.gltf"
 code 1 "$BIN/hslt-scene" check "$DIR/prism.gltf"
 grep -q 'prism.gltf:[1-9][0-9]*: .*`dispersion` is not supported' "$DIR/out" || fail "$(cat "$DIR/out")"
 code 0 "$BIN/hslt-scene" check --lenient "$DIR/prism.gltf"

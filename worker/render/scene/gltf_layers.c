@@ -6,9 +6,9 @@
  * factor of ten.
  *
  * Details that `principled` does not have are left out with a note: normals of a coat, what a sheen or a reflection
- * varies by. So are extensions that are not known, as the format wants it of those that a file does not require. The
- * dispersion of anything but clear glass becomes a property that the table does not know: refused with its name, or
- * left out with --lenient.
+ * varies by. So are extensions that are not known, as the format wants it of those that a file does not require. So is
+ * the dispersion of anything but clear glass; where the file requires it, it becomes a property that the table does not
+ * know: refused with its name, or left out with --lenient.
  */
 #include "worker/render/scene/gltf_layers.h"
 #include "worker/render/scene/gltf_texture.h"
@@ -145,6 +145,16 @@ static void note_iridescence(struct gltf *g, const struct gltf_at *at)
 		gltf_note(g, "the colours of thin films (KHR_materials_iridescence) are left out");
 }
 
+/* Of what is not clear glass: `principled` has one index of refraction. */
+static void put_dispersion(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
+{
+	if (is_listed(g, "extensionsRequired", "KHR_materials_dispersion"))
+		gltf_put_text(g, el, at, "dispersion", ELEMENT_UNSUPPORTED);
+	else
+		gltf_note(g, "only clear glass without textures disperses light: KHR_materials_dispersion of other "
+			     "materials is left out");
+}
+
 static void put_transmission(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
 {
 	const json_t *t = gltf_extension(g, at, at->json, "KHR_materials_transmission"),
@@ -153,7 +163,7 @@ static void put_transmission(struct gltf *g, struct xml_element *el, const struc
 	if (factor > 0) {
 		gltf_put_share(g, el, at, "spec_trans", factor, gltf_object(g, at, t, "transmissionTexture"), "r");
 		if (dispersion && gltf_number(g, at, dispersion, "dispersion", 0) > 0)
-			gltf_put_text(g, el, at, "dispersion", ELEMENT_UNSUPPORTED);
+			put_dispersion(g, el, at);
 	}
 }
 
