@@ -95,10 +95,10 @@ static void test_parameter_bomb(void **state)
 static void test_deep_nesting(void **state)
 {
 	(void)state;
-	static char xml[1 << 20];
+	static char xml[8 << 20];
 	char *p = xml;
 	p += sprintf(p, S "\n");
-	for (int i = 0; i < 5000; i++)
+	for (int i = 0; i < 100000; i++)
 		p += sprintf(p, "<bsdf type='twosided'>");
 	refuses(xml, "s.xml:2: <bsdf>: elements are nested more than 64 deep");
 	p = xml;
@@ -109,9 +109,9 @@ static void test_deep_nesting(void **state)
 	assert_int_equal(read_text(xml, NULL), 0); /* each is made when those it refers to are there */
 	p = xml;
 	p += sprintf(p, S);
-	for (int i = 0; i < 5000; i++)
+	for (int i = 0; i < 100000; i++)
 		p += sprintf(p, "<bsdf type='twosided' id='m%d'><ref id='m%d'/></bsdf>", i, i + 1);
-	sprintf(p, "<bsdf type='diffuse' id='m5000'/>" END);
+	sprintf(p, "<bsdf type='diffuse' id='m100000'/>" END);
 	refuses(xml, "objects refer to each other more than 64 deep");
 }
 
