@@ -4,6 +4,8 @@
 #include "common/base/spelling.h"
 #include "common/base/text.h"
 #include "worker/render/scene/plugin.h"
+#include "worker/render/scene/snake_case.h"
+#include "worker/render/scene/value.h"
 
 #include <ctype.h>
 #include <stdarg.h>
@@ -140,13 +142,33 @@ static bool says_what_is_done(const struct xml_element *el, const char *type)
 	return true;
 }
 
+/* The values of an object of which its table understands only some. */
+static void list_ignored(const struct xml_element *el, const struct plugin_decl *decl, char *list, size_t size)
+{
+	*list = '\0';
+	for (const struct xml_element *c = el->first; c; c = c->next) {
+		const char *name = value_is_element(c->name) ? xml_attribute(c, "name") : NULL;
+		char snake[2 * REPORT_TEXT_MAX + 1], shown[72];
+		if (!name || strlen(name) >= REPORT_TEXT_MAX)
+			continue;
+		if (c->snake)
+			snake_case(name, snake);
+		const struct param *p = plugin_param(decl, c->snake ? plugin_new_name(decl, snake) : name);
+		if (p && p->status == PARAM_UNDERSTOOD)
+			continue;
+		snprintf(shown, sizeof shown, "`%.64s`", name);
+		spelling_list(list, size, shown);
+	}
+}
+
 int note_ignored_plugin(const struct notes *t, const struct xml_element *el, const struct plugin_decl *decl)
 {
-	char list[256];
+	char list[256], ignored[256];
 	const char *type = xml_attribute(el, "type");
 	if (says_what_is_done(el, type))
 		return 0;
 	plugin_list_params(decl, list, sizeof list);
-	return note(t, el, type, "", "%s:%d: <%.64s type=\"%.64s\"> is ignored except for: %s", el->file, el->line,
-		    el->name, type, list);
+	list_ignored(el, decl, ignored, sizeof ignored);
+	return note(t, el, type, "", "%s:%d: <%.64s type=\"%.64s\"> is ignored except for: %s%s%s", el->file, el->line,
+		    el->name, type, list, *ignored ? "; ignored here: " : "", ignored);
 }

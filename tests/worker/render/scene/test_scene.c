@@ -441,7 +441,8 @@ static void test_ignored_is_noted_once(void **state)
 	assert_string_equal(s.notes[0], "s.xml:2: <mode> is ignored with its contents");
 	assert_string_equal(
 		s.notes[1],
-		"s.xml:3: <integrator type=\"unheard\"> is ignored except for: max_depth, rr_depth, hide_emitters");
+		"s.xml:3: <integrator type=\"unheard\"> is ignored except for: max_depth, rr_depth, hide_emitters; "
+		"ignored here: `q`");
 	assert_non_null(strstr(s.notes[2], "s.xml:4: <bsdf type=\"roughdielectric\">: `sampleVisible`"));
 	assert_non_null(strstr(s.notes[3], "s.xml:6: <dpt>"));
 	assert_non_null(strstr(s.notes[4], "s.xml:3: <integrator type=\"unheard\">: is not known"));
