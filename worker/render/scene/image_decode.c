@@ -10,11 +10,6 @@ int image_allocate(const struct image_input *in, struct image *out, uint64_t wid
 	    width * height > IMAGE_PIXELS_MAX)
 		return error_set(in->error, EFBIG, "%llu x %llu pixels; at most %d in all, and at least one",
 				 (unsigned long long)width, (unsigned long long)height, IMAGE_PIXELS_MAX);
-	uint64_t need = width * height * channels * sizeof *out->pixels;
-	if (need > IMAGE_BYTES_MAX)
-		return error_set(in->error, EFBIG, "%llu x %llu pixels take %llu MB decoded; at most %d MB",
-				 (unsigned long long)width, (unsigned long long)height, (unsigned long long)need >> 20,
-				 IMAGE_BYTES_MAX >> 20);
 	if (in->size < bytes_least)
 		return error_set(in->error, EBADMSG, "too short for %llu x %llu pixels", (unsigned long long)width,
 				 (unsigned long long)height);

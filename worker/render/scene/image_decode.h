@@ -11,9 +11,9 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* Limits checked before decoding, because a small file may promise a large image. A mask may have 11,585 x 11,585
- * pixels, a colour image 9,459 x 9,459. */
-enum { IMAGE_PIXELS_MAX = 1 << 27, IMAGE_BYTES_MAX = 1 << 30 };
+/* Limits checked before decoding, because a small file may promise a large image: 16,384 x 8,192 pixels, as the largest
+ * panoramas have, of three channels. */
+enum { IMAGE_PIXELS_MAX = 1 << 27, IMAGE_BYTES_MAX = 3 << 29 };
 
 struct image_input {
 	const char *name;
