@@ -34,6 +34,33 @@ grep -q "^$DIR/bad.xml: 6 problems" "$DIR/out" || fail "it does not sum up: $(ta
 code 1 "$BIN/hslt-render" "$DIR/bad.xml" -o "$DIR/bad.exr"
 grep -q "bad.xml:3.*and 5 more: hslt-scene check lists them" "$DIR/err.log" || fail "a render says: $(cat "$DIR/err.log")"
 
+# What only building finds is listed in the same run, in the order of lines, but nothing that only follows from what the reader has found.
+cat >"$DIR/deep.xml" <<'XML'
+<scene version="3.0.0"><sensor type="perspective"/><emitter type="constant"/>
+<shape type="instance"/>
+<shape type="instance"><ref id="nothing"/></shape>
+<shape type="instance"><shape type="sphere"/></shape>
+<shape type="ply"/>
+<shape type="ply">
+	<string name="filenam" value="x.ply"/>
+</shape>
+<shape type="ply">
+	<bsdf type="irawan"/>
+</shape>
+<shape type="sphere">
+	<bsdf type="mask">
+		<bsdf type="irawan"/>
+	</bsdf>
+</shape>
+<shape type="sphere"><bsdf type="mask"/></shape>
+<emitter type="envmap"/>
+<emitter type="area"/>
+</scene>
+XML
+code 1 "$BIN/hslt-scene" check "$DIR/deep.xml"
+[ "$(sed -n 's|.*/deep.xml:\([0-9]*\): .*|\1|p' "$DIR/out" | tr '\n' ' ')" = "2 3 4 5 7 9 10 14 17 18 19 " ] || fail "not one line each: $(cat "$DIR/out")"
+grep -q "^$DIR/deep.xml: 11 problems" "$DIR/out" || fail "it does not sum up: $(tail -n 1 "$DIR/out")"
+
 sed 's|<integer name="rr_depth" value="5"/>|<boolean name="hide_emitters" value="ture"/>|' "$DIR/bad.xml" >"$DIR/ture.xml"
 code 1 "$BIN/hslt-scene" check "$DIR/ture.xml"
 grep -q '`ture` is neither true nor false; did you mean `true`?' "$DIR/out" || fail "of ture it says: $(cat "$DIR/out")"

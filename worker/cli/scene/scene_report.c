@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The scene is read such that every problem is found (scene_read_all); if there is none, meshes, images and
- * combinations of values are checked as a worker would, again all of them. `show` collects everything as JSON, from
+ * The scene is read such that every problem is found (scene_read_all); then meshes, images and combinations of
+ * values are checked as a worker would, again all of them, but where the reader has found something, only what does
+ * not follow from that is said. `show` collects everything as JSON, from
  * which the text is made.
  *
  * For a scene that cannot be rendered the exit code is 1, with one line per problem; a file that cannot be read at all
@@ -132,26 +133,55 @@ static uint32_t find_missing(const struct scene *s, const struct asset_source *a
 	return missing;
 }
 
-/* What the reader cannot see, in meshes, pictures and values that do not go together. */
-static uint32_t print_deeper(const struct scene *s, const struct asset_source *assets, const char *scene,
-			     struct render_summary *m)
+/* Whether two problems are of one line of one file. */
+static bool same_place(const char *text, const char *file, size_t n, unsigned long line)
+{
+	unsigned long own;
+	return place_of(text, &own) == n && memcmp(text, file, n) == 0 && own == line;
+}
+
+/* Whether a problem of building may only follow from one of reading: it has no line, or that of a problem or of an
+ * object that lacks something. */
+static bool may_follow(const struct scene *s, const struct problem_list *list, size_t count, const char *text)
+{
+	unsigned long line;
+	size_t n = place_of(text, &line);
+	if (line == 0)
+		return true;
+	for (size_t i = 0; i < count; i++)
+		if (same_place(list->at[i].text, text, n, line))
+			return true;
+	for (uint32_t i = 0; i < s->flawed_count; i++)
+		if (strlen(s->flawed[i]->file) == n && memcmp(s->flawed[i]->file, text, n) == 0 &&
+		    (unsigned long)s->flawed[i]->line == line)
+			return true;
+	return false;
+}
+
+/* What the reader cannot see, in meshes, pictures and values that do not go together: in all that was read. */
+static uint32_t find_deeper(const struct scene *s, const struct asset_source *assets, struct problem_list *list,
+			    struct render_summary *m)
 {
 	const struct render_options as_it_is = {0};
+	const size_t before = list->count;
 	struct arena arena = {0};
-	struct report found;
+	struct report found = {.problem_count = 0};
 	struct error e;
-	int rc = report_init(&found, &arena, &e);
 	uint32_t problems = 0;
-	if (!rc) {
+	int rc = report_init(&found, &arena, &e);
+	if (!rc)
 		rc = render_check_all(s, assets, &as_it_is, &found, m, &e);
-		problems = found.problem_count;
+	for (uint32_t i = 0; i < found.problem_count; i++)
+		if (!before || !may_follow(s, list, before, found.problems[i])) {
+			add_problem(list, found.problems[i]);
+			problems++;
+		}
+	if (rc && (!before || !may_follow(s, list, before, e.text))) {
+		add_problem(list, e.text);
+		problems++;
 	}
-	for (uint32_t i = 0; i < problems; i++)
-		place_print(stdout, "", scene, found.problems[i]);
-	if (rc)
-		place_print(stdout, "", scene, e.text);
 	arena_fini(&arena);
-	return problems + (rc != 0);
+	return problems;
 }
 
 /* ", N segments of curves"; nothing without any. */
@@ -172,9 +202,9 @@ static int print_check(const struct scene *s, const struct asset_source *assets,
 	for (uint32_t i = 0; i < s->problem_count; i++)
 		add_problem(&list, s->problems[i]);
 	problems += find_missing(s, assets, &list);
+	if (!problems || (s->object_count > 0 && problems < REPORT_PROBLEMS_MAX))
+		problems += find_deeper(s, assets, &list, &m);
 	print_problems(&list, scene);
-	if (!problems)
-		problems = print_deeper(s, assets, scene, &m);
 	for (uint32_t i = 0; i < s->note_count; i++)
 		place_print(stdout, "note: ", scene, s->notes[i]);
 	char text[512];

@@ -35,6 +35,7 @@ struct draft {
 	const struct plugin_decl *decl;
 	bool stands_in; /* replaces a plug-in that is not supported */
 	bool lacks;	/* something inside it was left out, or is wrong */
+	bool unsure;	/* the same of what decides whether the object itself is sound */
 	bool flat;	/* its transform has no inverse */
 	struct property *properties;
 	const struct scene_node **children;
@@ -351,6 +352,42 @@ static int hold_still(struct maker *m, struct draft *d, const struct xml_element
 	return 0;
 }
 
+/* Whether an object may be refused for want of what an element in it gives. Shapes do without materials and the like.
+ */
+static bool decides(const struct scene_node *n, const struct xml_element *c)
+{
+	return n->cls != PLUGIN_SHAPE || strcmp(n->type, "instance") == 0 || value_is_element(c->name);
+}
+
+/* A node that holds a flawed one, such as a shape with a flawed texture, is flawed. */
+static bool holds_flawed(const struct scene_node *n)
+{
+	bool with_children = n->cls != PLUGIN_SHAPE || strcmp(n->type, "instance") == 0;
+	for (uint32_t i = 0; i < n->property_count; i++)
+		if (n->properties[i].value.type == VALUE_NODE && n->properties[i].value.as.node->flawed)
+			return true;
+	for (uint32_t i = 0; i < n->child_count && with_children; i++)
+		if (n->children[i]->flawed)
+			return true;
+	return false;
+}
+
+static int note_flaw(struct maker *m, struct scene_node *n)
+{
+	uint32_t count = m->flawed_count;
+	n->flawed = true;
+	if ((count & (count - 1)) == 0) { /* 0 or a power of two: there is no room */
+		const struct scene_node **more = arena_alloc(m->arena, count ? 2 * (size_t)count : 1, sizeof *more);
+		if (!more)
+			return maker_out_of_memory(m);
+		if (count)
+			memcpy(more, m->flawed, count * sizeof *more);
+		m->flawed = more;
+	}
+	m->flawed[m->flawed_count++] = n;
+	return 0;
+}
+
 static int fill_node(struct maker *m, struct draft *d, struct xml_element *el)
 {
 	size_t n = 0;
@@ -363,8 +400,10 @@ static int fill_node(struct maker *m, struct draft *d, struct xml_element *el)
 	d->node->properties = d->properties;
 	d->node->children = d->children;
 	for (struct xml_element *c = el->first; c; c = c->next) {
+		uint32_t before = m->report.problem_count;
 		int r = read_content(m, d, el, c);
 		d->lacks |= r == REPORT_TOLD;
+		d->unsure |= (r || m->report.problem_count > before) && decides(d->node, c);
 		r = report_problem(&m->report, r, m->error);
 		if (r)
 			return r;
@@ -484,6 +523,8 @@ int maker_node(struct maker *m, struct xml_element *el, const struct scene_node 
 	r = fill_node(m, &d, el);
 	if (!r)
 		r = report_problem(&m->report, hold_still(m, &d, el), m->error);
+	if (!r && (d.unsure || holds_flawed(d.node)))
+		r = note_flaw(m, d.node);
 	m->depth--;
 	el->busy = false;
 	el->nesting = d.nesting;

@@ -30,7 +30,9 @@ struct maker {
 	struct asset_list assets;
 	uint64_t objects; /* made so far, counted once for each reference: bounded by nesting.h */
 	int depth;
-	uint32_t flat_shapes; /* left out, because their transforms have no inverses */
+	uint32_t flawed_count;
+	const struct scene_node **flawed; /* as in the scene */
+	uint32_t flat_shapes;		  /* left out, because their transforms have no inverses */
 	const struct xml_element *first_flat;
 	bool lenient;
 };

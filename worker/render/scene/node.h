@@ -46,6 +46,7 @@ struct scene_node {
 	int line;
 	const struct plugin_decl *decl;
 	bool shines; /* an emitter, or a shape that holds one, however deep */
+	bool flawed; /* it lacks what was refused: what else is wrong with it may only follow from that */
 	uint32_t property_count, child_count;
 	const struct property *properties;
 	const struct scene_node *const *children; /* nested objects without a name */

@@ -83,3 +83,11 @@ int report_problem(struct report *r, int code, struct error *e)
 	r->problems[r->problem_count++] = text;
 	return r->problem_count < REPORT_PROBLEMS_MAX ? 0 : REPORT_FULL;
 }
+
+int report_problem_once(struct report *r, int code, struct error *e)
+{
+	for (uint32_t i = 0; i < r->problem_count && code && code != -ENOMEM; i++)
+		if (strcmp(r->problems[i], e->text) == 0)
+			return 0;
+	return report_problem(r, code, e);
+}

@@ -41,5 +41,7 @@ int report_text(struct report *r, const char *file, const char *key, const char 
  * room for more, and reading on would only take time; it is returned unchanged. */
 enum { REPORT_TOLD = 1, REPORT_FULL = 2 };
 int report_problem(struct report *r, int code, struct error *e);
+/* The same, unless the text is there already, because several objects refer to the one that it is about. */
+int report_problem_once(struct report *r, int code, struct error *e);
 
 #endif

@@ -244,6 +244,8 @@ static int read_all(struct scene *s, const struct asset_source *assets, const ch
 	s->note_count = m->report.note_count;
 	s->problems = m->report.problems;
 	s->problem_count = m->report.problem_count;
+	s->flawed = m->flawed;
+	s->flawed_count = m->flawed_count;
 	return r;
 }
 

@@ -31,6 +31,8 @@ struct scene {
 	uint32_t problem_count;		 /* 0 except after scene_read_all */
 	const char *const
 		*problems; /* "scene.xml:12: <bsdf>: ..." all that is wrong or not supported, in the file's order */
+	uint32_t flawed_count;
+	const struct scene_node *const *flawed; /* those nodes, however deep; what they hold need not be among them */
 	uint32_t note_count;
 	const char *const *notes; /* "scene.xml:12: ignored ...": each once, for the log */
 };

@@ -5,6 +5,8 @@
  */
 #include "worker/render/shape/group.h"
 
+#include "worker/render/scene/report.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -22,6 +24,7 @@ struct listing {
 	uint32_t count, room;
 	double open, close;	       /* the shutter */
 	const struct animation *moves; /* of the instance that is being listed */
+	struct report *found;
 	struct error *e;
 };
 
@@ -80,11 +83,17 @@ static int append(struct listing *l, const struct scene_node *n, const struct sc
 
 static int list(struct listing *l, const struct scene_node *n, const struct scene_node *instance);
 
+/* An object has failed with `code`, or not; 0: the listing goes on. */
+static int go_on(struct listing *l, int code)
+{
+	return l->found && code != -E2BIG ? report_problem_once(l->found, code, l->e) : code;
+}
+
 static int list_inside(struct listing *l, const struct scene_node *n, const struct scene_node *instance)
 {
 	int rc = 0;
 	for (uint32_t i = 0; i < n->child_count && !rc; i++)
-		rc = list(l, n->children[i], instance);
+		rc = go_on(l, list(l, n->children[i], instance));
 	return rc;
 }
 
@@ -153,14 +162,14 @@ static int find_uses(struct listing *l)
 	return 0;
 }
 
-int shape_list(const struct scene *s, double open, double close, struct arena *arena, struct listed_shape **shapes,
-	       uint32_t *count, struct error *e)
+int shape_list(const struct scene *s, double open, double close, struct arena *arena, struct report *found,
+	       struct listed_shape **shapes, uint32_t *count, struct error *e)
 {
-	struct listing l = {.arena = arena, .open = open, .close = close, .e = e};
+	struct listing l = {.arena = arena, .open = open, .close = close, .found = found, .e = e};
 	int rc = 0;
 	for (uint32_t i = 0; i < s->object_count && !rc; i++)
 		if (s->objects[i]->cls == PLUGIN_SHAPE && strcmp(s->objects[i]->type, "shapegroup") != 0)
-			rc = list(&l, s->objects[i], NULL);
+			rc = go_on(&l, list(&l, s->objects[i], NULL));
 	if (!rc)
 		rc = find_uses(&l);
 	*shapes = l.shapes;

@@ -9,6 +9,8 @@
 
 #include "worker/render/shape/shape.h"
 
+struct report;
+
 enum { SHAPES_MAX = 1 << 20 };
 
 struct listed_shape {
@@ -19,9 +21,10 @@ struct listed_shape {
 };
 
 /* In the file's order, in the arena. What moves stands where it is at the time `open`; it moves on if the shutter is
- * open until a later one. -EINVAL, -ENOTSUP, -E2BIG with a sentence, -ENOMEM. */
-int shape_list(const struct scene *s, double open, double close, struct arena *arena, struct listed_shape **shapes,
-	       uint32_t *count, struct error *e);
+ * open until a later one. found: gets what is wrong, and the rest is listed; NULL: the first problem ends it. -EINVAL,
+ * -ENOTSUP, -E2BIG with a sentence, -ENOMEM. */
+int shape_list(const struct scene *s, double open, double close, struct arena *arena, struct report *found,
+	       struct listed_shape **shapes, uint32_t *count, struct error *e);
 
 /* The node itself, or a copy in the arena with the instance's to_world after its own; NULL: out of memory. */
 const struct scene_node *shape_placed(const struct listed_shape *s, struct arena *arena);

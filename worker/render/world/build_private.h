@@ -43,12 +43,7 @@ struct builder {
 /* An object has failed with `code`. 0: the problem is noted, and building goes on without the object. */
 static inline int build_go_on(struct builder *b, int code)
 {
-	if (!b->found)
-		return code;
-	for (uint32_t i = 0; i < b->found->problem_count && code != -ENOMEM; i++)
-		if (strcmp(b->found->problems[i], b->e->text) == 0)
-			return 0; /* of an object that several refer to */
-	return report_problem(b->found, code, b->e);
+	return b->found ? report_problem_once(b->found, code, b->e) : code;
 }
 
 static inline int build_out_of_memory(struct error *e)

@@ -186,8 +186,8 @@ int build_read_shapes(struct builder *b)
 	struct listed_shape *list;
 	uint32_t listed;
 	struct arena *a = &b->scratch;
-	int rc = shape_list(b->scene, b->w->settings.shutter_open, b->w->settings.shutter_close, a, &list, &listed,
-			    b->e);
+	int rc = shape_list(b->scene, b->w->settings.shutter_open, b->w->settings.shutter_close, a, b->found, &list,
+			    &listed, b->e);
 	if (rc)
 		return rc;
 	struct shared_mesh **meshes = arena_alloc(a, listed, sizeof(void *));
