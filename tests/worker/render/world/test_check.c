@@ -74,6 +74,26 @@ static void test_all_problems(void **state)
 	free_checked(&c);
 }
 
+/* What is wrong with instances comes first, because shapes are listed before they are read. */
+static void test_instances(void **state)
+{
+	(void)state;
+	static const char xml[] = "<scene version='3.0.0'>\n<shape type='instance'/>\n" SPHERE(METAL(
+		"Xy")) "<shape type='merge'><shape type='instance'/>\n<shape type='instance'><shape type='cube'/></shape></shape>"
+		       "</scene>";
+	static const char *const expected[] = {"s.xml:2: <shape type=\"instance\">",
+					       "s.xml:4: <shape type=\"instance\">",
+					       "s.xml:5: <shape type=\"instance\">", "s.xml:3: "};
+	enum { COUNT = sizeof expected / sizeof *expected };
+	struct checked c;
+	check(xml, &c);
+	assert_int_equal(c.found.problem_count, COUNT);
+	for (uint32_t i = 0; i < COUNT; i++)
+		if (strncmp(c.found.problems[i], expected[i], strlen(expected[i])) != 0)
+			fail_msg("problem %u: %s", i, c.found.problems[i]);
+	finish(&c);
+}
+
 static void test_good_scene(void **state)
 {
 	(void)state;
@@ -185,9 +205,13 @@ static void test_too_many(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_all_problems),	cmocka_unit_test(test_good_scene),
-		cmocka_unit_test(test_second_tables),	cmocka_unit_test(test_unknown_metals),
-		cmocka_unit_test(test_unknown_indices), cmocka_unit_test(test_values_beside_textures),
+		cmocka_unit_test(test_all_problems),
+		cmocka_unit_test(test_instances),
+		cmocka_unit_test(test_good_scene),
+		cmocka_unit_test(test_second_tables),
+		cmocka_unit_test(test_unknown_metals),
+		cmocka_unit_test(test_unknown_indices),
+		cmocka_unit_test(test_values_beside_textures),
 		cmocka_unit_test(test_too_many),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
