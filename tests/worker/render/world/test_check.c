@@ -91,7 +91,7 @@ static void test_instances(void **state)
 	for (uint32_t i = 0; i < COUNT; i++)
 		if (strncmp(c.found.problems[i], expected[i], strlen(expected[i])) != 0)
 			fail_msg("problem %u: %s", i, c.found.problems[i]);
-	finish(&c);
+	free_checked(&c);
 }
 
 static void test_good_scene(void **state)
