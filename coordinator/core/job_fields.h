@@ -89,6 +89,7 @@ typedef double field_real, field_positive, field_known;
 	COUNTER(faults, NULL, NOWHERE)               /* ... of these, results that no correct worker sends */ \
 	COUNTER(failures, "failures", NOWHERE)       /* leases that a worker could not compute */ \
 	COUNTER(timeouts, "timeouts", NOWHERE)       /* leases that timed out and were handed out again */ \
+	COUNTER(lost, "lost", NOWHERE)               /* leases whose worker was lost before it sent a result */ \
 	COUNTER(duplicates, "duplicates", NOWHERE)   /* second copies of slow leases */ \
 	COUNTER(verified, "verified", AT(verified))  /* leases on which two workers agreed */ \
 	COUNTER(mismatched, "mismatched", AT(mismatched)) /* ... of which the first two disagreed */

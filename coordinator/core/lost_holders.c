@@ -80,6 +80,7 @@ void lost_holders_add(struct farm *f, struct lease *l)
 	lease_drop(f, l);
 	if (!counts)
 		return;
+	j->counts.lost++;
 	add_worker(&s->lost, p->who);
 	p->who->calls += p->returns;
 	n = gone(&s->lost, &certificates);

@@ -22,6 +22,30 @@ static void play_line(struct farm *f, const char *line)
 	transcript_play(f, (const char *const[]){line, NULL});
 }
 
+/* Leases that end with their worker's connection are counted, once, whoever ended it. */
+static void lost_leases_are_counted(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	struct job_counts c;
+	transcript_play(f, (const char *const[]){
+				   "[0] submit groups=2 parts=2 -> j1 submitted, j1 is queued",
+				   "[0] w1 joins A threads=2 home=a start=1 -> -",
+				   "[0] w2 joins A threads=1 home=b start=1 -> -",
+				   "[1] w1 wants 2 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g0 p1 boot",
+				   "[2] w1 batch j1 g0 p0 boot -> merge, merged, w1 gets j1 g1 p0 boot",
+				   "[2] w2 wants 1 -> w2 gets j1 g1 p1 boot",
+				   "[3] w1 leaves -> -",
+				   NULL,
+			   });
+	assert_true(farm_counts(f, 1, &c));
+	assert_int_equal(c.lost, 2);
+	play_line(f, "[4] w3 joins A threads=1 home=b start=2 -> close w2");
+	assert_true(farm_counts(f, 1, &c));
+	assert_int_equal(c.lost, 3);
+	farm_free(f);
+}
+
 /* The process that renders ends, the worker connects again after a restart and says which lease it was: a failure, as
  * if it had held the lease still, once. Three workers, and the job is over; its owner's next job gets one lease at a
  * time.
@@ -221,6 +245,7 @@ static void one_certificate(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(lost_leases_are_counted),
 		cmocka_unit_test(told_after_a_restart),
 		cmocka_unit_test(limit_ends),
 		cmocka_unit_test(never_heard_again),
