@@ -68,8 +68,13 @@ static void print_row(const Farm__JobStatus *s, bool owners)
 	printf("\n");
 }
 
+static bool is_wanted(const struct job_options *o, const Farm__JobStatus *s)
+{
+	return !o->state || strcmp(s->state, o->state) == 0;
+}
+
 /* Owners are known by their certificates. */
-static void print_table(const Farm__JobListAnswer *a)
+static void print_table(const Farm__JobListAnswer *a, const struct job_options *o)
 {
 	bool owners = false;
 	for (size_t i = 0; i < a->n_jobs; i++)
@@ -77,15 +82,18 @@ static void print_table(const Farm__JobListAnswer *a)
 	printf("%-6s %-10s %4s %7s %-9s %-8s %8s %s%s\n", "JOB", "STATE", "PRI", "DONE", "ETA", "MACHINES", "ERROR",
 	       owners ? "OWNER        " : "", "NAME");
 	for (size_t i = 0; i < a->n_jobs; i++)
-		print_row(a->jobs[i], owners);
+		if (is_wanted(o, a->jobs[i]))
+			print_row(a->jobs[i], owners);
 }
 
-static void print_json(const Farm__JobListAnswer *a)
+static void print_json(const Farm__JobListAnswer *a, const struct job_options *o)
 {
 	json_t *list = json_array();
 	for (size_t i = 0; i < a->n_jobs; i++) {
 		const Farm__JobStatus *s = a->jobs[i];
 		char id[32];
+		if (!is_wanted(o, s))
+			continue;
 		snprintf(id, sizeof id, "j%llu", (unsigned long long)s->job);
 		json_array_append_new(list,
 				      json_pack("{s:i s:s s:s s:s s:f s:i s:s s:s s:s s:b s:i s:s s:s s:i s:f s:s}",
@@ -106,7 +114,7 @@ static int list(struct client *cl, const struct job_options *o, struct error *e)
 	int rc = client_call(cl, ENVELOPE(JOB_LIST, job_list), FARM__ENVELOPE__BODY_JOB_LIST_ANSWER, &answer, e);
 	if (rc)
 		return rc;
-	(o->json ? print_json : print_table)(answer.envelope.message->job_list_answer);
+	(o->json ? print_json : print_table)(answer.envelope.message->job_list_answer, o);
 	client_message_fini(&answer);
 	return 0;
 }

@@ -17,6 +17,12 @@
 
 enum { PRIORITY_MOST = 100 };
 
+static const char *state_at(size_t i)
+{
+	static const char *const states[] = {"queued", "bootstrap", "running", "held", "done", "failed", "cancelled"};
+	return i < sizeof states / sizeof *states ? states[i] : NULL;
+}
+
 static const struct option_row rows[] = {
 	{"coordinator", 'c', "HOST:PORT", "The coordinator", OPTION_TEXT(struct job_options, coordinator),
 	 .environment = "HSLT_COORDINATOR", .needed = true},
@@ -28,6 +34,8 @@ static const struct option_row rows[] = {
 	 "fetch: the image so far, while the job runs; room.exr is previewed in room.preview.exr, also with -o room.exr",
 	 OPTION_FLAG(struct job_options, preview)},
 	{"json", 0, NULL, "list: one JSON array", OPTION_FLAG(struct job_options, json)},
+	{"state", 0, "STATE", "(list: the only jobs shown)", OPTION_TEXT(struct job_options, state),
+	 .values = state_at},
 	{"spp", 0, "+N", "extend: additional samples per pixel", OPTION_COUNT(struct job_options, more_spp, 1, 1e15)},
 	{"mutations", 0, "+N", "extend: additional mutations or samples",
 	 OPTION_COUNT(struct job_options, more_mutations, 1, 1e18)},
@@ -108,8 +116,8 @@ static int check(void *target, struct error *e)
 	if (o->verb != JOB_FETCH && (o->output || o->preview))
 		return error_set(e, EINVAL, "%s is only for fetch%s", o->output ? "--output" : "--preview",
 				 o->verb == JOB_LOG ? ": the log goes to stdout" : "");
-	if (o->verb != JOB_LIST && o->json)
-		return error_set(e, EINVAL, "--json is only for list");
+	if (o->verb != JOB_LIST && (o->json || o->state))
+		return error_set(e, EINVAL, "%s is only for list", o->json ? "--json" : "--state");
 	return 0;
 }
 
@@ -118,6 +126,7 @@ static const struct program program = {
 	.words = "VERB [JOB] [PRIORITY]",
 	.summary = "Manages the jobs of a coordinator.",
 	.examples = "hslt-job --coordinator 127.0.0.1:7700 list\n"
+		    "hslt-job list --state running\n"
 		    "hslt-job fetch j12 -o room.exr\n"
 		    "hslt-job fetch j12 --preview -o so-far.exr\n"
 		    "hslt-job hold j12             hands out no more of its leases; those already out still count\n"

@@ -10,6 +10,7 @@ enum job_verb { JOB_LIST, JOB_CANCEL, JOB_FETCH, JOB_LOG, JOB_HOLD, JOB_RELEASE,
 
 struct job_options {
 	const char *coordinator, *tls, *output;
+	const char *state;  /* that list is about; NULL: all */
 	enum job_verb verb; /* JOB_VERBS: none */
 	uint64_t job;
 	int priority;

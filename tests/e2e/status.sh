@@ -48,6 +48,13 @@ if command -v jq >/dev/null; then
 	jq -e .id "$DIR/lines" >/dev/null || fail "jq does not take it"
 fi
 "$BIN/hslt-status" | grep -q "^$id  *done" || fail "the table does not show the job"
+"$BIN/hslt-job" list --state done >"$DIR/done"
+grep -q "^$id " "$DIR/done" && ! grep -q "^$second " "$DIR/done" || fail "list --state done: $(cat "$DIR/done")"
+"$BIN/hslt-job" list --state cancelled --json >"$DIR/cancelled"
+grep -q "\"id\": \"$second\"" "$DIR/cancelled" && ! grep -q "\"id\": \"$id\"" "$DIR/cancelled" || fail "list --state cancelled --json"
+code 2 "$BIN/hslt-job" list --state dome
+grep -q 'did you mean `done`' "$DIR/err.log" || fail "a state that there is not: $(cat "$DIR/err.log")"
+code 2 "$BIN/hslt-job" cancel "$id" --state done
 "$BIN/hslt-status" j99 2>/dev/null && fail "j99 cannot be known"
 grep -q "event=lease_granted .* kind=render " "$DIR/coordinator.log" || fail "the log does not name the kinds of leases"
 # Of what has ended a snapshot says less than of the one job that is asked for.
