@@ -115,17 +115,17 @@ static void broken(struct farm *f, const struct event *ev)
 		rounds_end(f, j, END_FAILED, ev->text ? ev->text : "");
 }
 
-static void ticked(struct farm *f, const struct event *ev)
+static void take_no_action(struct farm *f, const struct event *ev)
 {
 	(void)f;
 	(void)ev;
 }
 
 static void (*const on_event[])(struct farm *, const struct event *) = {
-	[EVENT_TICK] = ticked,
+	[EVENT_TICK] = take_no_action,
 	[EVENT_JOINED] = joined,
 	[EVENT_LEFT] = peer_left,
-	[EVENT_HEARTBEAT] = ticked,
+	[EVENT_HEARTBEAT] = take_no_action,
 	[EVENT_REQUEST] = requested,
 	[EVENT_BATCH] = answer_batch,
 	[EVENT_STORED] = answer_stored,

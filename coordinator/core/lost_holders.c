@@ -14,7 +14,7 @@ static bool is_gone(const struct lost_worker *w)
 	return w->who->id != w->id || w->who->calls == w->calls;
 }
 
-static uint32_t gone(const struct lost_holders *l, uint32_t *certificates)
+static uint32_t count_gone(const struct lost_holders *l, uint32_t *certificates)
 {
 	uint32_t n = 0;
 	*certificates = 0;
@@ -83,7 +83,7 @@ void lost_holders_add(struct farm *f, struct lease *l)
 	j->counts.lost++;
 	add_worker(&s->lost, p->who);
 	p->who->calls += p->returns;
-	n = gone(&s->lost, &certificates);
+	n = count_gone(&s->lost, &certificates);
 	if (n < LOST_TOLD)
 		return;
 	text_print(f->text, sizeof f->text,

@@ -9,7 +9,7 @@
 #include <math.h>
 
 /* The live job that the event names; NULL: the event has been answered. */
-static struct job *meant(struct farm *f, const struct event *ev)
+static struct job *live_job_of(struct farm *f, const struct event *ev)
 {
 	struct job *j = farm_find_job(f, ev->job);
 	if (j && job_is_live(j))
@@ -39,14 +39,14 @@ static void hold(struct job *j, enum job_hold which, const char *why, double now
 
 void orders_hold(struct farm *f, const struct event *ev)
 {
-	struct job *j = meant(f, ev);
+	struct job *j = live_job_of(f, ev);
 	if (j)
 		hold(j, ev->hold, ev->text ? ev->text : "", f->now);
 }
 
 void orders_priority(struct farm *f, const struct event *ev)
 {
-	struct job *j = meant(f, ev);
+	struct job *j = live_job_of(f, ev);
 	if (!j)
 		return;
 	if (ev->priority < -PRIORITY_MAX || ev->priority > PRIORITY_MAX) {
@@ -60,7 +60,7 @@ void orders_priority(struct farm *f, const struct event *ev)
 
 void orders_extend(struct farm *f, const struct event *ev)
 {
-	struct job *j = meant(f, ev);
+	struct job *j = live_job_of(f, ev);
 	if (!j)
 		return;
 	assert(ev->plan->rounds >= j->plan.rounds && ev->plan->groups == j->plan.groups &&

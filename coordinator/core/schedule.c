@@ -69,7 +69,7 @@ static struct peer *waiting_for(struct farm *f, const struct job *j, const struc
 }
 
 /* Leases that wait for a second worker go first: their chains and their round are blocked. */
-static struct peer *taker(struct farm *f, const struct job *j, struct slot **slot)
+static struct peer *choose_peer(struct farm *f, const struct job *j, struct slot **slot)
 {
 	for (int i = 0; i < 2; i++) {
 		for (struct link *k = j->second[i].next; k != &j->second[i]; k = k->next) {
@@ -124,7 +124,7 @@ static bool hand_out_ready(struct farm *f)
 		if (!job_is_open(j) || (best && comes_first(best, j)) || must_wait(f, j))
 			continue;
 		struct slot *s;
-		struct peer *p = taker(f, j, &s);
+		struct peer *p = choose_peer(f, j, &s);
 		if (p) {
 			best = j;
 			slot = s;

@@ -13,7 +13,7 @@ bool share_competes(const struct job *a, const struct job *b)
 }
 
 /* Machines that would be busy with all of the job's leases, at the number that one takes. */
-static double wants(const struct job *j, double leases_each)
+static double machines_wanted(const struct job *j, double leases_each)
 {
 	if (job_is_held(j))
 		return 0;
@@ -54,7 +54,7 @@ static uint32_t workers_of(const struct job *j)
 }
 
 /* Jobs that take part: the i-th live job, if it competes at this priority and for this owner (NULL: any). */
-static const struct job *rival(const struct farm *f, uint32_t i, const struct job *j, const struct owner *o)
+static const struct job *competitor_at(const struct farm *f, uint32_t i, const struct job *j, const struct owner *o)
 {
 	const struct job *r = f->live[i];
 	return r->priority == j->priority && share_competes(r, j) && (!o || r->owner == o) ? r : NULL;
@@ -67,7 +67,7 @@ struct level {
 	uint32_t above;
 };
 
-static void pour(struct level *v, double want)
+static void level_add(struct level *v, double want)
 {
 	if (want > v->level)
 		v->above++;
@@ -87,7 +87,7 @@ static bool is_level(struct level *v)
 	return false;
 }
 
-static double due(const struct farm *f, const struct job *j, uint32_t machines, double leases_each)
+static double machines_due(const struct farm *f, const struct job *j, uint32_t machines, double leases_each)
 {
 	struct level v = {.there = machines};
 	for (struct link *k = f->owners.next; k != &f->owners; k = k->next)
@@ -95,21 +95,21 @@ static double due(const struct farm *f, const struct job *j, uint32_t machines, 
 	for (uint32_t i = 0; i < f->live_count; i++) {
 		const struct job *r = f->live[i];
 		if (r->priority > j->priority && share_competes(r, j))
-			v.there = fmax(0, v.there - wants(r, leases_each));
-		else if (rival(f, i, j, NULL))
-			r->owner->wants += wants(r, leases_each);
+			v.there = fmax(0, v.there - machines_wanted(r, leases_each));
+		else if (competitor_at(f, i, j, NULL))
+			r->owner->wants += machines_wanted(r, leases_each);
 	}
 	do
 		for (struct link *k = f->owners.next; k != &f->owners; k = k->next)
-			pour(&v, list_entry(k, struct owner, link)->wants);
+			level_add(&v, list_entry(k, struct owner, link)->wants);
 	while (!is_level(&v));
 	v = (struct level){.there = fmin(j->owner->wants, v.above ? v.level : INFINITY)};
 	do
 		for (uint32_t i = 0; i < f->live_count; i++)
-			if (rival(f, i, j, j->owner))
-				pour(&v, wants(f->live[i], leases_each));
+			if (competitor_at(f, i, j, j->owner))
+				level_add(&v, machines_wanted(f->live[i], leases_each));
 	while (!is_level(&v));
-	return fmin(wants(j, leases_each), v.above ? v.level : INFINITY);
+	return fmin(machines_wanted(j, leases_each), v.above ? v.level : INFINITY);
 }
 
 /* "; j4, j7 and 2 more come first"; only: the owner whose jobs may be named, NULL: any. "; 2 jobs of other owners
@@ -123,7 +123,7 @@ static void put_others(struct text *t, const struct farm *f, const struct job *j
 	uint32_t count = 0, named = 0;
 	for (uint32_t i = 0; i < f->live_count; i++) {
 		const struct job *r = f->live[i];
-		if (r == j || !share_competes(r, j) || !(wants(r, leases_each) > 0) ||
+		if (r == j || !share_competes(r, j) || !(machines_wanted(r, leases_each) > 0) ||
 		    !(higher ? r->priority > j->priority : r->priority == j->priority))
 			continue;
 		count++;
@@ -158,7 +158,7 @@ void share_of(const struct farm *f, const struct job *j, struct share *out)
 		return;
 	out->workers = workers_of(j);
 	out->machines = machines_of(f, j, &leases_each);
-	out->machines_due = due(f, j, out->machines, leases_each);
+	out->machines_due = machines_due(f, j, out->machines, leases_each);
 	put_place(f, j, NULL, out, leases_each, out->place, sizeof out->place);
 	put_place(f, j, j->owner, out, leases_each, out->owners_place, sizeof out->owners_place);
 }

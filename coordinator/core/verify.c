@@ -79,7 +79,7 @@ bool verify_may_begin(const struct farm *f, const struct job *j, const struct pe
 }
 
 /* The first lease that no connected worker may have. */
-static const struct slot *stranded(const struct farm *f, const struct job *j)
+static const struct slot *find_stranded_slot(const struct farm *f, const struct job *j)
 {
 	for (int i = 0; i < 2; i++) {
 		for (struct link *k = j->second[i].next; k != &j->second[i]; k = k->next) {
@@ -99,7 +99,7 @@ static const struct slot *stranded(const struct farm *f, const struct job *j)
 
 bool verify_why(const struct farm *f, const struct job *j, char *text, size_t size)
 {
-	const struct slot *s = j->proofs ? stranded(f, j) : NULL;
+	const struct slot *s = j->proofs ? find_stranded_slot(f, j) : NULL;
 	if (!s)
 		return false;
 	const struct lease_key k = slot_key(j, s);

@@ -91,7 +91,7 @@ static void run_tidy(uv_work_t *work)
 	journal_clear(t->folder, t->keep);
 }
 
-static void tidied(uv_work_t *work, int status)
+static void on_tidied(uv_work_t *work, int status)
 {
 	struct tidying *t = work->data;
 	(void)status;
@@ -111,7 +111,7 @@ static void delete_old_journals(struct jobs *jobs, struct journal *old, const ch
 	}
 	*t = (struct tidying){.jobs = jobs, .old = old, .keep = keep};
 	snprintf(t->folder, sizeof t->folder, "%s", folder);
-	jobs_in_pool(jobs, &t->work, t, run_tidy, tidied);
+	jobs_in_pool(jobs, &t->work, t, run_tidy, on_tidied);
 }
 
 static void checkpoint_written(uv_work_t *work, int status)

@@ -321,7 +321,7 @@ static void drop_ack(struct durable_ack *a)
 }
 
 /* Waits until the journal is replaced. */
-static void park(struct jobs *jobs, struct durable_ack *a)
+static void park_ack(struct jobs *jobs, struct durable_ack *a)
 {
 	struct live_job *job = jobs->stopping ? NULL : jobs_find(jobs, a->key.job);
 	if (!job) {
@@ -340,7 +340,7 @@ static void park(struct jobs *jobs, struct durable_ack *a)
 static void answer(struct jobs *jobs, struct durable_ack *a)
 {
 	if (a->failed) {
-		park(jobs, a);
+		park_ack(jobs, a);
 		return;
 	}
 	if (a->ack == ACK_MERGED)
@@ -436,7 +436,7 @@ static void write_counts(struct jobs *jobs, struct live_job *job)
 }
 
 /* Answers that waited for journals which have been replaced. */
-static void unpark(struct jobs *jobs)
+static void release_parked_acks(struct jobs *jobs)
 {
 	struct ack_list list = STAILQ_HEAD_INITIALIZER(list);
 	STAILQ_CONCAT(&list, &jobs->parked);
@@ -491,7 +491,7 @@ void durable_tick(struct jobs *jobs)
 	for (struct live_job *job = jobs->live; job; job = job->next)
 		write_counts(jobs, job);
 	if (!STAILQ_EMPTY(&jobs->parked))
-		unpark(jobs);
+		release_parked_acks(jobs);
 	end_again(jobs);
 	mend_ledger(jobs);
 }

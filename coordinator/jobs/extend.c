@@ -36,7 +36,7 @@ static double error_of(const struct forecast_history *h)
 }
 
 /* r: the record of its end; NULL: it runs. */
-static struct extension_from where(const struct live_job *job, double seconds, const struct job_record *r)
+static struct extension_from extension_from_job(const struct live_job *job, double seconds, const struct job_record *r)
 {
 	return (struct extension_from){.rounds = live_job_rounds(job),
 				       .seconds = seconds,
@@ -117,7 +117,7 @@ static int extend_live(struct jobs *jobs, const struct requester *by, struct liv
 	struct plan_request asked, old_asked;
 	struct plan plan, old = job->plan;
 	double seconds = farm_elapsed(jobs->farm, job->id, jobs_now(jobs));
-	struct extension_from from = where(job, isnan(seconds) ? 0 : seconds, NULL);
+	struct extension_from from = extension_from_job(job, isnan(seconds) ? 0 : seconds, NULL);
 	int rc = plan_request_from_wire(live_job_submit(job)->plan, &old_asked, e);
 	if (!rc)
 		rc = plan_of(jobs, by, job, x, &from, &asked, &plan, e);
@@ -202,7 +202,7 @@ static int extend_read(struct jobs *jobs, const struct requester *by, struct liv
 			e, EAGAIN,
 			"memory has no room for its chain states beside those of j%llu: extend it when that has ended",
 			(unsigned long long)other);
-	struct extension_from from = where(job, isnan(job->times.completed) ? 0 : job->times.completed, r);
+	struct extension_from from = extension_from_job(job, isnan(job->times.completed) ? 0 : job->times.completed, r);
 	int rc = plan_of(jobs, by, job, x, &from, &asked, &plan, e);
 	if (rc)
 		return rc;

@@ -26,7 +26,7 @@ static void hold(struct jobs *jobs, struct live_job *job, const char *text)
 }
 
 /* The first missing one; NULL: all exist. */
-static const Farm__File *lacking(const struct jobs *jobs, const struct live_job *job)
+static const Farm__File *find_missing_file(const struct jobs *jobs, const struct live_job *job)
 {
 	const Farm__Submit *m = live_job_submit(job);
 	for (size_t i = 0; i < m->n_files; i++) {
@@ -40,7 +40,7 @@ static const Farm__File *lacking(const struct jobs *jobs, const struct live_job 
 bool files_look(struct jobs *jobs, struct live_job *job)
 {
 	char text[256];
-	const Farm__File *f = job->ended ? NULL : lacking(jobs, job);
+	const Farm__File *f = job->ended ? NULL : find_missing_file(jobs, job);
 	if (!f == !job->lacks_file)
 		return false;
 	*text = 0;
@@ -192,7 +192,7 @@ void files_read(struct jobs *jobs, struct live_job *job)
 
 bool files_are_right(const struct jobs *jobs, const struct live_job *job)
 {
-	return !job->unread && !lacking(jobs, job);
+	return !job->unread && !find_missing_file(jobs, job);
 }
 
 void files_tick(struct jobs *jobs)

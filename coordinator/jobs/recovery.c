@@ -55,7 +55,7 @@ static double share_of(const struct recovering_job *f)
 	return read < f->bytes ? (double)read / (double)f->bytes : 1;
 }
 
-static void view(const struct recovering_job *f, struct job_view *v)
+static void fill_view(const struct recovering_job *f, struct job_view *v)
 {
 	view_of_record(v, &f->record);
 	v->reading = share_of(f);
@@ -71,7 +71,7 @@ bool recovery_view(const struct jobs *jobs, uint64_t job, struct job_view *v)
 	while (f && f->record.id != job)
 		f = f->next;
 	if (f)
-		view(f, v);
+		fill_view(f, v);
 	return f != NULL;
 }
 
@@ -80,7 +80,7 @@ size_t recovery_views(const struct jobs *jobs, struct job_view *v)
 	size_t n = 0;
 	for (const struct recovering_job *f = jobs->found; f; f = f->next, n++)
 		if (v)
-			view(f, &v[n]);
+			fill_view(f, &v[n]);
 	return n;
 }
 

@@ -45,7 +45,7 @@ static void on_drain(uv_idle_t *h)
 	waiting_batch_free(w);
 }
 
-static void stepped(struct jobs *jobs)
+static void on_step(struct jobs *jobs)
 {
 	finish_ended(jobs);
 	late_feed(jobs);
@@ -60,7 +60,7 @@ static void films_free(struct jobs *jobs)
 	late_feed(jobs);
 }
 
-static const struct follow_up follow_up = {.carry_out = dispatch_update, .stepped = stepped, .films_free = films_free};
+static const struct follow_up follow_up = {.carry_out = dispatch_update, .stepped = on_step, .films_free = films_free};
 
 static bool drop_films(void *jobs)
 {

@@ -66,7 +66,7 @@ static int merge(struct replay *r, struct batch *b, struct error *e)
 }
 
 /* An undamaged record that another version wrote: it must not be thrown away. */
-static int strange(const struct replay *r, const char *what, size_t size, struct error *e)
+static int foreign_record_error(const struct replay *r, const char *what, size_t size, struct error *e)
 {
 	return error_set(
 		e, EPROTO,
@@ -91,10 +91,10 @@ static int take_batch(struct replay *r, const struct journal_item *item, struct 
 	int rc = envelope_unpack_frame(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, item->body, item->size, &payload,
 				       &payload_size, e);
 	if (rc)
-		return rc == -EBADMSG ? strange(r, "a result", item->size, e) : rc;
+		return rc == -EBADMSG ? foreign_record_error(r, "a result", item->size, e) : rc;
 	rc = batch_unpack(&batch, &r->job->plan, env.message->lease_result, payload, payload_size, e);
 	if (rc == -EBADMSG)
-		rc = strange(r, "a result", item->size, e);
+		rc = foreign_record_error(r, "a result", item->size, e);
 	if (!rc && item->kind == JOURNAL_AGAIN)
 		rc = rollback_replay(r->job, item->journal, &batch.key, e);
 	if (!rc && item->kind == JOURNAL_KEPT) {
@@ -153,7 +153,7 @@ static int take_record(void *user, const struct journal_item *item, struct error
 		return take_batch(r, item, e);
 	case JOURNAL_PINNED:
 		if (size >= sizeof job->fingerprint)
-			return strange(r, "a fingerprint", size, e);
+			return foreign_record_error(r, "a fingerprint", size, e);
 		memcpy(job->fingerprint, body, size);
 		job->fingerprint[size] = 0;
 		return 0;
@@ -171,7 +171,7 @@ static int take_record(void *user, const struct journal_item *item, struct error
 						  : stored_old_counts(body, size, &job->record.counts, e);
 		return rc ? strange_note(r, rc, e) : 0;
 	default:
-		return strange(r, "a record", size, e);
+		return foreign_record_error(r, "a record", size, e);
 	}
 }
 

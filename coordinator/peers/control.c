@@ -64,7 +64,7 @@ static int set_priority(struct session *p, uint64_t id, int priority, struct err
 }
 
 /* The core may have forgotten a job that is over. */
-static int finds(const struct session *p, uint64_t job, bool over_too, struct error *e)
+static int check_job_exists(const struct session *p, uint64_t job, bool over_too, struct error *e)
 {
 	struct job_view v;
 	if (!client_finds_job(p, job, &v))
@@ -78,7 +78,7 @@ void control_cancel(struct session *p, uint64_t job)
 	char text[96] = "";
 	struct job_view v;
 	struct event ev = {.kind = EVENT_CANCEL, .job = job};
-	int rc = finds(p, job, false, &e);
+	int rc = check_job_exists(p, job, false, &e);
 	if (!rc)
 		rc = ask_core(p, &ev, &e);
 	if (!rc && (rc = finish_cancelled(p->jobs, job, &e)))
@@ -95,7 +95,7 @@ void control_job(struct session *p, const Farm__Control *c)
 	struct error e;
 	struct requester by = {.peer = p->id, .unbounded = p->who.role == TLS_OPERATOR};
 	text_copy(by.owner, sizeof by.owner, p->who.name);
-	int rc = finds(p, c->job, extends, &e);
+	int rc = check_job_exists(p, c->job, extends, &e);
 	if (!rc) {
 		switch (c->verb) {
 		case FARM__VERB__VERB_HOLD:

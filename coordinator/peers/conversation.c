@@ -99,7 +99,7 @@ static void join(struct session *p, const Farm__Hello *h)
 }
 
 /* What the certificate does not allow; NULL: it allows everything. */
-static const char *overreach(struct session *p, Farm__Role role, char *text, size_t size)
+static const char *find_overreach(struct session *p, Farm__Role role, char *text, size_t size)
 {
 	const struct tls_peer *who = conn_peer(p->conn);
 	if (!who)
@@ -140,7 +140,7 @@ static void take_hello(struct session *p, const Farm__Hello *h)
 		return;
 	}
 	text_copy(p->name, sizeof p->name, h->name);
-	const char *no = overreach(p, h->role, text, sizeof text);
+	const char *no = find_overreach(p, h->role, text, sizeof text);
 	if (no) {
 		refuse_for_good(p, no);
 		return;

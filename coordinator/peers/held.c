@@ -36,7 +36,7 @@ static bool is_request(const struct session *p, Farm__Envelope__BodyCase what)
 	       !is_answered_at_once(what, false);
 }
 
-static bool waits(const struct session *p, Farm__Envelope__BodyCase what)
+static bool must_wait(const struct session *p, Farm__Envelope__BodyCase what)
 {
 	bool first = STAILQ_EMPTY(&p->held);
 	if (recovery_is_on(p->jobs))
@@ -65,7 +65,7 @@ struct session *held_turn(const struct peers *s)
 bool held_take(struct session *p, struct envelope *env)
 {
 	struct peers *s = p->peers;
-	if (!waits(p, env->message->body_case))
+	if (!must_wait(p, env->message->body_case))
 		return false;
 	size_t cost = cost_of(env);
 	struct held *h =

@@ -116,7 +116,7 @@ static void fault(struct peers *s, uint64_t peer, const char *text)
 		session_fault(p, "%s", text);
 }
 
-static void dismiss(struct peers *s, uint64_t peer, const char *text)
+static void dismiss_peer(struct peers *s, uint64_t peer, const char *text)
 {
 	struct session *p = peers_find(s, peer);
 	if (!p)
@@ -172,7 +172,7 @@ void peers_init(struct peers *s)
 					     .revoke = worker_send_revoke,
 					     .acknowledge = worker_send_ack,
 					     .fault = fault,
-					     .dismiss = dismiss,
+					     .dismiss = dismiss_peer,
 					     .extended = extended,
 					     .job_ended = job_ended,
 					     .jobs_let_go = jobs_let_go,

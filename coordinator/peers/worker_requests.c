@@ -17,7 +17,7 @@ enum {
 };
 
 /* Of what may wait at all, half is left to other answers. */
-static size_t ahead(const struct session *p)
+static size_t send_ahead_bytes(const struct session *p)
 {
 	uint64_t half = p->peers->sending.limit / 2, all = half < AHEAD_OF_ALL ? half : AHEAD_OF_ALL;
 	size_t share = all / (p->peers->session_count + 1);
@@ -26,7 +26,7 @@ static size_t ahead(const struct session *p)
 
 static size_t chunk_size(const struct session *p)
 {
-	size_t n = ahead(p);
+	size_t n = send_ahead_bytes(p);
 	return n < CHUNK_LEAST ? CHUNK_LEAST : n < CHUNK_MOST ? n : CHUNK_MOST;
 }
 
@@ -89,7 +89,7 @@ static bool answer(struct session *p, const struct worker_request *a)
 
 void worker_requests_take(struct session *p, const struct worker_request *a)
 {
-	if (STAILQ_EMPTY(&p->requests) && conn_unsent(p->conn) <= ahead(p) && answer(p, a))
+	if (STAILQ_EMPTY(&p->requests) && conn_unsent(p->conn) <= send_ahead_bytes(p) && answer(p, a))
 		return;
 	struct worker_request *last = p->request_count < REQUESTS_MOST ? mem_alloc(1, sizeof *last) : NULL;
 	if (!last) {
@@ -113,8 +113,8 @@ static void drop_first(struct session *p)
 void worker_requests_go_on(void *session)
 {
 	struct session *p = session;
-	while (!STAILQ_EMPTY(&p->requests) && p->state == SESSION_WORKER && conn_unsent(p->conn) <= ahead(p) &&
-	       answer(p, STAILQ_FIRST(&p->requests)))
+	while (!STAILQ_EMPTY(&p->requests) && p->state == SESSION_WORKER &&
+	       conn_unsent(p->conn) <= send_ahead_bytes(p) && answer(p, STAILQ_FIRST(&p->requests)))
 		drop_first(p);
 }
 

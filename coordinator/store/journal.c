@@ -90,7 +90,7 @@ void journal_hold(struct journal *j)
 
 /* ---- the queue ---- */
 
-static struct unwritten *front(struct journal *j)
+static struct unwritten *first_unwritten(struct journal *j)
 {
 	pthread_mutex_lock(&j->list);
 	struct unwritten *n = j->first;
@@ -177,7 +177,7 @@ static int write_waiting(struct journal *j)
 	pthread_mutex_lock(&j->writer);
 	uint64_t end = journal_bytes(j);
 	while (!rc && !j->bad && j->written < end) {
-		struct unwritten *n = front(j);
+		struct unwritten *n = first_unwritten(j);
 		rc = write_one(j, j->fd, j->written, n);
 		if (!rc) {
 			pop(j);

@@ -43,7 +43,7 @@ struct ledger {
 };
 
 /* Ends a transaction: what it did counts if rc is 0. */
-static int conclude(struct ledger *l, int rc, struct error *e)
+static int end_transaction(struct ledger *l, int rc, struct error *e)
 {
 	if (!rc)
 		rc = ledger_file_run(l->db, "COMMIT", e);
@@ -147,7 +147,7 @@ static int merge(struct ledger *l, struct error *e)
 		rc = merge_notes(l, schemas[0], schemas[1], e);
 	if (!rc && !l->behind)
 		rc = merge_notes(l, schemas[1], schemas[0], e);
-	return conclude(l, rc, e);
+	return end_transaction(l, rc, e);
 }
 
 int ledger_mend(struct ledger *l, struct error *e)
@@ -321,7 +321,7 @@ static int remove_all(struct ledger *l, struct ledger_side *s, const uint64_t *i
 	int rc = ledger_file_run(l->db, "BEGIN", e);
 	for (size_t i = 0; !rc && i < count; i++)
 		rc = ids[i] ? ledger_side_remove(s, ids[i], e) : 0;
-	return conclude(l, rc, e);
+	return end_transaction(l, rc, e);
 }
 
 /* First from the copy: after a fault in between the rows still exist, and are dropped again. */
@@ -357,7 +357,7 @@ static int add_to(struct ledger *l, struct ledger_side *s, const struct ledger_j
 		rc = ledger_side_set(s, next_job, next, e);
 	if (!rc)
 		rc = write_row(s, j, e);
-	return conclude(l, rc, e);
+	return end_transaction(l, rc, e);
 }
 
 int ledger_add(struct ledger *l, const struct ledger_job *j, struct error *e)

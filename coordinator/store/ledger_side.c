@@ -208,7 +208,7 @@ int ledger_side_set(struct ledger_side *s, const char *name, const char *text, s
 	return rc;
 }
 
-static int unseal(const char *name, const char *stored, char **text, struct error *e)
+static int read_note_text(const char *name, const char *stored, char **text, struct error *e)
 {
 	size_t size;
 	if (note_rank(name, stored, &size) == NOTE_DAMAGED)
@@ -226,7 +226,7 @@ int ledger_side_note(struct ledger_side *side, const char *name, char **text, st
 	sqlite3_bind_text(s, 1, name, -1, SQLITE_STATIC);
 	int rc = sqlite3_step(s);
 	if (rc == SQLITE_ROW)
-		rc = unseal(name, text_at(s, 0), text, e);
+		rc = read_note_text(name, text_at(s, 0), text, e);
 	else
 		rc = rc == SQLITE_DONE ? error_set(e, ENOENT, "there is no %s", name) : ledger_file_error(side->db, e);
 	sqlite3_reset(s);

@@ -11,7 +11,7 @@
 
 static const char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
-static int letter(unsigned char c)
+static int digit_of_letter(unsigned char c)
 {
 	const char *at = c ? strchr(letters, c) : NULL;
 	return at ? (int)(at - letters) : -1;
@@ -38,7 +38,7 @@ static int64_t decode(const unsigned char *text, size_t n, unsigned char *out)
 		return -1;
 	uint32_t bits = 0;
 	for (size_t i = 0; i < n; i++) {
-		int x = letter(text[i]);
+		int x = digit_of_letter(text[i]);
 		if (x < 0)
 			return -1;
 		bits = bits << 6 | (uint32_t)x;

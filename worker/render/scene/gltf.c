@@ -203,7 +203,7 @@ static bool is_hidden(struct gltf *g, const struct gltf_at *node)
 
 /* Whether a scale of 0 in two or three directions leaves a line or a point of its mesh: animations hide things so. Not
  * of a skinned mesh, which is where its joints are. */
-static bool vanishes(const struct gltf_at *node, const mat4 *to_world)
+static bool is_scaled_away(const struct gltf_at *node, const mat4 *to_world)
 {
 	int flat = 0;
 	for (int k = 0; k < 3; k++)
@@ -221,7 +221,7 @@ static void visit_lists(struct gltf *g, const struct gltf_at *node, const mat4 *
 	if (hidden)
 		return;
 	const json_t *instances = gltf_extension(g, node, node->json, "EXT_mesh_gpu_instancing");
-	bool mesh = gltf_follow(g, node, node->json, "mesh", GLTF_MESHES, &what) > 0 && !vanishes(node, to_world);
+	bool mesh = gltf_follow(g, node, node->json, "mesh", GLTF_MESHES, &what) > 0 && !is_scaled_away(node, to_world);
 	if (mesh && instances)
 		gltf_mesh_instances(g, &what, node, instances, to_world);
 	else if (mesh)

@@ -30,7 +30,7 @@ static bool opens(const struct asset_source *assets, const char *name)
 	return true;
 }
 
-static const char *beside(const char *other, const char *name, struct arena *arena)
+static const char *name_beside(const char *other, const char *name, struct arena *arena)
 {
 	const char *slash = *name != '/' ? strrchr(other, '/') : NULL;
 	size_t folder = slash ? (size_t)(slash - other) + 1 : 0, size = folder + strlen(name);
@@ -60,8 +60,8 @@ const char *mtl_file(const struct asset_source *assets, const char *other, const
 		return NULL;
 	for (char *p = written; *p; p++)
 		*p = *p == '\\' ? '/' : *p; /* files written on Windows have it */
-	const char *last = strrchr(written, '/'), *out = beside(other, written, arena);
-	return !out || !last || opens(assets, out) ? out : beside(other, last + 1, arena);
+	const char *last = strrchr(written, '/'), *out = name_beside(other, written, arena);
+	return !out || !last || opens(assets, out) ? out : name_beside(other, last + 1, arena);
 }
 
 /* ---- reading */

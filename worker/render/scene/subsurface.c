@@ -220,15 +220,15 @@ static int settle_shape(struct maker *m, struct xml_element *shape)
 			dipole->file, dipole->line);
 }
 
-static int settle(struct maker *m, struct xml_element *el)
+static int settle_element(struct maker *m, struct xml_element *el)
 {
 	int r = strcmp(el->name, "shape") == 0 && !el->ignored ? settle_shape(m, el) : 0;
 	for (struct xml_element *c = el->first; c && !r; c = c->next)
-		r = settle(m, c);
+		r = settle_element(m, c);
 	return r;
 }
 
 int subsurface_settle(struct maker *m)
 {
-	return settle(m, m->tree->root);
+	return settle_element(m, m->tree->root);
 }

@@ -19,7 +19,8 @@ void texture_names_settle(const struct plugin_decl *decls, struct xml_element *r
 }
 
 /* The attributes of the spectrum under the name, if any, by which it is referred to. */
-static int become(struct xml_element *ref, const struct xml_element *spectrum, struct arena *arena, struct error *e)
+static int become_spectrum(struct xml_element *ref, const struct xml_element *spectrum, struct arena *arena,
+			   struct error *e)
 {
 	const char *name = xml_attribute(ref, "name");
 	struct xml_attribute *a = arena_alloc(arena, spectrum->attribute_count + 1, sizeof *a);
@@ -60,7 +61,7 @@ static int follow(struct xml_element *el, struct id_table *ids, struct arena *ar
 		if (*bytes > XML_FILES_BYTES)
 			return xml_error(el, e, E2BIG, "spectra have more than %d MB when all references are followed",
 					 XML_FILES_BYTES >> 20);
-		return become(el, target, arena, e);
+		return become_spectrum(el, target, arena, e);
 	}
 	int r = 0;
 	for (struct xml_element *c = el->first; c && !r; c = c->next)

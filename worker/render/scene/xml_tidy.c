@@ -38,7 +38,7 @@ static bool starts(const struct pass *p, const char *with)
 }
 
 /* The place behind the markup of this kind that begins here; NULL: none does, or it has no end. */
-static const char *behind(struct pass *p, enum kind kind)
+static const char *end_of_markup(struct pass *p, enum kind kind)
 {
 	const char *closing = markup[kind].closing;
 	size_t n = strlen(closing);
@@ -69,15 +69,15 @@ static bool is_entity(const struct pass *p)
 /* One piece of markup, or one character. */
 static void step(struct pass *p)
 {
-	const char *to = behind(p, COMMENT);
+	const char *to = end_of_markup(p, COMMENT);
 	if (to) {
 		copy_to(p, to, true);
 		return;
 	}
 	bool blank = number_is_blank(*p->at);
-	if (!p->begun && (to = behind(p, DECLARATION))) {
+	if (!p->begun && (to = end_of_markup(p, DECLARATION))) {
 		copy_to(p, to, true);
-	} else if ((to = behind(p, CDATA)) || (to = behind(p, INSTRUCTION))) {
+	} else if ((to = end_of_markup(p, CDATA)) || (to = end_of_markup(p, INSTRUCTION))) {
 		copy_to(p, to, false);
 	} else if (*p->at == '&' && !is_entity(p)) {
 		memcpy(p->out, amp, sizeof amp - 1);
