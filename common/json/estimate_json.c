@@ -7,7 +7,7 @@
 
 #include "common/base/text.h"
 #include "common/estimate/strategy.h"
-#include "common/json/whole.h"
+#include "common/json/compose.h"
 
 #include <math.h>
 #include <string.h>

@@ -16,7 +16,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/json/estimate_json.h"
-#include "common/json/whole.h"
+#include "common/json/compose.h"
 
 #include <math.h>
 #include <string.h>

@@ -368,7 +368,7 @@ static void write_folder(const struct faulty_disk_node *n, const char *path, con
 	}
 }
 
-static void go_dark(void)
+static void lose_power(void)
 {
 	static const double shares[] = {0, 0.1, 0.5, 0.9, 1};
 	uint64_t lost = 0;
@@ -384,7 +384,7 @@ static void go_dark(void)
 void faulty_disk_power_off(void)
 {
 	pthread_mutex_lock(&mutex);
-	go_dark();
+	lose_power();
 }
 
 int faulty_disk_enter(enum faulty_disk_call what)
@@ -396,7 +396,7 @@ int faulty_disk_enter(enum faulty_disk_call what)
 		since_failure += setup.lose_after && atomic_load(&failed);
 		if (changing_calls == setup.lose_at || (setup.lose_after && since_failure == setup.lose_after) ||
 		    atomic_load(&setup.counts[4]))
-			go_dark();
+			lose_power();
 	}
 	if (!setup.fail_from || calls < setup.fail_from || calls - setup.fail_from >= setup.fail_count)
 		return 0;

@@ -168,7 +168,7 @@ void faulty_disk_vfs_begin(void)
 {
 	system_vfs = sqlite3_vfs_find(NULL);
 	vfs = *system_vfs; /* what is not of files is the system's */
-	vfs.zName = "lossy";
+	vfs.zName = "faulty_disk";
 	vfs.szOsFile = sizeof(struct file);
 	vfs.xOpen = x_open;
 	vfs.xDelete = x_delete;

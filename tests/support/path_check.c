@@ -114,7 +114,7 @@ bool path_check(struct path_context *c, const struct full_path *x, char *text, s
 	}
 	struct full_path *film = copy_of(x);
 	double off = fmax(1e-6, FILM_TOLERANCE * c->w->camera.scale);
-	if (!whole_film(c, film) || hypot(film->film[0] - x->film[0], film->film[1] - x->film[1]) > off) {
+	if (!full_path_project(c, film) || hypot(film->film[0] - x->film[0], film->film[1] - x->film[1]) > off) {
 		snprintf(text, size, "the film point (%g, %g) is (%g, %g)", x->film[0], x->film[1], film->film[0],
 			 film->film[1]);
 		return false;

@@ -295,7 +295,7 @@ enum proposal_end breakup_propose(struct mutation_ctx *m, const struct breakup *
 		return PROPOSAL_BLOCKED;
 	if (EFFECT_IS_ON(c->w, scattering) && !full_path_is_made(c, y))
 		return PROPOSAL_DARK;
-	return b < k || whole_film(c, y) ? PROPOSAL_MADE : PROPOSAL_OUTSIDE;
+	return b < k || full_path_project(c, y) ? PROPOSAL_MADE : PROPOSAL_OUTSIDE;
 }
 
 /* Cosines, distances and Jacobians that do not cancel between f and T, by sec. 5: one geometric normal, at x_{b-1}. */

@@ -249,7 +249,7 @@ bool full_path_see_media(struct path_context *c, struct full_path *x)
 	return true;
 }
 
-bool whole_film(const struct path_context *c, struct full_path *x)
+bool full_path_project(const struct path_context *c, struct full_path *x)
 {
 	const struct full_path_edge *e = &x->edge[x->edges - 1];
 	struct camera room;
@@ -343,7 +343,7 @@ bool full_path_finish(struct path_context *c, struct full_path *x)
 		if (!mode || mode != (x->v[j].mode & (BSDF_REFLECT | BSDF_TRANSMIT)))
 			return false;
 	}
-	if (!whole_film(c, x))
+	if (!full_path_project(c, x))
 		return false;
 	if (EFFECT_IS_ON(c->w, scattering) && !(full_path_see_media(c, x) && full_path_is_made(c, x)))
 		return false;

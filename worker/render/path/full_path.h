@@ -110,7 +110,7 @@ bool full_path_visible(struct path_context *c, struct full_path *x, unsigned e);
 bool full_path_see_media(struct path_context *c, struct full_path *x);
 
 /* Where v[edges - 1] lies on the film as seen from v[edges]; false: outside the window that is sampled. */
-bool whole_film(const struct path_context *c, struct full_path *x);
+bool full_path_project(const struct path_context *c, struct full_path *x);
 
 /* The technique with the most light vertices: fewer than all where media do not fit together (path/media.h). */
 unsigned full_path_most_light(const struct path_context *c, const struct full_path *x);

@@ -152,7 +152,7 @@ static enum proposal_end no_way_back(const struct mutation_ops *self, struct mut
 		if (!y->v[ends[i]].mode)
 			return PROPOSAL_MODE;
 	}
-	return move->b < y->edges || whole_film(m->path, y) ? PROPOSAL_MADE : PROPOSAL_OUTSIDE;
+	return move->b < y->edges || full_path_project(m->path, y) ? PROPOSAL_MADE : PROPOSAL_OUTSIDE;
 }
 
 /* The emitter's point as if all points were as likely. */

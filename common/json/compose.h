@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* JSON values that are whole or NULL: if memory runs out for a part, the rest is freed. Any thread. */
-#ifndef COMMON_JSON_WHOLE_H
-#define COMMON_JSON_WHOLE_H
+/* Composes JSON values: if memory runs out for a part, the rest is freed, and the result is NULL. Any thread. */
+#ifndef COMMON_JSON_COMPOSE_H
+#define COMMON_JSON_COMPOSE_H
 
 #include <jansson.h>
 
