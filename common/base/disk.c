@@ -91,7 +91,8 @@ int disk_write_all(int fd, const void *bytes, size_t size)
 	return 0;
 }
 
-/* Removes what has the name: it may be a link to a file of somebody else's, or be open to more readers. */
+/* Creates a new file and never writes into an existing one, which may be a link to somebody else's file, or open in
+ * another process with fewer restrictions: that one is unlinked first. */
 static int open_new(const char *path, mode_t mode)
 {
 	int fd = disk_open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);

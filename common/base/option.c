@@ -156,7 +156,7 @@ static int take_time(const struct option_row *r, void *field, const char *arg, s
 	return 0;
 }
 
-/* Above 1 it is asked back: 5 may mean 5 percent, and 150% may be a slip of 1.5%. */
+/* A ratio above 1 is refused with a question: 5 may mean 5 percent, and 150% may be a slip of 1.5%. */
 static int take_ratio(const struct option_row *r, void *field, const char *arg, struct error *e)
 {
 	double x = 0;

@@ -71,7 +71,7 @@ int target_find(struct target *t, const char *path, struct error *e)
 			return 0;
 		}
 		if (lstat(t->path, &st))
-			return 0; /* left to whoever writes there to report */
+			return 0; /* the caller reports it when writing fails */
 		if (S_ISDIR(st.st_mode))
 			return error_set(e, EISDIR, "%s: is a folder", path);
 		t->through = !S_ISREG(st.st_mode);

@@ -175,8 +175,8 @@ static bool in_doubt(const struct forecast_look *l)
 	return l->doubtful || rare_factor(l) > 0;
 }
 
-/* Looks `first` .. of h, but for those whose upper end is only a multiple of the estimate: without any other, that of
- * chi-square. */
+/* From the looks of h from `first` on, without those whose upper end is only a multiple of the estimate; if there are
+ * no others, the margin is that of chi-square. */
 static void fit_margin(struct fit *f, const struct forecast_history *h, uint32_t first)
 {
 	double sum = 0, square = 0, n = 0;

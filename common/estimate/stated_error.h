@@ -36,7 +36,7 @@ void stated_error(const struct canvas_image *img, char *text, size_t size);
 double stated_error_upper(const struct canvas_image *img, bool *doubtful);
 /* That is below or at the target: what ends a render. */
 bool stated_error_meets(const struct canvas_image *img, double target);
-/* The factor by which such an `upper` was made of a relative error; 0: it is that of an interval. */
+/* The factor by which a relative error was multiplied to give this `upper`; 0: it is the end of an interval. */
 double stated_error_rare_factor(double error, double upper);
 /* The estimate at which a render stops while its light is rare, by this factor; 0: it is not known yet,
  * and taken to be the smaller one, as it is most often. */

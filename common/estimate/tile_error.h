@@ -12,7 +12,7 @@
 
 /* With fewer groups there is no trimmed mean, and no colours cancel. */
 enum { BASE_GROUPS = 8 };
-/* Powers of two above the floor that are told apart. */
+/* The number of powers of two above the floor that are distinguished. */
 enum { BASE_POWERS = 32 };
 
 /* A tile being worked on. Rows of `apart` hold three channels of `groups` values. */

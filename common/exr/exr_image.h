@@ -33,10 +33,11 @@ struct exr_image {
 	struct exr_attribute *attributes; /* when read: all hslt:* attributes of these types; owned */
 };
 
-/* The number of the channel of that name; EXR_CHANNELS_MOST: there is none. */
+/* The index of the channel with this name; EXR_CHANNELS_MOST: no such channel. */
 uint32_t exr_channel(const struct exr_image *img, const char *name);
-const float *exr_plane(const struct exr_image *img, const char *name);			       /* NULL: there is none */
-const struct exr_attribute *exr_attribute_find(const struct exr_image *img, const char *name); /* likewise */
+const float *exr_plane(const struct exr_image *img, const char *name); /* NULL: no such channel */
+/* NULL: no such attribute */
+const struct exr_attribute *exr_attribute_find(const struct exr_image *img, const char *name);
 
 /* bytes are mem_alloc'd; free them with mem_free. */
 int exr_write(const struct exr_image *img, unsigned char **bytes, size_t *size, struct error *e);

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * header_fill goes through plan, result and extras in the order of header_list.h. Text goes into one buffer of fixed
- * size; what does not fit is cut at its end, which is not an error.
+ * header_fill goes through plan, result and extras in the order of header_list.h, and makes an attribute of each value
+ * that is there. Text goes into one buffer of fixed size; what does not fit is cut at its end, which is not an error.
+ * Nothing fails.
  */
 #include "common/exr/header.h"
 

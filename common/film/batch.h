@@ -65,7 +65,7 @@ enum batch_counter {
 	COUNT_SPREAD_RAYS,	/* rays that these chains took, part of COUNT_RAYS_CLOSEST and COUNT_RAYS_SHADOW */
 };
 
-/* All rays. Of one batch: its counters are bounded, those of many may be saturated. */
+/* All rays of one batch, whose counters are bounded. Not for sums of many batches, which may be saturated. */
 static inline uint64_t batch_rays(const uint64_t counters[BATCH_COUNTERS])
 {
 	return counters[COUNT_RAYS_CLOSEST] + counters[COUNT_RAYS_SHADOW];

@@ -126,7 +126,7 @@ int canvas_save(const struct canvas *c, struct checked_file *out, struct error *
 	return rc ? rc : save_tiles(c, out, e);
 }
 
-/* A count that never becomes that of all leases would leave its round open for ever. */
+/* With a count that never reaches the number of all leases, its round would stay open for ever. */
 static int check_merged(const struct canvas *c, struct error *e)
 {
 	uint32_t leases = c->plan.groups * c->plan.parts, merged[1 + OPEN_ROUNDS] = {0};

@@ -37,7 +37,7 @@ static inline enum path_class_kind path_class_kind_next(enum path_class_kind kin
 	return (enum path_class_kind)next[kind][smooth];
 }
 
-/* The kind of a path whose inner vertices are those of `camera` and then those of `light`. */
+/* The class of a path whose inner vertices are the vertices of `camera`, then those of `light`. */
 static inline enum path_class_kind path_class_kind_join(enum path_class_kind camera, enum path_class_kind light)
 {
 	/* Row: the kind of the vertices so far; column: the kind of those that follow, in the order of the enum. */

@@ -465,8 +465,8 @@ int authority_issue(const char *folder, const char *name, enum tls_role role, do
 	return rc;
 }
 
-/* Calls `each` for every certificate in issued/, until it fails. What is no certificate keeps nobody from the others:
- * damage says what is wrong with the first such file; "": there is none. */
+/* Calls `each` for every certificate in issued/, until it fails. Files that are not certificates are skipped; damage
+ * says what is wrong with the first of them; "": all are certificates. */
 static int for_each_issued(const char *folder,
 			   int (*each)(void *user, X509 *cert, const struct tls_peer *who, struct error *e), void *user,
 			   struct error *damage, struct error *e)

@@ -101,7 +101,7 @@ struct plan {
 	 * "tolerance=1e-05". Effects whose choice was overridden: "all", "-dispersion,+aperture". Empty: nothing
 	 * differs. */
 	char accuracy[PLAN_ACCURACY_MAX], effects[PLAN_EFFECTS_MAX];
-	struct plan_unseen unseen; /* changes no bit of the image, but what is said of its error */
+	struct plan_unseen unseen; /* changes no bit of the image, only the error that is stated */
 };
 
 /* Their numbers, but for the kind: those that a plan has from its request, and those that plan_make may choose.

@@ -291,7 +291,7 @@ static void note_failure(struct farm *f, struct peer *p, struct job *j, const st
 {
 	text_copy(p->text, sizeof p->text, ev->text ? ev->text : "");
 	text_print(f->text, sizeof f->text, "%s: %s", p->name, p->text);
-	if (!ev->lease.later) /* that is no failure, and true for a while only: status.c tells it from the worker */
+	if (!ev->lease.later) /* this is not a failure, and lasts only a while: status.c reads it from the worker */
 		text_copy(j->text, sizeof j->text, f->text);
 }
 

@@ -77,8 +77,8 @@ double job_progress(const struct job *j, double now)
 	return fmin(1, fmax(j->progress_floor, p));
 }
 
-/* The rate of the bootstrap does not tell that of rounds: that of `path` is so short that its leases are mostly waits.
- */
+/* The rate during the bootstrap does not predict the rate of rounds: the bootstrap of `path` is so short that its
+ * leases mostly wait. */
 static double seconds_left(const struct job *j, double total, bool idle, double now)
 {
 	double left = INFINITY, rate = idle || !j->leases_merged ? 0 : rate_value(&j->rate, now);

@@ -30,8 +30,8 @@ static void call_again(struct farm *f, double at)
 		f->schedule_at = at;
 }
 
-/* The worker that has waited longest and does not hold the slot. If there is none and `again`, one that holds it
- * overdue. */
+/* The worker that has waited longest and does not hold the slot. If there is none and `again` is set, one whose lease
+ * of the slot is overdue. */
 static struct peer *waiting_in(struct farm *f, const struct peer_class *c, const struct job *j, const struct slot *s,
 			       bool again)
 {

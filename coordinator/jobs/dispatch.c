@@ -45,8 +45,8 @@ static int store_submission(struct jobs *jobs, uint64_t id, const struct submiss
 		memset(&(*job)->submit, 0, sizeof(*job)->submit);
 		live_job_free(*job);
 	}
-	if (rc)
-		spool_drop_job(jobs->spool, id, NULL); /* what is left has no row, and goes at the next start */
+	if (rc) /* files that are left belong to no row, and are deleted at the next start */
+		spool_drop_job(jobs->spool, id, NULL);
 	return rc;
 }
 

@@ -96,7 +96,7 @@ int durable_begin(struct jobs *jobs, struct live_job *job, struct error *e)
 	if (!rc) {
 		j.record = record;
 		rc = ledger_add(jobs->ledger, &j, e);
-		if (rc) /* in case it was written after all: nobody waits for the job */
+		if (rc) /* in case it was written in spite of the error: the client is told that it failed */
 			ledger_forget(jobs->ledger, job->id, NULL);
 	}
 	mem_free(record);

@@ -94,7 +94,7 @@ static void read_first(struct jobs *jobs)
 		jobs_in_pool(jobs, &c->work, c, read_some, on_read);
 }
 
-/* Whoever waits for the first one goes on. */
+/* Those who wait for the first file continue. */
 static void finish_first(struct jobs *jobs)
 {
 	struct file_check *c = STAILQ_FIRST(&jobs->checks);

@@ -90,7 +90,7 @@ static int read_old_job(const struct jobs *jobs, uint64_t id, struct old_job *ol
 	return rc == -ENOENT || rc == -EBADMSG ? 0 : rc;
 }
 
-/* Of what is left of a job that has ended. */
+/* The row of a job that has ended, made from its record. */
 static void row_of_record(const struct job_record *r, struct ledger_job *j)
 {
 	*j = (struct ledger_job){.id = r->id,

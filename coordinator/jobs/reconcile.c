@@ -35,7 +35,7 @@ static void log_fault(uint64_t id, const char *what)
 
 /* ---- lost jobs ---- */
 
-/* Its folder is kept, for somebody who knows more. */
+/* Its folder is kept, so that an operator can look into it. */
 static int move_to_lost(struct looking *l, uint64_t id, const char *why, struct error *e)
 {
 	const struct spool *spool = l->jobs->spool;
@@ -122,7 +122,7 @@ static int look_at(struct looking *l, uint64_t id, struct error *e)
 	if (rc)
 		return is_lost(l, id, "jobs.db and jobs-copy.db have no row for it, and its folder has results", e);
 	struct error left;
-	if (spool_drop_job(l->jobs->spool, id, &left)) /* of no use to anybody, and in nobody's way */
+	if (spool_drop_job(l->jobs->spool, id, &left)) /* a folder that cannot be deleted does no harm */
 		log_fault(id, left.text);
 	return 0;
 }

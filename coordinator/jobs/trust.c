@@ -3,7 +3,8 @@
  * Quarantined workers are a note in the ledger, which is told to the core at the start and written again whenever the
  * core finds one; wrong results are counted, named in the job's note and logged.
  *
- * A note that cannot be read is put by, and a list that cannot be written is logged: the farm stops for neither.
+ * A note that cannot be read is kept under another name, and a list that cannot be written is logged; neither stops the
+ * farm.
  */
 #include "coordinator/jobs/trust.h"
 
@@ -95,7 +96,7 @@ static void tell_unforgiven(const struct jobs *jobs, const json_t *list)
 static const char empty[] = "{\"schema\": 1, \"workers\": []}";
 
 /* The farm does not stop for it: a worker that gives wrong results will do so again, and be found again. */
-static int put_by(struct jobs *jobs, const char *text, struct error *e)
+static int keep_damaged_note(struct jobs *jobs, const char *text, struct error *e)
 {
 	log_event(LOG_SPOOL_FAULT,
 		  "text=\"the note %s in jobs.db is no list of workers: it is kept as %s-damaged, and nobody in it is "
@@ -120,7 +121,7 @@ int trust_open(struct jobs *jobs, struct error *e)
 	json_t *o = json_loads(text, JSON_REJECT_DUPLICATES, NULL);
 	const json_t *list = json_object_get(o, "workers");
 	if (!json_is_array(list))
-		rc = put_by(jobs, text, e);
+		rc = keep_damaged_note(jobs, text, e);
 	for (size_t i = 0; i < json_array_size(list); i++)
 		tell_core(jobs, json_array_get(list, i));
 	if (!rc)

@@ -48,7 +48,7 @@ struct session {
 	struct {
 		uint64_t job;
 		double at;    /* s of the loop's clock */
-	} ended;	      /* the watched job whose end it was told: it will fetch the result */
+	} ended;	      /* the watched job of whose end the client knows: it will fetch the result */
 	struct fetching {     /* a file being received */
 		uint64_t job; /* 0: none */
 		Farm__What what;
@@ -60,7 +60,7 @@ struct session {
 	struct job_view *shown;	  /* what was last sent to the watcher */
 	STAILQ_HEAD(, held) held; /* requests that wait until the jobs are read */
 	size_t held_bytes;
-	uint64_t turn; /* number of its last request, of those of all */
+	uint64_t turn; /* the number of its last request; all sessions share one counter */
 	double told;   /* s of the loop's clock: the last heartbeat sent meanwhile */
 };
 

@@ -4,8 +4,8 @@
 #include <math.h>
 #include <string.h>
 
-/* Samples or mutations requested, as plan_make counts them; if there was no such bound, or it was that of a cancelled
- * extension, those that are done. */
+/* Samples or mutations requested, as plan_make counts them; those that are done if there was no such bound, or if it
+ * came from a cancelled extension. */
 static uint64_t total_of(const struct plan *p, const struct plan_request *asked, const struct extension_from *from)
 {
 	uint64_t pixels = (uint64_t)p->crop_width * p->crop_height, total = 0, rounds = from->rounds;

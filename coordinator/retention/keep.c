@@ -73,7 +73,7 @@ void keep_trim(const struct jobs *jobs)
 void ended_jobs_add(struct jobs *jobs, const struct job_record *r)
 {
 	if (jobs->ended_count == ENDED_MAX) {
-		keep_drop(jobs, jobs->ended[0].id); /* nobody would count its films any more */
+		keep_drop(jobs, jobs->ended[0].id); /* it leaves the list by which films are counted */
 		memmove(jobs->ended, jobs->ended + 1, --jobs->ended_count * sizeof *jobs->ended);
 	}
 	jobs->ended[jobs->ended_count++] = *r;

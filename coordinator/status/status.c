@@ -491,7 +491,7 @@ static void look_for_file(struct status_socket *t)
 		return;
 	int fd = socket_file_open(&t->file, &e), rc = fd < 0 ? fd : listen_on(t, fd, &e);
 	if (rc) {
-		socket_file_remove(&t->file); /* it may be there, with nobody behind it */
+		socket_file_remove(&t->file); /* the file may still exist, although no socket listens on it */
 		error_prefix(&e, rc, "the status socket's file was removed, and cannot be made anew yet");
 		report_once(t, e.text);
 		return;

@@ -197,7 +197,7 @@ void journal_release(struct journal *j)
 	if (!j || atomic_fetch_sub(&j->holders, 1) > 1)
 		return;
 	if (j->fd >= 0 && !j->bad) {
-		int rc = j->settled ? 0 : write_waiting(j); /* nobody was told that it is stored */
+		int rc = j->settled ? 0 : write_waiting(j); /* it was never acknowledged */
 		if (!rc && j->room > j->written)
 			rc = cut_off(j); /* otherwise it goes with the file */
 		(void)rc;

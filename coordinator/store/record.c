@@ -4,8 +4,8 @@
  *
  * record_to_json writes everything that is kept of a job, record_from_json reads it back; a missing key, because an
  * older version wrote the file, is zero, unknown or "". Plain fields and counters are generated from the list in
- * coordinator/core/job_fields.h. The checksum is over the content with sorted keys, so that
- * formatting does not matter.
+ * coordinator/core/job_fields.h. The checksum is over the content with sorted keys, so
+ * that formatting does not matter.
  *
  * A text that is not UTF-8 is -EINVAL, and the record is not written. A damaged file is -EBADMSG, one of another schema
  * -EPROTO. A record without a checksum is of an earlier version and trusted.

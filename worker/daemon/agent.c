@@ -266,7 +266,7 @@ static void on_pulse(uv_timer_t *t)
 	begin_leaving(a);
 }
 
-/* Often enough for whoever watches; not at all if nobody does. */
+/* Often enough to be watched; not sent if nobody watches. */
 static void start_pulse(struct agent *a)
 {
 	double watchdog = notify_watchdog(), idle = a->config.idle_seconds, wait = 1;

@@ -44,7 +44,7 @@ struct job_cache {
 		size_t file;
 		bool more;
 		bool failed;			  /* the file cannot be used: it is fetched */
-		const bool *stop;		  /* nothing more is to be read */
+		const bool *stop;		  /* there is nothing more to read */
 		void (*done)(struct job_cache *); /* on the loop's thread */
 	} reading;
 	struct world *world;

@@ -24,7 +24,7 @@ void send_job_get(struct agent *a, uint64_t job)
 	send_message(a, ENVELOPE(JOB_GET, job_get, .job = job));
 }
 
-/* Whose: the job's; this machine's; nobody's, since another scene is in memory. */
+/* Whose fault it is: the job's, this machine's, or none, because another scene is in memory. */
 enum fault { FAULT_JOB, FAULT_OWN, FAULT_LATER };
 
 /* states: digest of the chain states that are at fault; NULL: none are. */

@@ -29,7 +29,7 @@ struct stats_point {
 	double bias_suspect;	  /* lower bound of the bias by this setting's own interval, 0: it contains 0 */
 	double bias_seen;	  /* ... when all settings are tested together: not explained by chance */
 	double bias_bound;	  /* upper bound */
-	bool other_image;	  /* known to be biased, seen or not: it beats nobody */
+	bool other_image; /* biased by design, whether or not it shows: it is never better than another setting */
 };
 
 /*

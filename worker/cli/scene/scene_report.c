@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The scene is read such that every problem is found (scene_read_all); then meshes, images and combinations of
- * values are checked as a worker would, again all of them, but where the reader has found something, only what does
- * not follow from that is said. `show` collects everything as JSON, from
- * which the text is made.
+ * The scene is read such that every problem is found (scene_read_all). Then all meshes, images and combinations of
+ * values are checked as a worker would check them; problems that only follow from one that the reader has found are
+ * not reported. `show` collects everything as JSON, from which the text is made.
  *
  * For a scene that cannot be rendered the exit code is 1, with one line per problem; a file that cannot be read at all
  * gets only that line.

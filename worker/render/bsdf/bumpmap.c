@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Another BSDF on a surface whose shading normals are bent by a height (`bumpmap`) or given by an image or one colour
- * (`normalmap`).
- * The BSDF itself is the inner one: the normals are bent by the geometry (worker/render/geom/relief.h), so that half
- * vectors and their derivatives take it into account.
+ * (`normalmap`). The BSDF itself is the inner one: the normals are bent by the geometry (worker/render/geom/relief.h),
+ * so that half vectors and their derivatives take it into account.
  *
  * Refused when it is created: anything but one texture (for `bumpmap`) and one BSDF inside, and such a map in another.
  */

@@ -5,7 +5,7 @@
 
 #include "worker/render/bsdf/bsdf.h"
 
-/* Puts `ops`, whose data is a BSDF, around b: all that b says of itself stays. */
+/* Wraps b in `ops`, whose data is a BSDF; all properties of b stay. */
 int bsdf_wrap(struct bsdf *b, const struct bsdf_ops *ops, const struct scene_node *n, const struct bsdf_build *build,
 	      struct error *e);
 

@@ -34,7 +34,7 @@ struct hair_fibre {
 #define HAIR_ROUGHNESS_MIN 1e-3
 void hair_fibre_set(struct hair_fibre *f, double eta, double along, double around, double tilt);
 
-/* Light from the direction of a camera, or to it, as it enters. */
+/* How a ray enters the fibre, from the camera's side. */
 struct hair_entry {
 	double reflected, transmitted; /* Fresnel's shares */
 	double gamma_t;		       /* inside; meaningless if nothing is transmitted */

@@ -60,7 +60,7 @@ static void place_of(struct angles a, double place[2])
 	place[1] = y - floor(y);
 }
 
-/* What is asked of the tables about a direction to the camera. */
+/* The values from the tables that depend only on the direction to the camera. */
 struct view {
 	const struct measured *m;
 	struct turn turn;

@@ -288,7 +288,7 @@ static spectrum reflected_value(const struct principled_point *s, vec3 wo, vec3 
 	return f;
 }
 
-/* Only what is asked for: `value`, or the density if the chances of sampling the lobes are given. */
+/* Computes `value`, or the density if the probabilities of the lobes are given. */
 static struct pair pair_of(const struct principled_point *s, vec3 wo, vec3 wi, enum transport transport, bool value,
 			   const double *chance)
 {
@@ -487,7 +487,7 @@ const struct bsdf_ops bsdf_ops_principled = {
 		       PRINCIPLED_SHARE("anisotropic"), PRINCIPLED_SHARE("coat"), PRINCIPLED_SHARE("coat_roughness"),
 		       {.name = "specular_color", .types = VALUE_TEXTURE, .min = 0, .max = 1},
 		       {.name = "lambertian", .types = VALUE_BOOL},
-		       {.name = "thin", .status = PARAM_REFUSED}, /* what is meant is `principledthin` */
+		       {.name = "thin", .status = PARAM_REFUSED}, /* use `principledthin` instead */
 		       {.name = "specular", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 8},
 		       {.name = "eta", .types = VALUE_FLOAT | VALUE_INT, .min = 1, .max = 10},
 		       {.name = "diffuse_reflectance_sampling_rate", .status = PARAM_IGNORED},

@@ -41,7 +41,7 @@ static bool same_side(vec3 a, vec3 b)
 	return a.z * b.z > 0;
 }
 
-/* What makes f of the inner frame that of the outer one; 0 where it is black. */
+/* The factor that converts f from the inner frame to the outer one; 0 where it is black. */
 static double factor(const struct bsdf_point *p, vec3 wo, vec3 wi, vec3 wo_in, vec3 wi_in)
 {
 	if (!same_side(wo, wo_in) || !same_side(wi, wi_in))

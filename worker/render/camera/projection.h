@@ -14,7 +14,7 @@ struct camera_projection {
 	bool all_around; /* it looks backwards, too, and has no clipping planes */
 	/* -EINVAL with a sentence; NULL: nothing is to be done. */
 	int (*init)(struct camera *c, const struct scene_settings *s, struct error *e);
-	/* Where a film point looks, not normalised; false: it is none. */
+	/* The direction in which a film point looks, not normalised; false: the projection has no such point. */
 	bool (*direction)(const struct camera *c, double film_x, double film_y, vec3 *l);
 	/* Of a unit direction. */
 	bool (*project)(const struct camera *c, vec3 l, double *film_x, double *film_y);

@@ -38,7 +38,7 @@ static unsigned vertex_count(const struct world *w, unsigned edges)
 #define ROUNDING 0x1p-48
 /* Walks meet specular directions far more exactly. */
 #define SPECULAR 1e-3
-/* Of the contribution: workers of other numeric fingerprints round otherwise. */
+/* Tolerance of the contribution: workers with other numeric fingerprints round differently. */
 #define CONTRIBUTION 1e-6
 
 /* ---- writing */

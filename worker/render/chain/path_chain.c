@@ -28,7 +28,7 @@ struct path_chain {
 	struct path_place place[2];
 	struct path_place *current, *proposal; /* the proposal's path equals the current one between steps */
 	size_t began_size;		       /* the path with which the epoch began, as bytes */
-	uint8_t began[WHOLE_BYTES];
+	uint8_t began[PATH_BYTES_MAX];
 };
 
 static struct path_chain *path_of(struct chain *c)
@@ -62,7 +62,7 @@ static bool start(struct chain *base, uint64_t bootstrap_index)
 {
 	static const struct full_path black = {0};
 	struct path_chain *c = path_of(base);
-	uint8_t bytes[WHOLE_BYTES];
+	uint8_t bytes[PATH_BYTES_MAX];
 	set_up(c);
 	c->current->path.edges = 0;
 	bool ok = bootstrap_index == UINT64_MAX ||
@@ -91,7 +91,7 @@ static bool resume(struct chain *base, const struct chain_state *state)
 static int save(struct chain *base, struct chain_state *out)
 {
 	struct path_chain *c = path_of(base);
-	uint8_t bytes[CHAIN_STATE_HEAD + WHOLE_BYTES];
+	uint8_t bytes[CHAIN_STATE_HEAD + PATH_BYTES_MAX];
 	_Static_assert(sizeof bytes <= CHAIN_STATE_MAX, "a coordinator would refuse it");
 	size_t size = path_write(base->context, &c->current->path, &c->proposal->path, bytes + CHAIN_STATE_HEAD);
 	if (size == 0) {

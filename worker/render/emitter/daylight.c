@@ -86,7 +86,7 @@ static double at_wavelength(const double table_of[TABLE_COUNT], double nm)
 	return table_of[low] + (x - low) * (table_of[low + 1] - table_of[low]);
 }
 
-/* What an amount x of an absorber lets through. */
+/* The transmittance of an amount x of an absorber. */
 static double through_vapour(double x)
 {
 	return exp(-0.2385 * x / pow(1 + 20.07 * x, 0.45));

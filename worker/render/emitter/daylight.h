@@ -37,7 +37,7 @@ struct daylight_time {
 /* x east, y up, z south: Blanco-Muriel et al. 2001, "Computing the Solar Vector", by which both Mitsubas go. Good to an
  * arcminute until 2050. */
 vec3 daylight_position(const struct daylight_time *t);
-/* From the day of one to that of the other. A day beyond the month's end counts on into the next. */
+/* Days from one date to the other. A day beyond the month's end counts on into the next month. */
 int daylight_days_between(const struct daylight_time *from, const struct daylight_time *to);
 
 #endif

@@ -11,7 +11,7 @@
 
 #include <string.h>
 
-/* Newton's iteration at least halves what is left: some 20 for lengths that differ by 2^16. */
+/* Newton's iteration at least halves the error: some 20 steps for lengths that differ by 2^16. */
 enum { POLAR_STEPS = 100 };
 
 static double norm3(const double a[3][3])

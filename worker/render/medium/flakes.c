@@ -10,7 +10,7 @@
 /* Areas, squared; and what counts as a matrix of zeros. */
 #define LARGEST 1e12
 #define SMALLEST 1e-30
-/* A matrix may miss being definite by that share of its trace, as those of bytes do. */
+/* A matrix may fail to be positive definite by this share of its trace, as matrices stored in bytes do. */
 #define ROUNDED 0.01
 
 /* The smallest eigenvalue, in closed form (Smith 1961, Eigenvalues of a Symmetric 3 x 3 Matrix). */

@@ -43,7 +43,7 @@ const struct plugin_decl medium_decls[] = {
 /* Mitsuba 3's defaults. */
 static const double default_sigma_t = 1, default_albedo = 0.75;
 
-/* What the file does not state of 0.6's two coefficients, or coefficient and share: that of skin1. */
+/* Where a file of 0.6 lacks one of two coefficients, or of coefficient and share, it is that of skin1. */
 static int fill_in(struct medium *m, const struct scene_node *n)
 {
 	char list[2];

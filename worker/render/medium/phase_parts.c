@@ -52,7 +52,7 @@ double phase_parts_eval(const struct phase *p, vec3 at, double cosine)
 	return sum;
 }
 
-/* u chooses the part, and what is left of it is the number for that part. */
+/* u chooses the part; rescaled to [0,1), it is then the random number of that part. */
 double phase_parts_sample(const struct phase *p, vec3 at, double u)
 {
 	const struct phase_parts *m = p->data;

@@ -242,7 +242,7 @@ static bool media_hold(const struct path_context *c, const struct full_path *y, 
 	return path_medium_after(c->w, v, v->edge.medium, to_light) == y->v[c_end - 1].edge.before;
 }
 
-/* Edges let through another share of another wavelength's light. */
+/* At another wavelength, the media transmit another share of the light along each edge. */
 static bool see_wavelength(struct path_context *c, const struct full_path *x, struct full_path *y, struct move *move)
 {
 	if (!EFFECT_IS_ON(c->w, scattering) || y->wavelength == x->wavelength)
@@ -305,7 +305,7 @@ static double log_geometry(const struct path_context *c, const struct full_path 
 		return 0;
 	const struct full_path_edge *e = &x->edge[b - 1];
 	double log_g = log(path_cosine(&x->v[b - 1], e->w) / e->distance2);
-	if (c_end > 0 && full_path_turned(x, c_end)) /* it stays, but its normal is that of x or of y alone */
+	if (c_end > 0 && full_path_turned(x, c_end)) /* it does not move, but has the normal of x or of y */
 		log_g += log(full_path_cosine_to_light(x, c_end) /
 			     fabs(vec3_dot(x->v[c_end].x.sh.n, x->edge[c_end - 1].w)));
 	struct camera room;

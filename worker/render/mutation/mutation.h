@@ -69,7 +69,7 @@ enum proposal_end {
 	PROPOSAL_DARK,
 	PROPOSAL_INAPPLICABLE,
 };
-/* That of a reason. */
+/* The counter of a reason. */
 enum strategy_counter proposal_counter(enum proposal_end reason);
 
 struct mutation_ops {

@@ -11,7 +11,7 @@ struct strategy {
 	const struct heuristic *heuristic;
 	int b, c;				      /* a number, or one of the above */
 	bool halfvecs, wavelength, aperture, emitter; /* see struct breakup */
-	bool wavelength_in_media; /* even where each edge then lets through another share of light */
+	bool wavelength_in_media; /* even where media then transmit another share of light along each edge */
 };
 
 /* A breakup by self's strategy; `how` takes precedence. */

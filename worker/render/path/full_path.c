@@ -168,7 +168,7 @@ double full_path_specular_miss(const struct full_path *x, unsigned j)
 	return vec3_length(vec3_sub(wi, frame_to_local(&x->v[j].x.sh, vec3_neg(x->edge[j - 1].w))));
 }
 
-/* Those of first..last that lie in word i of a set. */
+/* The bits of first..last that lie in word i of a set. */
 static uint64_t bits(unsigned i, unsigned first, unsigned last)
 {
 	unsigned begin = 64 * i, end = begin + 63;

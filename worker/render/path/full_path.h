@@ -103,10 +103,10 @@ void full_path_set_wavelength(const struct path_context *c, struct full_path *x,
 /* Vertices first..last with their edges and caches, and what belongs to the path as a whole. */
 void full_path_copy(struct full_path *to, const struct full_path *from, unsigned first, unsigned last);
 
-/* Whether nothing lies between v[e] and v[e + 1]. Where media scatter it also finds what edge e has of them, of which
- * v[e + 1] must know its own, and an event outside of such a medium is not seen. Counts rays. */
+/* Whether nothing lies between v[e] and v[e + 1]. Where media scatter, it also computes the transmittance of edge e,
+ * for which the medium of v[e + 1] must be set; an event outside of a scattering medium is not visible. Counts rays. */
 bool full_path_visible(struct path_context *c, struct full_path *x, unsigned e);
-/* That of all edges, for x's wavelengths; only where media scatter. */
+/* full_path_visible for all edges, at x's wavelengths; only where media scatter. */
 bool full_path_see_media(struct path_context *c, struct full_path *x);
 
 /* Where v[edges - 1] lies on the film as seen from v[edges]; false: outside the window that is sampled. */
@@ -132,7 +132,7 @@ bool full_path_finish(struct path_context *c, struct full_path *x);
  * the joint passes, the others of c->camera. Casts the connecting rays. false: there is none, or it is black. */
 bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned passed, unsigned edges, struct full_path *x);
 
-/* Multiplies p by what the media along the path let through, if there are any. */
+/* Multiplies p by the transmittance of the media along the path. */
 void full_path_attenuate_by_media(const struct world *w, const struct full_path *x, struct product *p);
 static inline void full_path_attenuate(const struct world *w, const struct full_path *x, struct product *p)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What is known of an integrator outside of the renderer. Pure; any thread. */
+/* The properties of an integrator that the programs know. Pure; any thread. */
 #ifndef WORKER_RENDER_PATH_INTEGRATOR_FACE_H
 #define WORKER_RENDER_PATH_INTEGRATOR_FACE_H
 
@@ -13,12 +13,12 @@ struct render_integrator {
 	bool from_camera;   /* it has no light sub-paths: no light of beams, and only it knows when a shutter rolls */
 	bool to_emitters;   /* its paths end on emitters: no light of media */
 };
-/* What is said where one that is from_camera, by name, meets a beam. */
+/* The error for an integrator that is from_camera in a scene with a beam; the argument is its name. */
 #define RENDER_NO_BEAMS                                                                                                \
 	"the integrator %s finds no light of `collimated`, a beam without width: paths must begin there, as those of " \
 	"bdpt, erpt, pssmlt and hslt do"
 
-/* And one that is not, a rolling shutter. */
+/* The error for one that is not from_camera in a scene with a rolling shutter. */
 #define RENDER_NO_ROLL                                                                                                \
 	"the integrator %s cannot render a rolling shutter while something moves: the time of a path depends on its " \
 	"place on the film, which only path draws first"

@@ -71,8 +71,8 @@ struct walk {
 	spectrum all, events;		/* optical depths so far: of all media, of those that scatter */
 	struct medium_lanes lanes;	/* of the medium where the ray is, if there is one */
 	bool scatters;			/* that medium does */
-	const struct medium *shines;	/* that medium, if it does and somebody asks */
-	struct path_emission *emission; /* NULL: nobody does */
+	const struct medium *shines;	/* that medium, if it emits and emission is wanted */
+	struct path_emission *emission; /* NULL: emission is not wanted */
 	const struct wavelengths *wl;
 };
 

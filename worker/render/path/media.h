@@ -37,13 +37,13 @@ uint32_t path_medium_after(const struct world *w, const struct path_vertex *v, u
 
 /* ---- where media only absorb ---- */
 
-/* The share of light that the edge between two vertices lets through. */
+/* The transmittance of the edge between two vertices. */
 spectrum path_transmittance(const struct world *w, const struct wavelengths *wl, uint32_t medium,
 			    const struct path_vertex *a, const struct path_vertex *b);
-/* Gives `to`, which the camera's sub-path reached from `at` along wi, its medium, and to its beta what that lets
- * through. */
+/* Sets the medium of `to`, which the camera's sub-path reached from `at` along wi, and multiplies its beta by the
+ * transmittance. */
 void path_absorb(const struct path_context *c, const struct path_vertex *at, vec3 wi, struct path_vertex *to);
-/* The same for a vertex of a joint, whose beta is the share of light that the joint lets through; returns that. */
+/* The same for a vertex of a joint, whose beta is the transmittance of the joint, which is returned. */
 spectrum path_absorb_share(const struct path_context *c, const struct path_vertex *at, vec3 wi, spectrum share,
 			   struct path_vertex *to);
 

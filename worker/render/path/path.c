@@ -112,7 +112,7 @@ double path_pdf(const struct path_context *c, const struct path_vertex *prev, co
 	return next->kind == VERTEX_INFINITE ? solid : solid * path_jac_solid_from_vertex(next, omega, distance2);
 }
 
-/* To the next vertex, for u in [0,1) where media scatter. *left: what they let through. */
+/* Traces to the next vertex; u in [0,1) is used where media scatter. *left: the transmittance. */
 static bool go_on(struct path_context *c, const struct path_vertex *at, vec3 d, double t_min, double t_max, double u,
 		  struct path_vertex *to, spectrum *left)
 {
@@ -240,8 +240,8 @@ static bool survives(const struct path_context *c, unsigned scatterings, double 
 	return true;
 }
 
-/* From vertex n - 1 of a sub-path to the next one, where there are media. *left: what those that scatter let through.
- */
+/* From vertex n - 1 of a sub-path to the next one, where there are media. *left: the transmittance of those that
+ * scatter. */
 static __attribute__((noinline)) bool go_on_in_media(struct path_context *c, struct sampler *s, enum sampler_side side,
 						     unsigned n, const struct departure *out, double u, spectrum *left)
 {

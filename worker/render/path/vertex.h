@@ -29,7 +29,7 @@ struct path_edge {
 	/* Where media scatter: */
 	uint32_t before; /* at the vertex before */
 	bool fits;	 /* each face on the way states the medium that it is reached through */
-	spectrum free;	 /* exp(-optical depth), without that of media that only absorb */
+	spectrum free;	 /* exp(-optical depth), without media that only absorb */
 	vec3 d;		 /* the unit direction along it, one way or the other */
 };
 
@@ -95,8 +95,8 @@ struct path_context {
 	double time;		       /* of the sub-paths: struct prim_ref */
 	uint32_t min_depth, max_depth; /* edges */
 	double roulette;	       /* the most that a sub-path goes on with; 0: no roulette */
-	bool unclassed;		       /* nobody asks for path_sample.classes */
-	bool one_way;		       /* nobody asks for pdf_rev: no technique has more than one light vertex */
+	bool unclassed;		       /* path_sample.classes is not wanted */
+	bool one_way;		       /* pdf_rev is not needed: no technique has more than one light vertex */
 	bool joins_lens;      /* points of emitters are joined to the camera: paths of one edge are found so, too */
 	bool opaque;	      /* connections do not look through surfaces, even if they do in this world */
 	bool dispersed;	      /* by a vertex of the camera's sub-path that is not in it any more */

@@ -291,7 +291,7 @@ static bool find_near(const char *folder, const char *name, char near[NAME_MAX_B
 	return is_file(folder, near);
 }
 
-/* For whoever may say --path. */
+/* Like open_any; if the file is not found, the error says which --path would help. */
 static int search_open(void *user, const char *name, struct asset *out, struct error *e)
 {
 	const struct asset_folders *f = user;

@@ -24,14 +24,14 @@ struct define_table {
 	struct arena *arena;
 	struct define_entry *entries; /* DEFINE_MAX */
 	size_t count, missing_count;
-	bool incomplete; /* a file that may define more is not there: nothing is complained of */
+	bool incomplete; /* a file that may define more is missing: undefined names are not reported */
 	const char *missing[DEFINE_MISSING_MAX]; /* names that were used but not defined, each once */
 };
 
 int define_init(struct define_table *t, const struct scene_define *given, size_t count, struct arena *arena,
 		struct error *e);
 int define_default(struct define_table *t, const char *name, const char *value, struct error *e);
-/* A <default> without a value, since that of another name is missing: whoever uses it is not complained of. */
+/* A <default> whose value uses an undefined name: uses of it are not reported again. */
 int define_without_value(struct define_table *t, const char *name, struct error *e);
 
 /* Replaces every $name in text; values are not expanded again. Returns text itself if it has no $. The longest run of

@@ -7,8 +7,8 @@
 
 enum { FOV_AXIS_MAX = 16 };
 
-/* Degrees, and x, y, diagonal, smaller or larger: the side of the picture that they span. 50mm where n has neither;
- * -EINVAL with a sentence where it has both, or a length that is none. */
+/* The field of view in degrees, and the side of the picture that it spans: x, y, diagonal, smaller or larger. 50mm
+ * where n has neither angle nor focal length; -EINVAL with a sentence where it has both, or a malformed length. */
 int fov_read(const struct scene_node *n, double *degrees, char axis[FOV_AXIS_MAX], struct error *e);
 /* That side of a picture of width x height, in the same unit. */
 double fov_side(const char *axis, double width, double height);

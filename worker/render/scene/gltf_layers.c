@@ -145,7 +145,7 @@ static void note_iridescence(struct gltf *g, const struct gltf_at *at)
 		gltf_note(g, "the colours of thin films (KHR_materials_iridescence) are left out");
 }
 
-/* Of what is not clear glass: `principled` has one index of refraction. */
+/* Dispersion of materials other than clear glass is left out: `principled` has one index of refraction. */
 static void put_dispersion(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
 {
 	if (is_listed(g, "extensionsRequired", "KHR_materials_dispersion"))

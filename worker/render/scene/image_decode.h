@@ -27,7 +27,7 @@ struct image_input {
 /* A file format; image_formats.h lists all. */
 struct image_format {
 	const char *begins[5];			  /* first bytes of its files, one of these; ends with NULL */
-	bool (*is)(const struct image_input *in); /* how else its files are told; NULL: not at all */
+	bool (*is)(const struct image_input *in); /* another way to recognise its files; NULL: none */
 	int (*decode)(const struct image_input *in, struct image *out);
 	enum { IMAGE_ALPHA_NOT_READ, IMAGE_ALPHA_READ, IMAGE_ALPHA_NONE } alpha; /* NONE: the format has none */
 };

@@ -3,7 +3,7 @@
 
 #include "worker/render/scene/depth.h"
 
-/* Those of both dialects, and the ones here. */
+/* The integrators of both dialects, and our own. */
 static const struct {
 	const char *type;
 	bool other; /* its image is of something other than all light */

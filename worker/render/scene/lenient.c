@@ -114,7 +114,7 @@ static bool has_parameter(const struct xml_element *el, const char *const *list)
 	return false;
 }
 
-/* Materials are told by their parameters, whose names most branches of Mitsuba keep, and glass by its name. */
+/* Materials are recognised by their parameters, whose names most branches of Mitsuba keep, and glass by its name. */
 static const char *material_of(const struct xml_element *el, const char *type, const char *fallback)
 {
 	static const char *const glass[] = {"dielectric", "glass", NULL}, *const other[] = {"thin", "coat", NULL};

@@ -113,7 +113,7 @@ int note_foreign(const struct notes *t, const struct xml_element *el)
 	return note(t, el, "", "", "%s:%d: <%.64s> is ignored with its contents", el->file, el->line, el->name);
 }
 
-/* What is not supported goes, and that is said. */
+/* Leaves out an element that is not supported, with a note. */
 int leave_out(const struct notes *t, const struct xml_element *el, const char *type, const char *property,
 	      const char *what)
 {

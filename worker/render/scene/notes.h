@@ -25,19 +25,19 @@ __attribute__((format(printf, 5, 6))) int note(const struct notes *t, const stru
 /* What becomes of a parameter: "is ignored". */
 int note_parameter(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 		   const char *name, const char *what);
-/* One without effect on light; those of an object share a line. */
+/* A parameter without effect on light; all of one object share a line. */
 int note_no_effect(struct notes *t, const struct xml_element *owner, const struct xml_element *el, const char *name);
-/* One that would change light a little. */
+/* A parameter that would change the light a little. */
 int note_difference(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 		    const char *name);
 /* A name of 0.6 in a file of 3.x. */
 int note_old_name(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 		  const char *name);
 int note_guide(const struct notes *t, const struct xml_element *el); /* plugin_is_guide */
-/* An element that is ignored with all inside; an object of which its table keeps something. */
+/* An element that is ignored with everything inside it; and an object of which only what its table lists is kept. */
 int note_foreign(const struct notes *t, const struct xml_element *el);
 int note_ignored_plugin(const struct notes *t, const struct xml_element *el, const struct plugin_decl *decl);
-/* What is not supported goes, and that is said. */
+/* Leaves out an element that is not supported, with a note. */
 int leave_out(const struct notes *t, const struct xml_element *el, const char *type, const char *property,
 	      const char *what);
 

@@ -2,6 +2,8 @@
 /*
  * Look-ups in the tables of plug-ins, and two tables of its own: the names that parameters had in 0.5 and 0.6, and
  * Mitsuba's plug-ins that the tables lack. They are lists of some dozens, searched from the beginning.
+ *
+ * Nothing fails: a name that no table has is NULL or false, and the caller reports it with the nearest name.
  */
 #include "worker/render/scene/plugin.h"
 

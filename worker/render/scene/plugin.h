@@ -25,10 +25,10 @@ const char *plugin_new_name(const struct plugin_decl *d, const char *name);
 
 /* A name of an older version, and the one that it is read as. */
 struct renamed {
-	int before;		    /* the minor version of 0.x from which on it is not; 0: any */
+	int before;		    /* the minor version of 0.x that dropped it; 0: any */
 	const char *element, *type; /* what has it, or in which a parameter is; NULL: any */
 	const char *old, *now;
-	bool parameter; /* otherwise a type; without an element, that of elements themselves */
+	bool parameter; /* a parameter's name; otherwise a type's, or without `element` an element's */
 };
 bool plugin_new_name_at(size_t i, struct renamed *out); /* false: no more */
 

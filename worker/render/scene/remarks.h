@@ -10,7 +10,7 @@
 /* About one object, whatever it holds: each is made once, however many refer to it. Adds notes to the report. 0 or
  * -ENOMEM. */
 int remarks_on_object(const struct scene_node *n, struct report *r, struct error *e);
-/* About the scene, whose top-level objects these are. Likewise. */
+/* Adds remarks about the scene with these top-level objects. 0, -ENOMEM. */
 int remarks_on_scene(const struct scene_node *const *objects, uint32_t count, bool dialect_3, struct report *r,
 		     struct error *e);
 

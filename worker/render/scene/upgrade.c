@@ -275,7 +275,7 @@ static bool turn_lookat(struct xml_element *el, struct arena *arena)
 	*mirror = (struct xml_attribute){"x", "-1"};
 	for (struct xml_element *c = look->first; c; c = c->next)
 		c->parent = look;
-	el->first = el->last = NULL; /* or whoever walks over them returns to the wrong one, and never ends */
+	el->first = el->last = NULL; /* otherwise a walk over the elements returns to the wrong one, and never ends */
 	el->name = "scale";
 	el->attributes = mirror;
 	el->attribute_count = 1;

@@ -36,11 +36,11 @@ struct xml_tree {
 	bool black_backs; /* XML of version >= 2 */
 	uint32_t element_count, include_count, path_count, note_count, missing_count;
 	const char *includes[XML_FILES_MAX];  /* names of included files; repeated where included more than once */
-	const char *notes[XML_NOTES_MAX];     /* what whoever reads the file should know */
+	const char *notes[XML_NOTES_MAX];     /* notes for the user about the file */
 	const char *missing[XML_MISSING_MAX]; /* a sentence for each $name without a value and each file that is not
 						 there or cannot be read to its end */
-	bool holes;			      /* there is such a file: ids that it may have are not complained of */
-	bool blind;			      /* a <path> has no value: files would be searched in vain */
+	bool holes; /* some file is missing: unknown ids, which it may define, are not reported */
+	bool blind; /* a <path> has no value: the scene is not built, since files in it would be missing */
 	const char *
 		paths[XML_PATHS_MAX]; /* of <path>, in their order; names of files after them are searched there, too */
 };

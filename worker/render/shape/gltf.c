@@ -124,7 +124,7 @@ static int fill_mesh(struct mesh *m, const struct scene_node *n, const struct ac
 	return 0;
 }
 
-/* Numbers at the vertices, as they stand in the buffer. */
+/* Reads attributes of vertices, in the order of the buffer. */
 static int add_attribute(struct mesh *m, const struct scene_node *n, const char *name, const char *attribute,
 			 unsigned components, const struct asset_range *buffer, struct arena *arena, struct error *e)
 {

@@ -57,7 +57,7 @@ static inline spectrum color_eval(const struct color *c, const struct wavelength
 	}
 	return color_eval_coloured(c, w);
 }
-/* color_eval of both; one search where their tables have the same wavelengths, such as those of a metal's n and k. */
+/* color_eval of two colours; one search if their tables have the same wavelengths, as a metal's n and k have. */
 void color_eval_both(const struct color *a, const struct color *b, const struct wavelengths *w, spectrum out[2]);
 double color_max(const struct color *c);  /* upper bound over wavelengths */
 double color_mean(const struct color *c); /* averaged over wavelengths as they are drawn, to choose among emitters */

@@ -8,8 +8,8 @@
 
 enum {
 	NUMBERS_MAX = 1 << 16, /* that an index of two bytes tells apart */
-	/* Slots looked at in vain for each place, on average: a file whose numbers collide is stored without indices
-	 * instead of taking hours. */
+	/* The most failed probes per place, on average: a file whose numbers collide is stored without indices instead
+	 * of taking hours. */
 	DETOUR_MAX = 8,
 };
 

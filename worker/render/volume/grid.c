@@ -298,7 +298,7 @@ static bool go_on(struct cells *c, int axis)
 	return true;
 }
 
-/* What has no inverse is none. */
+/* A component whose inverse overflows counts as 0. */
 static double without_tiny(double d)
 {
 	return fabs(d) >= DBL_MIN ? d : 0;

@@ -30,15 +30,15 @@ static inline int32_t emitter_of_part(const struct world *w, uint32_t part)
 	return part < w->emitter_count ? (int32_t)part : w->environment;
 }
 
-/* Divided emitters are no part themselves; those of power 0 may have been switched off (effects_apply.h), and nothing
- * else says so. */
+/* A divided emitter is not a part itself. An emitter of power 0 may have been switched off (effects_apply.h), which
+ * shows only in its power. */
 static inline bool emitter_part_shines(const struct world *w, uint32_t part)
 {
 	return w->emitters[emitter_of_part(w, part)].power > 0 &&
 	       (part >= w->emitter_count || !emitter_is_divided(w, (int32_t)part));
 }
 
-/* How many times denser points of a part lie, if the part is drawn, than those of its emitter. */
+/* The density of points of a part, once it is chosen, over the density of points of its whole emitter. */
 static inline double emitter_part_denser(const struct world *w, uint32_t part)
 {
 	return part < w->emitter_count ? 1 : ENVIRONMENT_PARTS;

@@ -372,7 +372,7 @@ static int place_shape(struct builder *b, uint32_t i, double wide_from, bool *go
 	return rc || *gone ? rc : build_keep_unrounded(b, g, &from->mesh, wide_from);
 }
 
-/* What belongs to shape `from` becomes that of shape `to`, which is not after it. */
+/* Moves all data of shape `from` to index `to` <= `from`. */
 static void move_shape(struct builder *b, uint32_t from, uint32_t to)
 {
 	if (from == to)

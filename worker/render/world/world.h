@@ -48,7 +48,7 @@ struct world {
 	struct world_shape *parts; /* one a shape */
 	struct bsdf *bsdfs;
 	struct emitter *emitters;
-	uint32_t media_count, camera_medium; /* the latter a number as those of shapes */
+	uint32_t media_count, camera_medium; /* camera_medium: 1 + its index, as in world_shape; 0: none */
 	struct medium *media;
 	bool has_passable;     /* some shape is */
 	struct box passed;     /* around all surfaces that connections may look through; may be empty */

@@ -296,7 +296,7 @@ static void check_scale(double floor)
 	struct scene_settings settings = {.width = SIDE, .height = SIDE, .filter = FILTER_BOX, .filter_radius = 0.5};
 	struct film_sums film;
 	struct world *w = on_floor(floor);
-	uint8_t bytes[WHOLE_BYTES];
+	uint8_t bytes[PATH_BYTES_MAX];
 	unsigned paths = 0, unwritten = 0;
 	starts_context(&context, w, 1, EDGES, counters);
 	for (uint64_t i = 0; i < 2000; i++) {
