@@ -267,7 +267,7 @@ static size_t tile_values(const struct tile *t)
 }
 
 /* The largest magnitude: the bits of finite floats without their sign are ordered like the floats. */
-static float largest(const struct tile *t)
+static float largest_of_tile(const struct tile *t)
 {
 	uint32_t most = 0;
 	size_t count = tile_values(t);
@@ -293,7 +293,7 @@ int canvas_admits(const struct canvas *c, const struct batch *b, struct error *e
 		limit = fmin(limit, KERNEL_MOST * (double)b->counters[COUNT_SAMPLES]);
 	for (uint32_t i = 0; i < b->tile_count; i++) {
 		const struct tile *t = &b->tiles[i];
-		double most = (double)largest(t);
+		double most = (double)largest_of_tile(t);
 		if (!(most <= limit))
 			return error_set(e, chains ? EBADMSG : ERANGE,
 					 "a pixel of %g in the tile at %u,%u; at most %g fits into one lease", most,
@@ -323,7 +323,7 @@ static void add_row(int64_t *s, const float *v, size_t count, double scale, bool
  * large. */
 static bool add_tile(const struct canvas *c, int64_t *slot, const struct tile *t, double sign, uint64_t *bound)
 {
-	double most = (double)largest(t) * c->scale;
+	double most = (double)largest_of_tile(t) * c->scale;
 	if (!(most < VALUE_MOST))
 		return false;
 	size_t row = (size_t)t->width * TILE_CHANNELS;

@@ -19,7 +19,7 @@ static struct job *live_job_of(struct farm *f, const struct event *ev)
 	return NULL;
 }
 
-static void hold(struct job *j, enum job_hold which, const char *why, double now)
+static void hold_job(struct job *j, enum job_hold which, const char *why, double now)
 {
 	bool was = job_is_held(j);
 	text_copy(j->held[which], sizeof j->held[which], why);
@@ -41,7 +41,7 @@ void orders_hold(struct farm *f, const struct event *ev)
 {
 	struct job *j = live_job_of(f, ev);
 	if (j)
-		hold(j, ev->hold, ev->text ? ev->text : "", f->now);
+		hold_job(j, ev->hold, ev->text ? ev->text : "", f->now);
 }
 
 void orders_priority(struct farm *f, const struct event *ev)

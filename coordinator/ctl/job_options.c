@@ -34,7 +34,7 @@ static const struct option_row rows[] = {
 	 "fetch: the image so far, while the job runs; room.exr is previewed in room.preview.exr, also with -o room.exr",
 	 OPTION_FLAG(struct job_options, preview)},
 	{"json", 0, NULL, "list: one JSON array", OPTION_FLAG(struct job_options, json)},
-	{"state", 0, "STATE", "(list: the only jobs shown)", OPTION_TEXT(struct job_options, state),
+	{"state", 0, "STATE", "(list: only jobs in this state)", OPTION_TEXT(struct job_options, state),
 	 .values = state_at},
 	{"spp", 0, "+N", "extend: additional samples per pixel", OPTION_COUNT(struct job_options, more_spp, 1, 1e15)},
 	{"mutations", 0, "+N", "extend: additional mutations or samples",

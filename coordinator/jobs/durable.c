@@ -200,7 +200,7 @@ static void end_again(struct jobs *jobs)
 
 /* ---- batches ---- */
 
-static void hold(struct jobs *jobs, struct live_job *job, const char *text)
+static void hold_job(struct jobs *jobs, struct live_job *job, const char *text)
 {
 	struct event ev = {.kind = EVENT_HOLD, .job = job->id, .text = text};
 	if (!*text != !job->held) {
@@ -216,7 +216,7 @@ void durable_hold(struct jobs *jobs, struct live_job *job, const char *what, con
 {
 	char text[256];
 	text_print(text, sizeof text, "%s: %s", what, why);
-	hold(jobs, job, text);
+	hold_job(jobs, job, text);
 }
 
 /* Where its chain states need more memory than those that they replace. */
@@ -471,7 +471,7 @@ int durable_mend(struct jobs *jobs, struct live_job *job)
 			rc = journal_reserve(job->journal, 2 * job->held_bytes, &e);
 	} while (disk_is_full(rc) && room_make(jobs)); /* of what has been of use until now */
 	if (!rc)
-		hold(jobs, job, "");
+		hold_job(jobs, job, "");
 	return rc;
 }
 

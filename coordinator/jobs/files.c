@@ -17,7 +17,7 @@
 
 #include <string.h>
 
-static void hold(struct jobs *jobs, struct live_job *job, const char *text)
+static void hold_job(struct jobs *jobs, struct live_job *job, const char *text)
 {
 	struct event ev = {.kind = EVENT_HOLD, .job = job->id, .hold = HOLD_FILES, .text = text};
 	job->lacks_file = *text != 0;
@@ -49,7 +49,7 @@ bool files_look(struct jobs *jobs, struct live_job *job)
 			text, sizeof text,
 			"its file %.100s is damaged or missing in the spool: submit the scene again (hslt-submit) to continue",
 			f->name);
-	hold(jobs, job, text);
+	hold_job(jobs, job, text);
 	return true;
 }
 
@@ -76,7 +76,7 @@ static void read_some(uv_work_t *work)
 	c->more = blob_check_read(c->check);
 }
 
-static bool needs(const struct live_job *job, const struct blob_hash *h)
+static bool needs_file(const struct live_job *job, const struct blob_hash *h)
 {
 	const Farm__Submit *m = live_job_submit(job);
 	for (size_t i = 0; i < m->n_files; i++)
@@ -105,7 +105,7 @@ static void finish_first(struct jobs *jobs)
 	if (rc == -EBADMSG)
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 	for (struct live_job *job = jobs->live; rc && job; job = job->next)
-		job->unread = job->unread || needs(job, &c->hash);
+		job->unread = job->unread || needs_file(job, &c->hash);
 	if (rc == -EBADMSG)
 		look_at_all(jobs);
 	jobs->peers.file_read(jobs->peers.user, &c->hash, rc, e.text);

@@ -5,7 +5,7 @@
 
 #include <inttypes.h>
 
-static uint64_t times(uint64_t a, uint64_t b)
+static uint64_t multiply_saturating(uint64_t a, uint64_t b)
 {
 	uint64_t product;
 	return __builtin_mul_overflow(a, b, &product) ? UINT64_MAX : product;
@@ -15,7 +15,7 @@ int quota_check(const struct quota *q, const struct quota_use *has, const struct
 		struct error *e)
 {
 	uint64_t films = canvas_bytes(p);
-	uint64_t mutations = times(p->rounds, plan_round_mutations(p));
+	uint64_t mutations = multiply_saturating(p->rounds, plan_round_mutations(p));
 	if (q->jobs && has->jobs >= q->jobs)
 		return error_set(e, EDQUOT, "quota: at most %" PRIu64 " live jobs", q->jobs);
 	if (q->asset_bytes && (has->asset_bytes > q->asset_bytes || asset_bytes > q->asset_bytes - has->asset_bytes))

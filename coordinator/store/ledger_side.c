@@ -98,8 +98,8 @@ static const char *text_at(sqlite3_stmt *s, int column)
 	return text ? text : "";
 }
 
-static int row(struct ledger_side *side, enum ledger_statement which, uint64_t id, struct ledger_job *j,
-	       struct error *e)
+static int read_row(struct ledger_side *side, enum ledger_statement which, uint64_t id, struct ledger_job *j,
+		    struct error *e)
 {
 	sqlite3_stmt *s = side->statements[which];
 	sqlite3_reset(s); /* here, so that the previous answer was valid until now */
@@ -134,12 +134,12 @@ static int row(struct ledger_side *side, enum ledger_statement which, uint64_t i
 
 int ledger_side_get(struct ledger_side *s, uint64_t id, struct ledger_job *j, struct error *e)
 {
-	return row(s, LEDGER_GET, id, j, e);
+	return read_row(s, LEDGER_GET, id, j, e);
 }
 
 int ledger_side_after(struct ledger_side *s, uint64_t id, struct ledger_job *j, struct error *e)
 {
-	int rc = row(s, LEDGER_AFTER, id, j, e);
+	int rc = read_row(s, LEDGER_AFTER, id, j, e);
 	/* Otherwise a caller that asks for the next one would never stop. */
 	return rc > 0 && j->id <= id
 		       ? error_set(e, EBADMSG, "the database of jobs is damaged: its jobs are not in order")

@@ -47,7 +47,7 @@ struct planner {
 	struct error *e;
 };
 
-static bool listed(const char *list, const char *name)
+static bool is_listed(const char *list, const char *name)
 {
 	size_t n = strlen(name);
 	for (const char *at = list; at; at = strchr(at, ',') ? strchr(at, ',') + 1 : NULL)
@@ -400,25 +400,25 @@ int accuracy_design(struct accuracy_design *d, const struct plan_request *base, 
 	const struct render_setting *k;
 	for (size_t i = 0; (k = render_setting_at(i)) != NULL; i++) {
 		const char *why = why_no_effect(&p, k);
-		if (!listed(only, k->name))
+		if (!is_listed(only, k->name))
 			continue;
 		if (why)
 			leave_out(&p, k->name, why);
 		else
 			sweep_setting(&p, k);
 	}
-	if (listed(only, DEPTH))
+	if (is_listed(only, DEPTH))
 		sweep_depth(&p);
 	if (!p.integrator->has_mutations) {
 		leave_out(&p, SHARE, "the integrator has no mixture of strategies");
 		leave_out(&p, MIXTURE, "the integrator has no mixture of strategies");
 		return 0;
 	}
-	if (listed(only, SHARE))
+	if (is_listed(only, SHARE))
 		sweep_share(&p);
-	if (listed(only, MIXTURE))
+	if (is_listed(only, MIXTURE))
 		sweep_mixture(&p);
-	if (listed(only, PRESET))
+	if (is_listed(only, PRESET))
 		sweep_presets(&p);
 	return 0;
 }

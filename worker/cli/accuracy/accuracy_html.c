@@ -152,7 +152,7 @@ static int put_picture(struct text_file *p, const struct accuracy_context *x, st
 	return 0;
 }
 
-static void fact(struct text_file *p, const char *name, const char *text)
+static void write_fact(struct text_file *p, const char *name, const char *text)
 {
 	text_file_put(p, "<tr><td class=\"t\">%s</td><td class=\"t\">", name);
 	text_file_escaped(p, text);
@@ -179,28 +179,28 @@ static void put_facts(struct text_file *p, const struct accuracy_context *x)
 	time_t now = time(NULL);
 	struct tm utc;
 	text_file_put(p, "<table>\n");
-	fact(p, "Scene", x->scene);
+	write_fact(p, "Scene", x->scene);
 	snprintf(text, sizeof text, "%s, %u x %u pixels, paths of at most %u edges", plan->integrator, plan->crop_width,
 		 plan->crop_height, plan->max_depth);
-	fact(p, "Rendered by", text);
-	fact(p, "Mixture", *plan->mutations ? plan->mutations : "none");
-	fact(p, "Settings changed", *plan->accuracy ? plan->accuracy : "none: the renderer's defaults");
+	write_fact(p, "Rendered by", text);
+	write_fact(p, "Mixture", *plan->mutations ? plan->mutations : "none");
+	write_fact(p, "Settings changed", *plan->accuracy ? plan->accuracy : "none: the renderer's defaults");
 	plan_describe(plan, text, sizeof text);
-	fact(p, "Plan of the default", text);
+	write_fact(p, "Plan of the default", text);
 	snprintf(text, sizeof text,
 		 "%zu settings in turns, %.0f s in all%s; each %.3g s of CPU, the reference %g times that",
 		 x->design->count, r->wall_seconds, r->interrupted ? " (interrupted: the figures so far)" : "",
 		 x->judgement->figures[ACCURACY_DEFAULT].cpu_seconds, ACCURACY_REFERENCE_SHARE);
-	fact(p, "Run", text);
+	write_fact(p, "Run", text);
 	snprintf(text, sizeof text, "rendered carefully: %s",
 		 *x->design->settings[ACCURACY_REFERENCE].accuracy ? x->design->settings[ACCURACY_REFERENCE].accuracy
 								   : "as the default, but longer");
-	fact(p, "Reference for the bias", x->reference ? x->reference : text);
+	write_fact(p, "Reference for the bias", x->reference ? x->reference : text);
 	machine(text, sizeof text, r->threads);
-	fact(p, "Machine", text);
+	write_fact(p, "Machine", text);
 	if (gmtime_r(&now, &utc) &&
 	    strftime(text, sizeof text, "%Y-%m-%d %H:%M UTC, hslt-accuracy " HSLT_VERSION, &utc))
-		fact(p, "Made", text);
+		write_fact(p, "Made", text);
 	text_file_put(p, "</table>\n");
 }
 
@@ -336,11 +336,11 @@ static void put_rest(struct text_file *p, const struct accuracy_context *x)
 		text_file_put(p, "<h2>Left out</h2>\n<table>\n<tr><th class=\"t\">parameter</th>"
 				 "<th class=\"t\">why it does nothing here</th></tr>\n");
 	for (size_t i = 0; i < d->left_out_count; i++)
-		fact(p, d->left_out[i].parameter, d->left_out[i].why);
+		write_fact(p, d->left_out[i].parameter, d->left_out[i].why);
 	text_file_put(p, "%s<h2>The CSV's columns</h2>\n<table>\n", d->left_out_count ? "</table>\n" : "");
 	for (size_t i = 0; accuracy_columns[i].name; i++)
-		fact(p, accuracy_columns[i].name,
-		     *accuracy_columns[i].meaning ? accuracy_columns[i].meaning : "the other end of it");
+		write_fact(p, accuracy_columns[i].name,
+			   *accuracy_columns[i].meaning ? accuracy_columns[i].meaning : "the other end of it");
 	text_file_put(p, "</table>\n");
 }
 

@@ -30,7 +30,7 @@ static const struct accuracy_job *job(const struct judge *j, size_t i)
 }
 
 /* The interval of x with a known relative standard deviation, on a logarithmic scale. */
-static struct interval around(double x, double log_sd)
+static struct interval interval_around(double x, double log_sd)
 {
 	double factor = exp(stats_t(LEVEL, 1e9) * log_sd);
 	return (struct interval){x, x / factor, x * factor};
@@ -144,8 +144,9 @@ static void scale_errors(struct judge *j, struct stats_point *points)
 		if (f->cost.low > 0)
 			cost_sd = 0.5 * log(f->cost.high / f->cost.low) / (2 * stats_t(LEVEL, 1e9));
 		double at_once = sqrt(j->rel_mse[i] * (double)f->mutations);
-		f->equal_mutations = around(at_once / sqrt((double)o->at_mutations), sd);
-		f->equal_time = around(at_once * sqrt(1e-6 * f->cost.value / o->at_cpu_seconds), hypot(sd, cost_sd));
+		f->equal_mutations = interval_around(at_once / sqrt((double)o->at_mutations), sd);
+		f->equal_time =
+			interval_around(at_once * sqrt(1e-6 * f->cost.value / o->at_cpu_seconds), hypot(sd, cost_sd));
 		points[i].log_error = log(f->equal_time.value);
 		points[i].log_sd = hypot(sd, cost_sd);
 	}

@@ -106,7 +106,7 @@ static json_t *json_of(double x)
 	return isfinite(x) ? json_real(x) : json_null();
 }
 
-static json_t *text(const char *s)
+static json_t *json_of_text(const char *s)
 {
 	json_t *t = json_string(s);
 	return t ? t : json_string("(not UTF-8)");
@@ -121,13 +121,13 @@ static void print_figures(const struct arguments *a, const struct compare_result
 {
 	if (a->json) {
 		print_json(json_pack("{s:i s:o s:o s:o s:o s:o s:o s:o s:o s:o s:o s:o s:I s:I s:I s:s}", "schema", 1,
-				     "a", text(a->path[0]), "b", text(a->path[1]), "relMSE", json_of(r->rel_mse),
-				     "relativeError", json_of(r->relative_error), "rmse", json_of(r->rmse), "psnr",
-				     json_of(r->psnr), "peak", json_of(r->peak), "meanA", json_of_three(r->mean_a),
-				     "meanB", json_of_three(r->mean_b), "meanRatio", json_of_three(r->ratio),
-				     "luminanceRatio", json_of(r->luminance_ratio), "pixels", (json_int_t)r->pixels,
-				     "leftOut", (json_int_t)r->left_out, "notFinite", (json_int_t)r->not_finite,
-				     "relMSEDefinition", REL_MSE_DEFINITION));
+				     "a", json_of_text(a->path[0]), "b", json_of_text(a->path[1]), "relMSE",
+				     json_of(r->rel_mse), "relativeError", json_of(r->relative_error), "rmse",
+				     json_of(r->rmse), "psnr", json_of(r->psnr), "peak", json_of(r->peak), "meanA",
+				     json_of_three(r->mean_a), "meanB", json_of_three(r->mean_b), "meanRatio",
+				     json_of_three(r->ratio), "luminanceRatio", json_of(r->luminance_ratio), "pixels",
+				     (json_int_t)r->pixels, "leftOut", (json_int_t)r->left_out, "notFinite",
+				     (json_int_t)r->not_finite, "relMSEDefinition", REL_MSE_DEFINITION));
 		return;
 	}
 	printf("relMSE          %.6g (" REL_MSE_DEFINITION ")\n", r->rel_mse);
@@ -147,8 +147,8 @@ static int run_exact(const struct arguments *a, const struct picture *p, int *co
 	char why[1024];
 	bool equal = compare_exact(&p[0].image, &p[1].image, why, sizeof why);
 	if (a->json)
-		print_json(json_pack("{s:i s:o s:o s:b s:o}", "schema", 1, "a", text(a->path[0]), "b", text(a->path[1]),
-				     "equal", equal, "difference", text(why)));
+		print_json(json_pack("{s:i s:o s:o s:b s:o}", "schema", 1, "a", json_of_text(a->path[0]), "b",
+				     json_of_text(a->path[1]), "equal", equal, "difference", json_of_text(why)));
 	else
 		printf("%s%s\n", equal ? "equal" : "different: ", why);
 	*code = !equal;

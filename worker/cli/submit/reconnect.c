@@ -7,7 +7,7 @@
 
 static const double first_pause = 0.25, longest_pause = 10;
 
-static void rest(double seconds)
+static void sleep_seconds(double seconds)
 {
 	struct timespec t = {(time_t)seconds, (long)(1e9 * (seconds - (double)(time_t)seconds))};
 	nanosleep(&t, NULL);
@@ -36,7 +36,7 @@ static int call_again(struct client **cl, const struct reconnect *o, struct erro
 	int rc;
 	do {
 		double left = gone + o->patience - clock_seconds();
-		rest(pause < left ? pause : left > 0 ? left : 0);
+		sleep_seconds(pause < left ? pause : left > 0 ? left : 0);
 		pause = 2 * pause < longest_pause ? 2 * pause : longest_pause;
 		rc = client_open(cl, o->coordinator, o->tls, o->insecure, "hslt-submit", e);
 	} while ((is_gone(rc) || rc == -EKEYEXPIRED) && clock_seconds() - gone < o->patience);

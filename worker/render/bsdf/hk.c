@@ -46,7 +46,7 @@ static spectrum depth_at(const struct layer *l, const struct bsdf_point *p, spec
 }
 
 /* exp(-t / cosine) */
-static double passed(double t, double cosine)
+static double transmittance(double t, double cosine)
 {
 	return exp(-t / cosine);
 }
@@ -56,7 +56,7 @@ static double passed(double t, double cosine)
 static double transmitted(double t, double a, double c)
 {
 	double most = fmax(a, c), least = fmin(a, c), d = t * ((most - least) / most / least);
-	double direct = passed(t, most);
+	double direct = transmittance(t, most);
 	if (!(direct > 0))
 		return 0;
 	if (d > 1)
@@ -90,7 +90,7 @@ static double straight_chance(const struct bsdf *b, const struct bsdf_point *p, 
 	double straight = 0, other = 0;
 	spectrum scattered, depth = depth_at(b->data, p, &scattered);
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
-		double direct = passed(depth.v[i], fabs(wo.z));
+		double direct = transmittance(depth.v[i], fabs(wo.z));
 		straight += direct;
 		other += scattered.v[i] * (1 - direct);
 	}
@@ -112,7 +112,7 @@ static spectrum hk_eval_delta(const struct bsdf *b, const struct bsdf_point *p, 
 		return spectrum_of(0);
 	spectrum unused, f = depth_at(b->data, p, &unused);
 	for (int i = 0; i < SPECTRUM_LANES; i++)
-		f.v[i] = passed(f.v[i], fabs(wo.z));
+		f.v[i] = transmittance(f.v[i], fabs(wo.z));
 	*wi = vec3_neg(wo);
 	*chance = straight_chance(b, p, wo);
 	return f;

@@ -39,7 +39,7 @@ static struct turn turn_of(const struct measured *m, vec3 w)
 	return t;
 }
 
-static vec3 turned(struct turn t, vec3 w)
+static vec3 turn_vector(struct turn t, vec3 w)
 {
 	return (vec3){t.x * w.x, t.y * w.y, w.z};
 }
@@ -71,7 +71,7 @@ struct view {
 static struct view view_from(const struct measured *m, vec3 camera)
 {
 	struct view v = {.m = m, .turn = turn_of(m, camera)};
-	v.angles = angles_of(turned(v.turn, camera));
+	v.angles = angles_of(turn_vector(v.turn, camera));
 	v.mix = warp_mix_at(&m->axes, (const double[2]){v.angles.phi, v.angles.theta});
 	return v;
 }
@@ -79,7 +79,7 @@ static struct view view_from(const struct measured *m, vec3 camera)
 /* Where h is in the square, and the solid angle of directions to the light per area there. */
 static double half_place(const struct view *v, vec3 h, double cosine, double place[2])
 {
-	struct angles a = angles_of(turned(v->turn, h));
+	struct angles a = angles_of(turn_vector(v->turn, h));
 	if (v->m->isotropic)
 		a.phi -= v->angles.phi;
 	place_of(a, place);
@@ -220,7 +220,7 @@ static bool measured_sample(const struct bsdf *b, const struct bsdf_point *p, ve
 	warp_table_sample(&m->visible, &v.mix, inner, place);
 	double theta = 0.5 * WARP_PI * place[0] * place[0],
 	       phi = (2 * place[1] - 1) * WARP_PI + (m->isotropic ? v.angles.phi : 0);
-	vec3 h = turned(v.turn, (vec3){sin(theta) * cos(phi), sin(theta) * sin(phi), cos(theta)});
+	vec3 h = turn_vector(v.turn, (vec3){sin(theta) * cos(phi), sin(theta) * sin(phi), cos(theta)});
 	if (!(vec3_dot(wo, h) > 0))
 		return false;
 	return bsdf_sample_smooth(b, p, wo, microfacet_mirror(wo, h), out);

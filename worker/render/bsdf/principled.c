@@ -188,7 +188,7 @@ static double coat_reflects(const struct principled_point *s, double cosine)
 }
 
 /* Probabilities of the lobes for light from wo. */
-static void chances(const struct principled_point *s, vec3 wo, double chance[LOBES])
+static void lobe_chances(const struct principled_point *s, vec3 wo, double chance[LOBES])
 {
 	const struct principled *p = s->p;
 	bool below = wo.z < 0;
@@ -327,7 +327,7 @@ static double principled_pdf(const struct bsdf *b, const struct bsdf_point *at, 
 {
 	struct principled_point s = principled_at(b->data, at);
 	double chance[LOBES];
-	chances(&s, wo, chance);
+	lobe_chances(&s, wo, chance);
 	return pair_of(&s, wo, wi, at->transport, false, chance).pdf;
 }
 
@@ -370,7 +370,7 @@ static bool principled_sample(const struct bsdf *b, const struct bsdf_point *at,
 	vec3 wi;
 	if (wo.z == 0)
 		return false;
-	chances(&s, wo, chance);
+	lobe_chances(&s, wo, chance);
 	int lobe = 0;
 	while (lobe < LOBES - 1 && rest >= chance[lobe])
 		rest -= chance[lobe++];

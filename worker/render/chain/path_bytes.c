@@ -73,7 +73,7 @@ static void write_vertex(const struct world *w, const struct path_vertex *v, uin
 
 /* ---- reading */
 
-static bool near(vec3 a, vec3 b, double size)
+static bool is_near(vec3 a, vec3 b, double size)
 {
 	vec3 d = vec3_sub(a, b);
 	return vec3_dot(d, d) <= BELONGS * BELONGS * size * size;
@@ -108,7 +108,7 @@ static bool read_far_emitter(const struct world *w, int32_t emitter, vec3 p, dou
 	struct emitter_point point = {.infinite = em->infinite};
 	double pdf;
 	if (em->delta) {
-		if (!em->ops->sample_point(em, half, &point, &pdf) || !near(point.p, p, w->radius))
+		if (!em->ops->sample_point(em, half, &point, &pdf) || !is_near(point.p, p, w->radius))
 			return false;
 	} else {
 		if (!em->infinite || !(fabs(vec3_dot(p, p) - 1) <= BELONGS))
@@ -159,7 +159,7 @@ static bool read_vertex(const struct world *w, const uint8_t *at, unsigned i, un
 		const struct camera *camera = world_camera(w, &v->x, &room);
 		camera_point_inverse(camera, place, u);
 		v->x.p = camera_point(camera, u);
-		return near(v->x.p, place, fmax(w->radius, w->camera.aperture));
+		return is_near(v->x.p, place, fmax(w->radius, w->camera.aperture));
 	}
 	if (i == 0 && (emitter < 0 || (uint32_t)emitter >= w->emitter_count))
 		return false;

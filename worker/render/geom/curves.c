@@ -237,7 +237,7 @@ static void directions(vec3 axis, vec3 *from, vec3 *to)
 }
 
 /* By the smallest rotation that turns one axis into the other. */
-static vec3 carry(vec3 direction, vec3 from, vec3 to)
+static vec3 transport_direction(vec3 direction, vec3 from, vec3 to)
 {
 	double sum = 1 + vec3_dot(from, to);
 	if (!(sum > 0x1p-40)) /* turned around: it stays perpendicular */
@@ -251,7 +251,7 @@ void curves_lay(struct curves *c)
 	for (uint32_t i = 0; i < c->count; i++) {
 		struct cone k = curves_cone(c, i);
 		directions(k.axis, &from, &to);
-		u = c->cone[i] & CURVE_BEGINS ? from : carry(u, axis, k.axis);
+		u = c->cone[i] & CURVE_BEGINS ? from : transport_direction(u, axis, k.axis);
 		axis = k.axis;
 		c->start[i] = (float)(atan2(vec3_dot(u, to), vec3_dot(u, from)) / (2 * M_PI));
 	}

@@ -4,7 +4,7 @@
 #define UNEVEN 0x1p16
 #define TINY 0x1p-80
 
-static vec3 row(const mat4 *m, int k)
+static vec3 matrix_row(const mat4 *m, int k)
 {
 	return (vec3){m->m[k][0], m->m[k][1], m->m[k][2]};
 }
@@ -12,7 +12,7 @@ static vec3 row(const mat4 *m, int k)
 /* Of the linear part; at most sqrt(3) times the largest stretch. */
 static double norm(const mat4 *m)
 {
-	double a = vec3_length(row(m, 0)), b = vec3_length(row(m, 1)), c = vec3_length(row(m, 2));
+	double a = vec3_length(matrix_row(m, 0)), b = vec3_length(matrix_row(m, 1)), c = vec3_length(matrix_row(m, 2));
 	return vec3_length((vec3){a, b, c});
 }
 
@@ -34,7 +34,7 @@ static void fill(struct placement *p, const mat4 *m, const mat4 *back, vec3 low,
 				.y = mat4_column(m, 1),
 				.z = mat4_column(m, 2),
 				.at = mat4_column(m, 3),
-				.back = {row(&inverse, 0), row(&inverse, 1), row(&inverse, 2)},
+				.back = {matrix_row(&inverse, 0), matrix_row(&inverse, 1), matrix_row(&inverse, 2)},
 				.mirrored = mat4_det3(*m) < 0};
 	vec3 half = vec3_scale(0.5, vec3_sub(high, low));
 	p->center = placement_point(p, vec3_add(low, half));

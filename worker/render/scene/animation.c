@@ -26,7 +26,7 @@ static int read_keyframe(const struct xml_element *el, bool timed, struct keyfra
 	return r;
 }
 
-static double largest(const mat4 *m)
+static double largest_element(const mat4 *m)
 {
 	double most = 0;
 	for (int i = 0; i < 3; i++)
@@ -39,10 +39,10 @@ static double largest(const mat4 *m)
 static int check_even(const struct xml_element *el, const struct keyframe *key, struct error *e)
 {
 	mat4 inverse;
-	double size = largest(&key->place);
+	double size = largest_element(&key->place);
 	if (!mat4_invert(key->place, &inverse))
 		return xml_error(el, e, EINVAL, "flattens what moves (it has no inverse)");
-	if (!(size >= LEAST_SIZE) || !(size * largest(&inverse) <= UNEVEN))
+	if (!(size >= LEAST_SIZE) || !(size * largest_element(&inverse) <= UNEVEN))
 		return xml_error(el, e, ERANGE, "makes what moves too small, or longer one way than another by %g",
 				 UNEVEN);
 	return 0;

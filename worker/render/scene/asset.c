@@ -132,7 +132,7 @@ static int open_in(const char *folder, const char *name, const char *shown, stru
 	return r;
 }
 
-static const char *after(const char *folder, const char *path)
+static const char *path_after(const char *folder, const char *path)
 {
 	size_t n = strlen(folder);
 	while (n > 0 && folder[n - 1] == '/')
@@ -142,11 +142,11 @@ static const char *after(const char *folder, const char *path)
 
 /* The part of an absolute path after the folder, compared as written or with the folder's links resolved; NULL: it is
  * not below the folder. */
-static const char *below(const char *folder, const char *path)
+static const char *path_below(const char *folder, const char *path)
 {
 	char real[PATH_MAX];
-	const char *name = *folder == '/' ? after(folder, path) : NULL;
-	return name || !realpath(*folder ? folder : ".", real) ? name : after(real, path);
+	const char *name = *folder == '/' ? path_after(folder, path) : NULL;
+	return name || !realpath(*folder ? folder : ".", real) ? name : path_after(real, path);
 }
 
 /* A name that leads `up` folders out of the scene's own, or to the top of all, and then to `rest`. */
@@ -167,7 +167,7 @@ static int open_outside(const struct asset_folders *f, const char *canonical, st
 	snprintf(path + end, sizeof path - end, "/%s", rest);
 	int rc = 0;
 	for (size_t i = 0; i < f->count && (rc == 0 || rc == -ENOENT || rc == -ENOTDIR); i++) {
-		const char *name = below(f->folder[i], path);
+		const char *name = path_below(f->folder[i], path);
 		if (name && !(rc = open_in(f->folder[i], name, shown, out, e)))
 			return 0;
 	}

@@ -9,7 +9,7 @@
 
 #include <string.h>
 
-static void drop(struct asset_keeper *k)
+static void drop_asset(struct asset_keeper *k)
 {
 	if (k->name)
 		k->inner->close(k->inner->user, &k->kept);
@@ -26,7 +26,7 @@ static int keeper_open(void *user, const char *name, struct asset *out, struct e
 		return 0;
 	}
 	if (k->users == 0)
-		drop(k); /* before the other takes memory */
+		drop_asset(k); /* before the other takes memory */
 	if (k->read > ASSET_KEEPER_BYTES_MAX)
 		return error_set(e, E2BIG, "%s: the scene asks for its files again and again; %llu GB were read so far",
 				 name, (unsigned long long)k->read >> 30);
@@ -63,5 +63,5 @@ struct asset_source asset_keeper_source(struct asset_keeper *k)
 
 void asset_keeper_fini(struct asset_keeper *k)
 {
-	drop(k);
+	drop_asset(k);
 }

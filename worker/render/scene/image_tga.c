@@ -36,7 +36,7 @@ static bool is_tga(const struct image_input *in)
 		memcmp(in->bytes + in->size - sizeof signature, signature, sizeof signature) == 0);
 }
 
-static size_t rest(const struct tga *t)
+static size_t bytes_left(const struct tga *t)
 {
 	return t->in->size - (size_t)(t->at - t->in->bytes);
 }
@@ -49,7 +49,7 @@ static int read_map(struct tga *t, const unsigned char *header)
 		return error_set(t->in->error, EBADMSG, "TGA: a palette that is not there");
 	if (header[1] == 0)
 		return 0;
-	if (size > rest(t))
+	if (size > bytes_left(t))
 		return error_set(t->in->error, EBADMSG, "TGA: the palette ends too early");
 	if (t->kind == KIND_MAPPED) {
 		if (bits != 24 && bits != 32)
@@ -88,7 +88,7 @@ static int read_header(struct tga *t)
 static const unsigned char *take_bytes(struct tga *t, size_t bytes)
 {
 	const unsigned char *p = t->at;
-	if (rest(t) < bytes)
+	if (bytes_left(t) < bytes)
 		return NULL;
 	t->at += bytes;
 	return p;

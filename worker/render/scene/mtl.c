@@ -20,7 +20,7 @@
 #include <stdio.h>
 #include <string.h>
 
-static bool opens(const struct asset_source *assets, const char *name)
+static bool can_open(const struct asset_source *assets, const char *name)
 {
 	struct asset a;
 	struct error unused;
@@ -61,7 +61,7 @@ const char *mtl_file(const struct asset_source *assets, const char *other, const
 	for (char *p = written; *p; p++)
 		*p = *p == '\\' ? '/' : *p; /* files written on Windows have it */
 	const char *last = strrchr(written, '/'), *out = name_beside(other, written, arena);
-	return !out || !last || opens(assets, out) ? out : name_beside(other, last + 1, arena);
+	return !out || !last || can_open(assets, out) ? out : name_beside(other, last + 1, arena);
 }
 
 /* ---- reading */
@@ -198,8 +198,8 @@ static void property(struct element_builder *k, struct xml_element *in, const ch
 	}
 }
 
-static void picture(struct element_builder *k, struct xml_element *in, const char *name, const struct mtl_value *v,
-		    bool numbers)
+static void put_picture(struct element_builder *k, struct xml_element *in, const char *name, const struct mtl_value *v,
+			bool numbers)
 {
 	struct xml_element *texture = plugin(k, in, "texture", "bitmap", name, v->line);
 	property(k, texture, "string", "filename", v);
@@ -212,7 +212,7 @@ static void colour(struct element_builder *k, struct xml_element *in, const char
 		   const struct mtl_value *v, const struct mtl_value *map)
 {
 	if (map->line > v->line)
-		picture(k, in, name, map, false);
+		put_picture(k, in, name, map, false);
 	else
 		property(k, in, "srgb", name, v->line ? v : &(struct mtl_value){line, "0 0 0"});
 }
@@ -256,13 +256,13 @@ int mtl_put(const struct mtl *m, const struct mtl_material *of, struct xml_eleme
 	if (mapped || partly) {
 		in = plugin(&k, in, "bsdf", "mask", NULL, of->line);
 		if (mapped)
-			picture(&k, in, "opacity", &of->opacity_map, false);
+			put_picture(&k, in, "opacity", &of->opacity_map, false);
 		else
 			property(&k, in, "float", "opacity", &of->opacity);
 	}
 	if (of->bump.line) {
 		in = plugin(&k, in, "bsdf", "bumpmap", NULL, of->line);
-		picture(&k, in, NULL, &of->bump, true);
+		put_picture(&k, in, NULL, &of->bump, true);
 	}
 	put_lobes(&k, of, in);
 	return k.count;

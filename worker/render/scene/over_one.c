@@ -15,7 +15,7 @@ static bool is_share(enum plugin_class cls, const struct param *p)
 }
 
 /* The largest number, if all are finite and none is below 0; otherwise 0. */
-static double largest(const struct value *v)
+static double largest_value(const struct value *v)
 {
 	double scratch[3], most = 0;
 	uint32_t count;
@@ -30,10 +30,10 @@ static double largest(const struct value *v)
 
 bool over_one(enum plugin_class cls, const struct param *p, const struct value *v)
 {
-	return is_share(cls, p) && largest(v) > 1;
+	return is_share(cls, p) && largest_value(v) > 1;
 }
 
-static int limit(struct value *v, struct arena *arena)
+static int limit_to_one(struct value *v, struct arena *arena)
 {
 	if (v->type == VALUE_INT)
 		v->as.integer = 1;
@@ -60,10 +60,10 @@ static int out_of_memory(const struct notes *t)
 int over_one_value(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 		   enum plugin_class cls, const struct param *p, struct arena *arena, struct value *v)
 {
-	double most = largest(v);
+	double most = largest_value(v);
 	if (!over_one(cls, p, v))
 		return 0;
-	if (limit(v, arena))
+	if (limit_to_one(v, arena))
 		return out_of_memory(t);
 	const char *type = xml_attribute(owner, "type");
 	return note(t, owner, type, p->name,
@@ -92,10 +92,10 @@ static int refuse_colour(const struct notes *t, const struct scene_node *texture
 static int limit_colour(const struct notes *t, bool lenient, struct arena *arena, const struct xml_element *el,
 			const struct scene_node *texture, const struct property *p, struct value *v)
 {
-	double most = largest(v);
+	double most = largest_value(v);
 	if (!lenient)
 		return refuse_colour(t, texture, p, most);
-	if (limit(v, arena))
+	if (limit_to_one(v, arena))
 		return out_of_memory(t);
 	return note(t, el, texture->type, p->name,
 		    "%s:%d: <texture type=\"%.64s\">: %s=%g is above 1 and counts as 1 (lenient)", texture->file,
@@ -114,7 +114,7 @@ static int limit_pattern(const struct notes *t, bool lenient, struct arena *aren
 		int r = 0;
 		if (v.type == VALUE_NODE && is_pattern(v.as.node->type))
 			r = limit_pattern(t, lenient, arena, el, &v.as.node);
-		else if (largest(&v) > 1)
+		else if (largest_value(&v) > 1)
 			r = limit_colour(t, lenient, arena, el, *texture, p, &v);
 		else
 			continue;

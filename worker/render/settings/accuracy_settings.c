@@ -55,7 +55,7 @@ static double value_of(const struct accuracy_settings *k, size_t index)
 	return value;
 }
 
-static void set(struct accuracy_settings *k, size_t index, double value)
+static void set_value(struct accuracy_settings *k, size_t index, double value)
 {
 	memcpy((char *)k + offset[index], &value, sizeof value);
 }
@@ -187,7 +187,7 @@ static int read_entry(const char *text, size_t length, struct accuracy_settings 
 				 list[index].kind == SETTING_WHOLE ? " a whole number from" : "", range, equals + 1,
 				 value_hint(&list[index], equals + 1, hint, sizeof hint));
 	}
-	set(out, index, value);
+	set_value(out, index, value);
 	return 0;
 }
 

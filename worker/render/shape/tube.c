@@ -130,7 +130,7 @@ static vec3 direction_at_start(vec3 axis)
 }
 
 /* By the smallest rotation that turns one axis into the other. */
-static vec3 carry(vec3 direction, vec3 from, vec3 to)
+static vec3 transport_direction(vec3 direction, vec3 from, vec3 to)
 {
 	double sum = 1 + vec3_dot(from, to);
 	if (!(sum > 0x1p-40)) /* turned around: it stays perpendicular */
@@ -177,7 +177,7 @@ int tube_mesh(const struct list *rings, struct arena *arena, struct mesh *out)
 		const struct tube_ring *r = &ring[i];
 		uint32_t first = i * (TUBE_SIDES + 1);
 		tick();
-		start = r->first ? direction_at_start(r->axis) : carry(start, r[-1].axis, r->axis);
+		start = r->first ? direction_at_start(r->axis) : transport_direction(start, r[-1].axis, r->axis);
 		set_ring(out, first, r, start);
 		if (r->first)
 			continue;

@@ -153,7 +153,7 @@ static void halve(const struct maker *m, uint32_t node, struct point_tree_node *
 }
 
 /* sqrt(a), scaled to a sum of 1, mixed with the chances of light sub-paths. */
-static void chances(const double *a, uint32_t n, const double *light, double *out)
+static void part_chances(const double *a, uint32_t n, const double *light, double *out)
 {
 	double sum = 0;
 	for (uint32_t e = 0; e < n; e++)
@@ -186,7 +186,7 @@ static void fill(const struct maker *m, uint32_t node, size_t count)
 	for (uint32_t e = 0; e < n; e++)
 		a[e] = around ? (a[e] + BORROWED * around[e]) / ((double)count + BORROWED) : a[e] / (double)count;
 	if (node >= m->to->first_cell) {
-		chances(a, n, m->light, a);
+		part_chances(a, n, m->light, a);
 		edges(a, n, &m->to->edge[(size_t)(node - m->to->first_cell) * (n + 1)]);
 		return;
 	}

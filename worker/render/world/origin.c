@@ -6,7 +6,7 @@
 #define MIXED 0x1p-12
 #define WIDE 0x1p11
 
-static double middle(const struct box *b, unsigned axis)
+static double middle_of(const struct box *b, unsigned axis)
 {
 	return 0.5 * (vec3_along(b->low, axis) + vec3_along(b->high, axis));
 }
@@ -55,11 +55,11 @@ vec3 origin_choose(const struct box *all, const struct box *shapes, uint32_t cou
 {
 	double at[3], least = least_extent(shapes, count);
 	for (unsigned axis = 0; axis < 3; axis++) {
-		at[axis] = middle(all, axis);
+		at[axis] = middle_of(all, axis);
 		if (!is_mixed(least, all))
 			continue;
 		for (uint32_t i = 0; i < count; i++)
-			room[i] = (struct weighted_value){middle(&shapes[i], axis), least / box_extent(&shapes[i])};
+			room[i] = (struct weighted_value){middle_of(&shapes[i], axis), least / box_extent(&shapes[i])};
 		at[axis] = median(room, count);
 	}
 	return (vec3){at[0], at[1], at[2]};
