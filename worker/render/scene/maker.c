@@ -460,6 +460,41 @@ static int read_inside(struct maker *m, struct xml_element *el, int refused)
 	return r ? r : REPORT_TOLD;
 }
 
+/* Fills in d's node from el's content, and notes whether it may be wrong. */
+static int fill_draft(struct maker *m, struct draft *d, struct xml_element *el)
+{
+	el->busy = true;
+	m->depth++;
+	int r = fill_node(m, d, el);
+	if (!r)
+		r = report_problem(&m->report, hold_still(m, d, el), m->error);
+	if (!r && (d->unsure || holds_flawed(d->node)))
+		r = note_flaw(m, d->node);
+	m->depth--;
+	el->busy = false;
+	el->nesting = d->nesting;
+	return r;
+}
+
+/* Adds the remarks on a complete node, and makes the replacements of a lenient reader, which may change *out. */
+static int finish_node(struct maker *m, const struct draft *d, struct xml_element *el, const struct scene_node **out)
+{
+	if (d->flat && m->lenient) {
+		if (m->flat_shapes++ == 0)
+			m->first_flat = el;
+		return REPORT_TOLD;
+	}
+	int r = remarks_on_object(d->node, &m->report, m->error);
+	if (!r && m->lenient && (r = substitute_medium(&m->notes, el, d->lacks, d->node)))
+		return r;
+	if (!r && m->lenient && !m->tree->dialect_3 && (r = substitute_volume(&m->notes, el, d->node)))
+		return r;
+	if (!r && m->lenient && (r = substitute_cover(&m->notes, el, d->lacks, out)) == REPORT_TOLD)
+		return r;
+	el->node = *out;
+	return r;
+}
+
 /* An object with errors inside still becomes a node, so that all errors are found. One that is not an object of any
  * kind does not, and is reported once. */
 int maker_node(struct maker *m, struct xml_element *el, const struct scene_node **out)
@@ -518,30 +553,10 @@ int maker_node(struct maker *m, struct xml_element *el, const struct scene_node 
 				      .line = el->line,
 				      .decl = decl,
 				      .shines = cls == PLUGIN_EMITTER};
-	el->busy = true;
-	m->depth++;
-	r = fill_node(m, &d, el);
-	if (!r)
-		r = report_problem(&m->report, hold_still(m, &d, el), m->error);
-	if (!r && (d.unsure || holds_flawed(d.node)))
-		r = note_flaw(m, d.node);
-	m->depth--;
-	el->busy = false;
-	el->nesting = d.nesting;
+	r = fill_draft(m, &d, el);
 	*out = d.node;
-	if (!r && d.flat && m->lenient) {
-		if (m->flat_shapes++ == 0)
-			m->first_flat = el;
-		return REPORT_TOLD;
-	}
 	if (!r)
-		r = remarks_on_object(d.node, &m->report, m->error);
-	if (!r && m->lenient && (r = substitute_medium(&m->notes, el, d.lacks, d.node)))
-		return r;
-	if (!r && m->lenient && !m->tree->dialect_3 && (r = substitute_volume(&m->notes, el, d.node)))
-		return r;
-	if (!r && m->lenient && (r = substitute_cover(&m->notes, el, d.lacks, out)) == REPORT_TOLD)
-		return r;
+		return finish_node(m, &d, el, out);
 	el->node = *out;
 	return r;
 }
