@@ -19,13 +19,13 @@ static inline double clock_wall_seconds(void)
 	return clock_seconds_of(CLOCK_REALTIME);
 }
 
-/* Of the monotonic clock. */
+/* Seconds of the monotonic clock. */
 static inline double clock_seconds(void)
 {
 	return clock_seconds_of(CLOCK_MONOTONIC);
 }
 
-/* Of processor time of the calling thread. */
+/* Seconds of CPU time of the calling thread. */
 static inline double clock_thread_seconds(void)
 {
 	return clock_seconds_of(CLOCK_THREAD_CPUTIME_ID);

@@ -28,7 +28,7 @@ const char *target_shown(const char *path);
 /* -ELOOP: a loop of links; -ENAMETOOLONG; -EISDIR. */
 int target_find(struct target *t, const char *path, struct error *e);
 
-/* Of one that is written to: a descriptor of its own; a pipe waits for its reader. -errno. */
+/* Opens the target for writing and returns a new descriptor, or -errno. Opening a pipe waits for its reader. */
 int target_open(const struct target *t, struct error *e);
 
 #endif

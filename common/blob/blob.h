@@ -23,7 +23,7 @@ int blob_store_open(struct blob_store **s, const char *folder, uint64_t limit, s
 void blob_store_close(struct blob_store *s);
 /* Evicts the least recently used blob that is not held, to make room on the disk; false: there is none. */
 bool blob_store_evict(struct blob_store *s);
-/* Of all files, also of those that are held or arriving. */
+/* Bytes of all files, including those that are held or still arriving. */
 uint64_t blob_store_bytes(const struct blob_store *s);
 /* Whoever may make room on the disk when nothing is left to evict; false: there is none. */
 void blob_store_ask(struct blob_store *s, bool (*more_room)(void *user), void *user);

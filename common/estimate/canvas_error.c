@@ -396,7 +396,7 @@ static void error_tile(struct image_builder *m, struct tile_error *t, uint32_t x
 		add_row(t, (size_t)row * t->width);
 }
 
-/* Of n values one of which differs from the others, which are equal: no n values have a larger one. */
+/* The kurtosis of n values of which all but one are equal: the largest that n values can have. */
 static double outlier_kurtosis(double n)
 {
 	return (n * n - 3 * n + 3) / (n - 1);

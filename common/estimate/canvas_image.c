@@ -20,7 +20,7 @@
 #include <math.h>
 #include <string.h>
 
-/* Of the bootstrap, whose samples are in no film: what b is made of, and what was refused. */
+/* Adds the counts of the bootstrap, whose samples are in no film: those that determine b, and refused contributions. */
 static void add_bootstrap(struct tally *to, const struct tally *from, uint32_t groups)
 {
 	for (uint32_t g = 0; g < groups; g++) {

@@ -294,7 +294,7 @@ static bool is_in_doubt(const struct fit *f, const struct scenario *y)
 	return 0.5 * erfc(0.5 * (y->rare + y->seen)) < f->doubt;
 }
 
-/* Of a render whose last look was in doubt, or not. */
+/* Draws the scenario anew until its last look is in doubt, or is not, as that of the render. */
 static void condition_on_doubt(const struct fit *f, struct scenario *y, bool doubt, struct dice *d)
 {
 	for (int i = 0; i < TRIES_MOST && is_in_doubt(f, y) != doubt; i++) {

@@ -57,7 +57,7 @@ int canvas_reserve(struct canvas *c, const struct batch *b, struct error *e);
 bool canvas_has(const struct canvas *c, const struct lease_key *k); /* merged before */
 uint64_t canvas_rounds(const struct canvas *c);			    /* complete rounds */
 
-/* Of the prefix of complete rounds; with open_rounds, of everything received. */
+/* The counts of the prefix of complete rounds; with open_rounds, of everything received. */
 void canvas_counts(const struct canvas *c, bool open_rounds, struct canvas_counts *out);
 
 #endif

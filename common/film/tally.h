@@ -17,7 +17,7 @@ struct canvas_counts {
 };
 void canvas_counts_add(struct canvas_counts *to, const struct canvas_counts *from);
 
-/* Of a round, of the prefix, or of the bootstrap. */
+/* The counts of a round, of the prefix, or of the bootstrap. */
 struct tally {
 	struct canvas_counts counts;
 	struct {

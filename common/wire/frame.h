@@ -40,7 +40,7 @@ int frame_reader_take(struct frame_reader *r, const unsigned char *bytes, size_t
 /* Releases the complete frame; otherwise the next call of frame_reader_take does. */
 void frame_reader_drop(struct frame_reader *r);
 bool frame_reader_is_midway(const struct frame_reader *r); /* part of a frame has been received */
-/* Of header and payload of the frame whose part has been received; 0: not known yet. */
+/* Bytes of header and payload of the frame that is being received; 0: not known yet. */
 uint64_t frame_reader_size(const struct frame_reader *r);
 
 void frame_prefix_read(const unsigned char in[FRAME_PREFIX], uint32_t *header_size, uint32_t *payload_size);

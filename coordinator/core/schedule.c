@@ -111,7 +111,7 @@ static bool must_wait(struct farm *f, const struct job *j)
 	return waits;
 }
 
-/* Of the jobs of the highest priority that can use a waiting worker, the one whose turn it is. */
+/* Hands out a lease of the job whose turn it is among those of the highest priority that can use a waiting worker. */
 static bool hand_out_ready(struct farm *f)
 {
 	struct job *best = NULL;

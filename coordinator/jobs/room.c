@@ -12,7 +12,7 @@ bool room_make(const struct jobs *jobs)
 	return blob_store_evict(jobs->blobs) || keep_drop_all(jobs);
 }
 
-/* Of the next checkpoint; before the first one, what it has at most. */
+/* Bytes of the next checkpoint; before the first one, an upper bound. */
 static uint64_t checkpoint_size(const struct live_job *job)
 {
 	return job->checkpoint_bytes ? job->checkpoint_bytes : canvas_bytes(&job->plan);

@@ -119,7 +119,7 @@ static void take_head(struct live_job *job, const struct checkpoint_head *h)
 	snprintf(job->fingerprint, sizeof job->fingerprint, "%s", h->fingerprint);
 }
 
-/* Of version 004. */
+/* The head of version 004. */
 static int read_old_head(struct checkpoint_head *h, struct checked_file *in, struct error *e)
 {
 	unsigned char bytes[STORED_OLD_HEAD];

@@ -175,7 +175,7 @@ static int take_record(void *user, const struct journal_item *item, struct error
 	}
 }
 
-/* Those that waited for later records in the file. */
+/* Merges the batches that waited for later records in the file. */
 static int take_late(struct replay *r, struct error *e)
 {
 	struct live_job *job = r->job;

@@ -16,7 +16,7 @@ enum {
 	REQUESTS_MOST = 512,	/* twice what a worker can need that has leases of as many jobs as it may hold */
 };
 
-/* Of what may wait at all, half is left to other answers. */
+/* Half of all that may wait to be sent is left to other answers. */
 static size_t send_ahead_bytes(const struct session *p)
 {
 	uint64_t half = p->peers->sending.limit / 2, all = half < AHEAD_OF_ALL ? half : AHEAD_OF_ALL;

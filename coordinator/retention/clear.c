@@ -86,7 +86,7 @@ static void clear_if_unneeded(const struct jobs *jobs, struct clearing *c, uint6
 			      .busy = busy};
 }
 
-/* Of large tables each piece is read when it is needed: reading them as a whole takes seconds. */
+/* Large tables are read piece by piece, as needed: reading all at once takes seconds. */
 static void look_at_next(const struct jobs *jobs, struct clearing *c)
 {
 	struct error e;

@@ -40,7 +40,7 @@ void keep_drop(const struct jobs *jobs, uint64_t job)
 		log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)job, log_quote(e.text).text);
 }
 
-/* Those that are being read for an extension stay, and so do those that the disk does not delete: they make no room. */
+/* Films that are being read for an extension stay, as do those whose deletion fails; neither makes room. */
 bool keep_drop_all(const struct jobs *jobs)
 {
 	bool any = false;

@@ -77,7 +77,7 @@ static int take_row(struct old_row *f, size_t size, const char *path, struct err
 	return 0;
 }
 
-/* Of version 002. */
+/* A row of version 002. */
 static int take_old_row(struct old_row *f, size_t size, const char *path, struct error *e)
 {
 	const unsigned char *p = f->memory, *piece[PIECES];

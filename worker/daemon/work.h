@@ -43,7 +43,7 @@ void work_memory_short(double now);
  * of twenty minutes, then of forty, and so on up to 320: what runs short again so soon needs the limit. */
 bool work_memory_was_short(double now);
 
-/* Of earlier processes: the index-th lost lease; NULL: no more. */
+/* The index-th lease that was lost with an earlier process; NULL: no more. */
 struct lost_lease *work_lost(unsigned index);
 
 #endif

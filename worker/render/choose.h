@@ -33,7 +33,7 @@
 #define RENDER_CHOICES_OTHER(name) ", " name
 #define RENDER_CHOICES_TEXT RENDER_CHOICES(RENDER_CHOICES_FIRST, RENDER_CHOICES_OTHER)
 
-/* What was found of one of them. */
+/* The figures of one integrator. */
 struct render_found {
 	double cost;	/* variance of a sample's relative contribution, the few largest left out, times rays a
 			   sample; infinite: no light but theirs */
@@ -66,7 +66,7 @@ struct render_choice {
 int render_choose(const struct world *w, struct plan_request *r, struct render_choice *out, struct error *e);
 /* By what was found. Pure. */
 const char *render_choice_of(const struct render_choice *c);
-/* What was found of path and by merging is enough. Pure. */
+/* Whether the figures of path and of merging are enough for a choice. Pure. */
 bool render_choice_is_settled(const struct render_choice *c);
 /* One sentence for people, without figures. Pure. */
 void render_choice_text(const char *integrator, const struct render_choice *c, char *text, size_t size);

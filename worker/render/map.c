@@ -34,7 +34,7 @@ enum {
 	STEP_SECOND, /* steps of RNG_BRIGHTNESS */
 };
 
-/* Of the second map: the nearest power of two. */
+/* Samples of the second map: the nearest power of two. */
 static uint64_t samples_of(const struct film_window *w, const struct plan *p)
 {
 	uint64_t n = SECOND_LEAST;

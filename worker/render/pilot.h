@@ -21,7 +21,8 @@ enum pilot_step {
 	PILOT_UNSEEN, /* uses the next three, too */
 };
 
-/* Of a render that is not short. Fewer estimate the tail worse: tests/bench/choices.md, "What the pilot chooses". */
+/* Samples for a render that is not short. Fewer estimate the tail worse: tests/bench/choices.md, "What the pilot
+ * chooses". */
 enum { PILOT_SAMPLES = 1 << 14 };
 
 /* A share of the render's samples, rounded to the nearest power of two, so that nearly equal renders have equal pilots.

@@ -32,7 +32,7 @@ enum { SAMPLES = 1 << 13 };
 enum { SETS = 2, ACROSS = 8, CELLS = ACROSS * ACROSS, CLASSES = 24 };
 static const double few = 3;
 
-/* Of one set of photons. */
+/* What one set of photons has found. */
 struct seen_by_merging {
 	double light[CELLS][CLASSES]; /* relative, summed over the samples of the camera */
 	double finds[CLASSES];	      /* by a sample of the integrator */

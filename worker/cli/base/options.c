@@ -445,7 +445,7 @@ void option_depth_note(const char *integrator, uint32_t max_depth, char *text, s
 			i->name, i->max_depth);
 }
 
-/* Of a scene that is not there: with the nearest name in its folder. */
+/* The error for a scene file that does not exist, with the nearest name in its folder. */
 static int no_scene(const char *path, const char *folder, const char *name, struct error *e)
 {
 	struct spelling near = {.wanted = name};

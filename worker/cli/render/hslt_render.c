@@ -206,7 +206,7 @@ static int make_plan(struct session *s, struct error *e)
 	return 0;
 }
 
-/* Of the time until the round is complete at which the plan's time ends the render. */
+/* The elapsed share of the time until the render ends, which is after the round in which the plan's time is over. */
 static double fraction_of_time(const struct plan *plan, const struct local_progress *p)
 {
 	double speed = p->round_seconds > 0 ? p->rounds / p->round_seconds : 0;

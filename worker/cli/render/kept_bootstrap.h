@@ -26,7 +26,7 @@
 enum { KEPT_PATH = 4096, KEPT_TEXT = 8192 };
 
 struct kept_bootstrap {
-	/* Of all files that the scene was read from: their names and contents in order. */
+	/* Where the scene is read from; checksum over names and contents of all files in order, and their bytes. */
 	const struct asset_source *inner;
 	uint32_t crc;
 	uint64_t bytes;

@@ -49,7 +49,7 @@ static double shadowed_pdf(const struct bsdf *b, const struct bsdf_point *p, vec
 	return inner->ops->pdf_solid(inner, p, wo, wi);
 }
 
-/* Of radiance: wi is towards the light. */
+/* The value for radiance: wi is towards the light. */
 static spectrum shadowed_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
 	struct bsdf_point radiance = *p;

@@ -43,7 +43,7 @@
 /* One over a cosine times the narrowest lobe is finite. */
 #define LEAST_COSINE 0x1p-900
 
-/* Of the white share in the choice of a lobe. */
+/* Weight of the white share in the choice of a lobe. */
 #define WHITE 0x1p-6
 
 /* For importance that arrives from outside: the probability of passing straight through, and those of the lobes. */

@@ -22,7 +22,7 @@
 #include <math.h>
 #include <string.h>
 
-/* What is divided by the cosines stays finite. */
+/* Lower bound of cosines, so that quotients stay finite. */
 #define COSINE_MIN 0x1p-1000
 
 struct layer {

@@ -66,7 +66,7 @@ static int read_warp(const struct tensor_input *in, const struct measured *m, co
 
 /* ---- colours ---- */
 
-/* Those of `all` wavelengths that matter to what is visible. */
+/* Keeps those of `all` wavelengths that matter to visible light. */
 static void keep_visible(struct measured *m, const double *nm, uint32_t all, uint32_t *first)
 {
 	uint32_t end = all;

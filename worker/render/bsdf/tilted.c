@@ -17,7 +17,7 @@ struct view {
 	struct relief_place outer;
 };
 
-/* Of a part of this part: in the coordinates of `frame`. */
+/* The shading frame of a part within this part, in the coordinates of `frame`. */
 static struct frame frame_inside(const void *point, const struct relief *r)
 {
 	const struct view *v = point;

@@ -16,7 +16,7 @@ struct camera_projection {
 	int (*init)(struct camera *c, const struct scene_settings *s, struct error *e);
 	/* The direction in which a film point looks, not normalised; false: the projection has no such point. */
 	bool (*direction)(const struct camera *c, double film_x, double film_y, vec3 *l);
-	/* Of a unit direction. */
+	/* The film point of a unit direction; false: it has none. */
 	bool (*project)(const struct camera *c, vec3 l, double *film_x, double *film_y);
 	double (*jac_film_from_solid)(const struct camera *c, vec3 l);
 	/* Unit tangents along which l moves with film_x and film_y, and by how much a pixel; NULL: as on a plane. */

@@ -24,7 +24,8 @@
 
 #include <string.h>
 
-/* Of to_world's columns, the longest being 1; below it, few pixels would fill the sphere. */
+/* The least volume spanned by to_world's columns, scaled so that the longest is 1; below it, few pixels would fill the
+ * sphere. */
 #define ENVMAP_VOLUME_MIN 1e-6
 
 static vec3 to_local(const struct envmap *m, vec3 d)
@@ -218,7 +219,7 @@ static int stretched_axes(const struct scene_node *n, const mat4 *to_world, stru
 	return 0;
 }
 
-/* Of a to_world that keeps angles. */
+/* The axes for a to_world that keeps angles. */
 static void turned_axes(const mat4 *to_world, struct envmap_axes *a)
 {
 	for (int c = 0; c < 3; c++)

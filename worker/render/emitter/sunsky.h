@@ -6,12 +6,12 @@
 #include "worker/render/emitter/daylight.h"
 #include "worker/render/emitter/envmap.h"
 
-/* Of the map, whose second axis is up. -EINVAL, -ENOTSUP: to_world does more than rotate. */
+/* The axes of the map, of which the second is up. -EINVAL, -ENOTSUP: to_world does more than rotate. */
 int sunsky_axes_read(const struct scene_node *n, const struct emitter_build *build, struct envmap_axes *axes,
 		     struct error *e);
 /* A direction of daylight_position in these axes. Mitsuba 3 mirrors the compass. */
 vec3 sunsky_compass(vec3 d, bool dialect_3);
-/* Of the ground, seen by X, Y and Z. */
+/* The albedo of the ground for X, Y and Z. */
 int sunsky_albedo(const struct scene_node *n, const struct emitter_build *build, double albedo[3], struct error *e);
 /* -ERANGE: the month has no such day. */
 int sunsky_check_day(const struct scene_node *n, int year, int month, int day, struct error *e);

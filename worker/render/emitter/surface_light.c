@@ -112,7 +112,7 @@ void surface_light_place(struct emitter *em, const mat4 *to_world)
 	move(em->data, to_world);
 }
 
-/* Of what moves, for choosing among emitters. */
+/* The mean area of a surface that moves, for choosing among emitters. */
 static double mean_area(const struct surface_light *l)
 {
 	enum { TIMES = 8 };

@@ -41,9 +41,9 @@ void surface_light_on_sphere(const struct surface_light *l, vec3 w, struct emitt
 /* The point of a triangle with weight b1 of its second corner and b2 of its third. */
 void surface_light_on_triangle(const struct surface_light *l, uint32_t triangle, double b1, double b2,
 			       struct emitter_point *x);
-/* Of a point in a triangle's plane: the weights of its second and third corner. */
+/* The barycentric weights of the triangle's second and third corner at a point in its plane. */
 void surface_light_weights(const struct surface_light *l, uint32_t triangle, vec3 p, double b[2]);
-/* Of a triangle, twice as long as its area is large. */
+/* The normal of a triangle; its length is twice the area. */
 vec3 surface_light_normal(const struct surface_light *l, uint32_t triangle);
 /* A corner of a triangle, k in 0..2. */
 vec3 surface_light_corner(const struct surface_light *l, uint32_t triangle, int k);

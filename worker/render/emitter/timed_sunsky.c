@@ -116,7 +116,7 @@ static int bake_sky(const struct timed *t, struct arena *room)
 	return 0;
 }
 
-/* Of the disk at its true size, by the angle from the zenith, of which there are HEIGHTS. */
+/* The colours of the disk at its true size, for HEIGHTS angles from the zenith. */
 static void sun_colors(const struct timed *t, double rgb[HEIGHTS][3])
 {
 	for (int i = 0; i < HEIGHTS; i++)

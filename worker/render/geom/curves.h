@@ -59,7 +59,7 @@ struct curve_crossing {
 /* The nearest point of a primitive within the ray; false: none. Of each sphere and cone that an end is on, of this
  * primitive or of a neighbour, that root is divided out. */
 bool curves_meet(const struct curves *c, uint32_t prim, const struct curve_ray *r, struct curve_crossing *x);
-/* Of all of its points within the ray, the one nearest to t_near. */
+/* Of all intersections within the ray, the one nearest to t_near. */
 bool curves_meet_near(const struct curves *c, uint32_t prim, const struct curve_ray *r, double t_near,
 		      struct curve_crossing *x);
 
@@ -67,9 +67,9 @@ struct curve_site {
 	double along, around;
 };
 
-/* Of a point on that part or near it. */
+/* The site of a point on this part or near it. */
 struct curve_site curves_site(const struct cone *c, enum cone_part part, vec3 p);
-/* Of the point of a primitive that is nearest to p. */
+/* The site of the primitive's point that is nearest to p. */
 struct curve_site curves_nearest(const struct curves *c, uint32_t prim, vec3 p);
 /* Whether the primitive has it. */
 bool curves_have(const struct curves *c, uint32_t prim, struct curve_site at);

@@ -14,7 +14,7 @@ struct flat_parts {
 	uint32_t *prim; /* ascending; freed with mem_free */
 };
 
-/* Of the mesh in its own frame. -ENOMEM. */
+/* Finds the flat parts of the mesh in its own frame. -ENOMEM. */
 int flat_parts_find(struct flat_parts *f, const struct accel_shape *s);
 
 #endif

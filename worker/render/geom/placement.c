@@ -9,7 +9,7 @@ static vec3 matrix_row(const mat4 *m, int k)
 	return (vec3){m->m[k][0], m->m[k][1], m->m[k][2]};
 }
 
-/* Of the linear part; at most sqrt(3) times the largest stretch. */
+/* The Frobenius norm of the linear part; at most sqrt(3) times the largest stretch. */
 static double norm(const mat4 *m)
 {
 	double a = vec3_length(matrix_row(m, 0)), b = vec3_length(matrix_row(m, 1)), c = vec3_length(matrix_row(m, 2));

@@ -8,7 +8,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Of coinciding surfaces, the one of the lowest rank is present. */
+/* Where surfaces coincide, only the one of the lowest rank is present. */
 enum surface_rank {
 	SURFACE_SHINES,
 	SURFACE_OPAQUE,
@@ -34,7 +34,7 @@ struct accel_shape {
 	bool culled;		       /* curves: no ray meets them from inside */
 };
 
-/* Of a triangle; time: see struct prim_ref. */
+/* The triangle `prim`; time: see struct prim_ref. */
 static inline struct triangle accel_triangle(const struct accel_shape *s, uint32_t prim, double time)
 {
 	const uint32_t *i = s->index[prim];
@@ -45,7 +45,7 @@ static inline struct triangle accel_triangle(const struct accel_shape *s, uint32
 			: triangle_from(s->position, i);
 }
 
-/* Of a mesh. A sphere with a placement moves. */
+/* Whether it is an instance of a mesh. A sphere with a placement moves. */
 static inline bool accel_is_instance(const struct accel_shape *s)
 {
 	return s->place && !s->is_sphere;

@@ -37,7 +37,7 @@ struct sphere_prim {
 	uint32_t shape;
 };
 
-/* Those triangles of a shape that are intersected in double, in scenes of mixed scales. */
+/* The triangles of a shape that are intersected in double, in scenes of mixed scales. */
 struct wide_prims {
 	const struct accel_shape *shape;
 	uint32_t id, count;

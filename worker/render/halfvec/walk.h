@@ -24,7 +24,7 @@ enum walk_end {
 	WALK_ITERATIONS, /* too many iterations, although the residuals still shrank */
 };
 
-/* Of a half vector whose target is 0, at the end of a walk. */
+/* Tolerance of a half vector whose target is 0, at the end of a walk. */
 #define WALK_SPECULAR_TOLERANCE 1e-9
 /* The tolerances of a reverse walk: with those of a forward walk, 2 to 11 % of the reverse walks miss the path where
  * that began only because of them. */

@@ -67,7 +67,7 @@ static inline spectrum spectrum_mul(spectrum a, spectrum b)
 	return a;
 }
 
-/* What an optical depth leaves. */
+/* The transmittance of an optical depth. */
 static inline spectrum spectrum_attenuation(spectrum depth)
 {
 	for (int i = 0; i < SPECTRUM_LANES; i++)
@@ -115,7 +115,7 @@ static inline bool spectrum_is_valid(spectrum a) /* finite and non-negative */
 	return true;
 }
 
-/* Of one lane's wavelength, per nm; positive from WAVELENGTH_MIN to WAVELENGTH_MAX. */
+/* Density of one lane's wavelength, per nm; positive from WAVELENGTH_MIN to WAVELENGTH_MAX. */
 double wavelength_pdf(double nm);
 /* u in [0,1) -> the four wavelengths described above. */
 struct wavelengths wavelengths_sample(double u);

@@ -213,7 +213,7 @@ struct medium_lanes medium_at(const struct medium *m, vec3 d, const struct wavel
 	return l;
 }
 
-/* Of channels that add up to `sum` along a ray. */
+/* The optical depth of channels whose integrals along a ray are `sum`. */
 static spectrum depth_of(const struct medium_lanes *m, const double sum[GRID_CHANNELS_MAX])
 {
 	spectrum depth = spectrum_of(0);

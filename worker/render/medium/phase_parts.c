@@ -30,7 +30,7 @@ int phase_parts_create(struct phase *p, struct phase_parts **parts, const struct
 	return 0;
 }
 
-/* Of the parts at a place; those that are fixed, or `room`. */
+/* The weights of the parts at a place: the fixed ones, or `room`, which is filled in. */
 static const double *weights_at(const struct phase_parts *m, vec3 at, double room[2])
 {
 	double value[GRID_CHANNELS_MAX];

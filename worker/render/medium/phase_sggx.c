@@ -68,7 +68,7 @@ static double eval(const struct phase *p, vec3 at, vec3 wo, vec3 wi)
 	double length = vec3_length(h);
 	if (!root_at(p, at, &l))
 		return 0;
-	/* Of light that goes straight on, any flake along the ray. */
+	/* Light that goes straight on may have met any flake that is parallel to the ray. */
 	h = length > 0 ? vec3_scale(1 / length, h) : frame_around(wo).s;
 	return distribution(&l, h) / (4 * vec3_length(times_transposed(&l, wo)));
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/mutation/heuristic.h"
 
-/* Of the two ends: nothing but half vectors (b = k), nothing but tracing (b = 0). */
+/* Weight of the two extremes: half vectors only (b = k), tracing only (b = 0). */
 #define END_WEIGHT 0.1
 
 static double roughness(const struct path_vertex *v)

@@ -22,7 +22,7 @@ struct classes {
 	struct path_sample *out;
 };
 
-/* Of c's sub-paths of so many vertices. Empties out's classes. */
+/* Begins with c's sub-paths of these numbers of vertices. Empties out's classes. */
 void classes_begin(struct classes *k, const struct path_context *c, unsigned camera, unsigned light,
 		   struct path_sample *out);
 

@@ -24,7 +24,7 @@ int asset_range_open(struct asset_range *r, const struct asset_source *assets, c
 		     uint64_t count, bool base64, struct error *e);
 void asset_range_close(struct asset_range *r, const struct asset_source *assets);
 
-/* Of bytes in base64 the bytes that they stand for. name: for the message. */
+/* Decodes base64. name: for the message. */
 int asset_range_decode(struct asset_range *r, const char *name, struct error *e);
 /* With a final 0. text: ASSET_RANGE_TEXT(n) bytes. */
 #define ASSET_RANGE_TEXT(n) (((n) + 2) / 3 * 4 + 1)

@@ -75,7 +75,7 @@ static enum gltf_colours colours_of(struct gltf *g, const struct gltf_at *a)
 	return strcmp(gltf_text(g, a, a->json, "type", ""), "VEC4") == 0 ? GLTF_COLOURS_AND_ALPHA : GLTF_COLOURS;
 }
 
-/* Of three or four components; the fourth is another accessor of the shape. */
+/* Colours have three or four components; the fourth becomes another accessor of the shape. */
 static void put_colours(struct primitive *p, const struct gltf_at *a)
 {
 	struct gltf *g = p->g;

@@ -70,7 +70,7 @@ static bool read_plane(struct stream *s, unsigned control, size_t count, unsigne
 	return header != NULL;
 }
 
-/* Of whole numbers 0, -1, 1, -2, 2 and so on, the one at that place. */
+/* Zigzag decoding: the integer at this place of 0, -1, 1, -2, 2, ... */
 static uint32_t unfold(uint32_t place)
 {
 	return place & 1 ? ~(place >> 1) : place >> 1;

@@ -149,7 +149,7 @@ enum lenient_way lenient_element(const struct xml_element *el, enum plugin_class
 		*stand_in = camera_of(type);
 		return *stand_in ? LENIENT_REPLACE : way;
 	case PLUGIN_SHAPE:
-		/* Of Mitsuba's own, `ellipsoids` have a PLY file too, but of points. */
+		/* Mitsuba's own `ellipsoids` have a PLY file too, but of points. */
 		if (plugin_is_mitsubas(cls, type) || !(mesh = mesh_of(el)))
 			return way;
 		*stand_in = mesh;

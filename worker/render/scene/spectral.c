@@ -305,7 +305,7 @@ static int inner_colour(const struct xml_element *el, const char *name, double s
 	return 0;
 }
 
-/* Of a colour if it has one: then it is what <rgb> is for light. */
+/* D65, or with a colour the same as <rgb> of light. */
 static int read_d65(const struct xml_element *el, struct arena *arena, struct value *out, struct error *e)
 {
 	double scale, *nm, *value;

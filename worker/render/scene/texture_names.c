@@ -40,7 +40,7 @@ static int become_spectrum(struct xml_element *ref, const struct xml_element *sp
 	return 0;
 }
 
-/* Of what is read again for each <ref>. */
+/* Bytes that are read again for each <ref>. */
 static uint64_t bytes_of(const struct xml_element *spectrum)
 {
 	uint64_t n = 0;

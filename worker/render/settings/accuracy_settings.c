@@ -113,7 +113,7 @@ static int name_error(const char *name, struct error *e)
 			 spelling_hint(&s, hint, sizeof hint), known);
 }
 
-/* Of one that is written without a value; "" if only the value is missing. */
+/* A hint about a setting that is written without a value; "" if only the value is missing. */
 static const char *name_hint(const char *name, char *text, size_t size)
 {
 	struct spelling s = {.wanted = name};

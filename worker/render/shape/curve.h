@@ -16,7 +16,7 @@ struct curve {
 	const uint32_t *first;	  /* of each curve, and the count of points at the end */
 	uint32_t count, curves;
 	bool spline; /* with open ends */
-	/* Of the chains: points, the box of their spheres, and the largest radius. */
+	/* The chains' number of points, the box of their spheres, and the largest radius. */
 	uint32_t chain_points;
 	vec3 low, high;
 	double thickest;

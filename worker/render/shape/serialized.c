@@ -26,7 +26,7 @@ enum { MAGIC = 0x041c, VERSION_3 = 3, VERSION_4 = 4, VERSION_5 = 5, NAME_MAX_BYT
 enum { ZLIB_RATIO = 1032 /* a byte of deflate represents at most this many */ };
 enum { HAS_NORMALS = 1, HAS_UV = 2, HAS_COLOURS = 8, HAS_FACE_NORMALS = 16, DOUBLES = 0x2000 };
 
-/* Of version 5. */
+/* Constants of version 5. */
 enum { HAS_TANGENTS_5 = 2, HAS_UV_5 = 4, FLOATS = 0x1000, RECORD = 32, FACE_RECORD = 16, ATTRIBUTES_MAX = 64 };
 
 struct stream {

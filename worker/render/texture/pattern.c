@@ -23,7 +23,7 @@ static unsigned square_at(const struct pattern *p, double u, double v)
 	return right != low;
 }
 
-/* Of the nearest whole number. */
+/* Distance to the nearest integer. */
 static double distance(double x)
 {
 	return fabs(x - round(x));

@@ -374,7 +374,7 @@ static void find_area(struct cells *c, vec3 d)
 	}
 }
 
-/* Of each channel up to `end` in this cell. */
+/* Adds the integral of each channel up to `end` in this cell. */
 static void integrate_cell(const struct cells *c, const float *const corner[8], double end,
 			   double part[GRID_CHANNELS_MAX])
 {

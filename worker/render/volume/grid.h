@@ -55,7 +55,7 @@ struct grid_ray {
 	double t0, t1;
 };
 
-/* Of each channel over the part in the box; those that the grid does not have are 0. Unit: that of t. */
+/* The integral of each channel over the part in the box, in units of t; 0 for channels that the grid does not have. */
 void grid_integrate(const struct grid *g, const struct grid_ray *r, double sum[GRID_CHANNELS_MAX]);
 /* The t at which the integral of weight[0] value[0] + ... from t0 on reaches `least`; INFINITY: not before t1. `sum` is
  * the integral of each channel up to there. Weights and values are not negative. */

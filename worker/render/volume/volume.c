@@ -14,7 +14,7 @@
 
 #define PLACE VALUE_POINT, PARAM_UNDERSTOOD, -PARAM_LENGTH_MAX, PARAM_LENGTH_MAX, NULL
 
-/* Of numbers that are no reflectances. */
+/* The upper bound of values that are not reflectances. */
 #define LARGEST 1e30
 
 const struct plugin_decl volume_decls[] = {

@@ -11,7 +11,7 @@ struct box {
 	vec3 low, high;
 };
 
-/* Of no points: low above high. */
+/* The box of no points: low above high. */
 struct box box_empty(void);
 void box_grow(struct box *b, vec3 p);
 double box_extent(const struct box *b); /* its largest side */

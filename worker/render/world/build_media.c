@@ -18,7 +18,7 @@ static int number_medium(struct builder *b, const struct scene_node *n, struct n
 	return rc ? build_go_on(b, rc) : 0;
 }
 
-/* Those inside of shapes with a `volumelight`. lights: the emitter of each medium so far. */
+/* Makes the media inside of shapes with a `volumelight` emit. lights: the emitter of each medium so far. */
 static int light_media(struct builder *b, const struct scene_node **lights)
 {
 	struct world *w = b->w;

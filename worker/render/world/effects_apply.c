@@ -46,7 +46,7 @@ static unsigned lobes_without(const struct bsdf *b, const struct effects_choice 
 	return without;
 }
 
-/* Of a medium whose albedo varies, optical depths are known for both effects together (medium.h). */
+/* Where a medium's albedo varies, its optical depths are known only for both effects together (medium.h). */
 static int apply_to_medium(struct medium *m, const struct effects *fx, const struct effects_choice *forced,
 			   struct error *e)
 {

@@ -91,7 +91,7 @@ static mat4 to_world(const struct world *w, const struct shared_mesh *m, const m
 	return r;
 }
 
-/* Of the mesh after rounding. */
+/* The box of the mesh after rounding. */
 static struct box float_box(const struct geom_shape *g)
 {
 	struct box b = box_empty();

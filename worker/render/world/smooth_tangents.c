@@ -13,7 +13,8 @@ struct weld {
 	uint32_t vertex;
 };
 
-/* Of a vertex: of triangles whose texture coordinates run as on a picture seen from outside, and of mirrored ones. */
+/* Sums at a vertex, over triangles whose texture coordinates run as on a picture seen from outside, and over mirrored
+ * ones. */
 struct sums {
 	vec3 of[2];
 	double angle[2];
