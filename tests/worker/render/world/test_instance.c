@@ -115,9 +115,10 @@ static void compare_surfaces(const char *shape, bool tangents, double turn)
 		     *b = world_of_pots(false, VIEW SKY, shape, 24, 16);
 	assert_int_equal(a->shape_count, PLACES);
 	assert_int_equal(b->shape_count, PLACES);
+	assert_int_equal(a->sharing_count, PLACES);
 	assert_int_equal(a->instance_count, PLACES);
 	assert_int_equal(a->shared_mesh_count, 1);
-	assert_int_equal(b->instance_count, 0);
+	assert_int_equal(b->sharing_count, 0);
 	for (uint32_t k = 0; k < PLACES; k++) {
 		const struct geom_shape *s = &a->shapes[k], *t = &b->shapes[k];
 		assert_ptr_equal(s->position, a->shapes[0].position);
@@ -172,7 +173,7 @@ static void test_coincident(void **state)
 			     : VIEW SKY FLOOR;
 		struct world *a = world_of_pots(true, floor, FILE_OF(GLASS), 24, 16),
 			     *b = world_of_pots(false, floor, FILE_OF(GLASS), 24, 16);
-		assert_int_equal(a->instance_count, PLACES);
+		assert_int_equal(a->sharing_count, PLACES);
 		assert_true((a->coincidence != NULL) == !lift && (b->coincidence != NULL) == !lift);
 		if (!lift) {
 			/* The plain one and a mirrored one; the others are tilted, or stand elsewhere. */
@@ -196,7 +197,7 @@ static void test_displaced(void **state)
 	"<integer name='displacement_level' value='1'/>"
 	struct world *a = world_of_pots(true, VIEW SKY, FILE_OF(DISPLACED), 12, 8),
 		     *b = world_of_pots(false, VIEW SKY, FILE_OF(DISPLACED), 12, 8);
-	assert_int_equal(a->instance_count, 1); /* of the four one is merely moved */
+	assert_int_equal(a->sharing_count, 1); /* of the four one is merely moved */
 	for (uint32_t k = 0; k < PLACES; k++) {
 		struct surface_point x, y;
 		surface_on_triangle(&a->shapes[k], (struct prim_ref){k, 77, 0}, 0.3, 0.3, &x);
@@ -218,7 +219,7 @@ static void test_not_shared(void **state)
 	};
 	for (size_t i = 0; i < sizeof inside / sizeof *inside; i++) {
 		struct world *w = world_of_pots(true, VIEW SKY, inside[i], 12, 8);
-		assert_int_equal(w->instance_count, 0);
+		assert_int_equal(w->sharing_count, 0);
 		assert_int_equal(w->shape_count, PLACES);
 		world_free(w);
 	}
@@ -242,7 +243,7 @@ static void test_images(void **state)
 		"</shape>";
 	/* clang-format on */
 	struct world *a = world_of_pots(true, room, inside, 24, 16), *b = world_of_pots(false, room, inside, 24, 16);
-	assert_int_equal(a->instance_count, 2 * PLACES);
+	assert_int_equal(a->sharing_count, 2 * PLACES);
 	static struct agree_image shared, written, chains;
 	agree_render(a, __func__, "instances", &(struct agree_side){"path", 640, 32, 0, 0}, &shared);
 	agree_render(b, __func__, "copies", &(struct agree_side){"path", 640, 32, 0, 0}, &written);
