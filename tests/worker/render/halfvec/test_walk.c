@@ -550,7 +550,7 @@ static void test_meshes(void **state)
 			    "</shape><shape type='instance'><ref id='g'/><transform name='to_world'>"
 			    "<scale x='-1.2' y='1' z='0.9'/></transform></shape><shape type='instance'><ref id='g'/>"
 			    "<transform name='to_world'><translate y='-0.5'/></transform></shape>");
-	assert_int_equal(w->instance_count, 2);
+	assert_int_equal(w->sharing_count, 2);
 	walk_in("instances of water", w, 0.99, 0.998);
 }
 

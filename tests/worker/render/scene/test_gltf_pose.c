@@ -332,7 +332,7 @@ static void of_several_nodes(void **state)
 			{"grid.bin", i ? (const void *)whole : grid, i ? sizeof whole : sizeof grid},
 			{0}};
 		struct world *w = world_of_files(4, 4, list);
-		assert_int_equal(w->instance_count, 3);
+		assert_int_equal(w->sharing_count, 3);
 		eye[i] = vec3_add(vec3_scale(1 / w->scale, w->camera.position), w->center);
 		world_free(w);
 	}

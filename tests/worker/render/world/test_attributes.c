@@ -170,7 +170,7 @@ static void test_instances(void **state)
 #define INSTANCE(inner) "<shape type='instance'><ref id='g'/><transform name='to_world'>" inner "</transform></shape>"
 	struct world *w = world_of(SKY "<shape type='shapegroup' id='g'>" PLY("linear.ply", LINEAR) "</shape>" INSTANCE(
 		"<translate z='-0.1'/>") INSTANCE("<scale x='-1'/>") INSTANCE("<translate z='0.1'/>"));
-	assert_int_equal(w->instance_count, 3);
+	assert_int_equal(w->sharing_count, 3);
 	for (uint32_t i = 0; i < 3; i++)
 		assert_linear(w, i, i == 1);
 	assert_true(w->parts[0].bsdf == w->parts[2].bsdf && w->parts[0].bsdf != w->parts[1].bsdf);

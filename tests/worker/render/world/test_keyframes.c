@@ -67,7 +67,7 @@ static void test_still(void **state)
 	world_free(w);
 	w = world_of_text(32, 32, VIEW(OPEN("1.999", "3")) SKY CUBE);
 	assert_true(w->effects.motion);
-	assert_int_equal(w->instance_count, 1);
+	assert_int_equal(w->sharing_count, 1);
 	world_free(w);
 }
 

@@ -184,7 +184,7 @@ static void test_instances(void **state)
 			"<transform name='to_world'><scale x='-2' y='2' z='2'/><translate z='4'/></transform></shape>");
 	compare(w, 0, unmoved, 1, 0.125, 0.75, 0.75, 0.25);
 	const mat4 mirrored = {{{-2, 0, 0, 0}, {0, 2, 0, 0}, {0, 0, 2, 4}, {0, 0, 0, 1}}};
-	compare(w, 1, mirrored, 2, w->instance_count ? 0.25 : 0.125, 0.75, 0.75, 0.25);
+	compare(w, 1, mirrored, 2, w->sharing_count ? 0.25 : 0.125, 0.75, 0.75, 0.25);
 	world_free(w);
 }
 
