@@ -85,6 +85,18 @@ bool coincide_triangles(const struct triangle *a, const struct triangle *b, doub
 	return over.n >= 3 && has_width(&over, n, fmax(largest_coordinate(a), largest_coordinate(b)));
 }
 
+static double farthest_coordinate(const struct accel_shape *s)
+{
+	return triangle_norm_max(s->center) + s->radius;
+}
+
+bool coincide_spheres(const struct accel_shape *a, const struct accel_shape *b)
+{
+	vec3 between = vec3_sub(a->center, b->center);
+	double within = 0x1p-23 * fmax(farthest_coordinate(a), farthest_coordinate(b));
+	return triangle_norm1(between) + fabs(a->radius - b->radius) <= within;
+}
+
 /* As seen along n. */
 static bool is_covered_by(const struct accel_shape *s, uint32_t prim, vec3 p, vec3 n)
 {

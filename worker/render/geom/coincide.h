@@ -55,4 +55,7 @@ struct prim_ref coincide_there(const struct coincidence *c, const struct accel_s
  * of their vertices besides the rounding of coordinates to float (struct placement). */
 bool coincide_triangles(const struct triangle *a, const struct triangle *b, double off, bool *wholly);
 
+/* Whether two spheres are one within the rounding of floats. */
+bool coincide_spheres(const struct accel_shape *a, const struct accel_shape *b);
+
 #endif

@@ -17,6 +17,7 @@
 #include "common/base/list.h"
 #include "common/base/liveness.h"
 #include "common/base/mem.h"
+#include "worker/render/geom/coincide_result.h"
 #include "worker/render/geom/flat_parts.h"
 
 #include <stdlib.h>
@@ -127,24 +128,12 @@ static bool nothing_to_find(const struct search *f, const struct prim_ref *items
 	return n < 2 || !is_emitter(f, items[0]);
 }
 
-static double largest_coordinate(const struct accel_shape *s)
-{
-	return fmax(fabs(s->center.x), fmax(fabs(s->center.y), fabs(s->center.z))) + s->radius;
-}
-
-static bool spheres_coincide(const struct accel_shape *a, const struct accel_shape *b)
-{
-	vec3 between = vec3_sub(a->center, b->center);
-	double within = 0x1p-23 * fmax(largest_coordinate(a), largest_coordinate(b));
-	return triangle_norm1(between) + fabs(a->radius - b->radius) <= within;
-}
-
 static bool coincide(const struct search *f, struct coincide_pair *p)
 {
 	const struct accel_shape *a = &f->shapes[p->hidden.shape], *b = &f->shapes[p->by.shape];
 	p->wholly = p->same_side = true;
 	if (a->is_sphere || b->is_sphere)
-		return a->is_sphere && b->is_sphere && spheres_coincide(a, b);
+		return a->is_sphere && b->is_sphere && coincide_spheres(a, b);
 	const struct triangle t = accel_triangle(a, p->hidden.prim, 0), u = accel_triangle(b, p->by.prim, 0);
 	double off = (a->place ? a->place->vertex_is_off : 0) + (b->place ? b->place->vertex_is_off : 0);
 	p->same_side = vec3_dot(t.n, u.n) > 0;
@@ -388,77 +377,6 @@ static int look_into(struct search *f, struct prim_ref *items, size_t n, unsigne
 	return rc;
 }
 
-static int compare_pairs(const void *x, const void *y)
-{
-	const struct coincide_pair *a = x, *b = y;
-	const uint32_t u[] = {a->hidden.shape, a->hidden.prim, (uint32_t)a->rank, a->by.shape, a->by.prim};
-	const uint32_t v[] = {b->hidden.shape, b->hidden.prim, (uint32_t)b->rank, b->by.shape, b->by.prim};
-	for (int i = 0; i < 5; i++)
-		if (u[i] != v[i])
-			return u[i] < v[i] ? -1 : 1;
-	return 0;
-}
-
-static int compare_shapes(const void *x, const void *y)
-{
-	const struct coincide_shapes *a = x, *b = y;
-	if (a->hidden != b->hidden)
-		return a->hidden < b->hidden ? -1 : 1;
-	return a->by < b->by ? -1 : a->by > b->by;
-}
-
-/* Pairs across a cut were found more than once. */
-static size_t unique_pairs(struct coincide_pair *p, size_t n)
-{
-	size_t kept = 0;
-	if (n == 0) /* p may be NULL then, which qsort does not allow */
-		return 0;
-	qsort(p, n, sizeof *p, compare_pairs);
-	for (size_t i = 0; i < n; i++)
-		if (kept == 0 || compare_pairs(&p[kept - 1], &p[i]) != 0)
-			p[kept++] = p[i];
-	return kept;
-}
-
-static void list_shapes(struct coincidence *c)
-{
-	struct coincide_shapes *s = c->shapes;
-	for (size_t i = 0; i < c->pair_count; i++)
-		s[i] = (struct coincide_shapes){c->pairs[i].hidden.shape, c->pairs[i].by.shape, c->pairs[i].same_side};
-	if (c->pair_count > 1)
-		qsort(s, c->pair_count, sizeof *s, compare_shapes);
-	for (size_t i = 0; i < c->pair_count; i++) {
-		if (c->shapes_count == 0 || compare_shapes(&s[c->shapes_count - 1], &s[i]) != 0)
-			s[c->shapes_count++] = s[i];
-		else
-			s[c->shapes_count - 1].same_side |= s[i].same_side;
-	}
-}
-
-static int make_result(struct search *f, uint32_t count, struct coincidence **out)
-{
-	struct coincidence *c = mem_alloc(1, sizeof *c);
-	if (!c)
-		return -ENOMEM;
-	*c = (struct coincidence){
-		.pairs = f->pairs, .pair_count = unique_pairs(f->pairs, f->pair_count), .incomplete = f->incomplete};
-	f->pairs = NULL;
-	c->shapes = mem_alloc(c->pair_count, sizeof *c->shapes);
-	c->first = mem_alloc((size_t)count + 1, sizeof *c->first);
-	if (!c->shapes || !c->first) {
-		coincide_free(c);
-		return -ENOMEM;
-	}
-	list_shapes(c);
-	for (size_t i = 0; i < c->pair_count; i++)
-		c->first[c->pairs[i].hidden.shape + 1] = i + 1;
-	for (uint32_t i = 0; i < count; i++)
-		if (c->first[i + 1] < c->first[i])
-			c->first[i + 1] = c->first[i];
-	*out = c;
-	return 0;
-}
-
 /* All primitives by rank; instances as single items. */
 static size_t list_primitives(const struct accel_shape *shapes, uint32_t count, struct prim_ref *items)
 {
@@ -519,7 +437,8 @@ int coincide_find(struct coincidence **out, const struct accel_shape *shapes, ui
 		mem_free(f.flat[i].prim);
 	mem_free(f.flat);
 	if (!rc && (f.pair_count > 0 || f.incomplete))
-		rc = make_result(&f, count, out);
-	mem_free(f.pairs);
+		rc = coincide_result(f.pairs, f.pair_count, f.incomplete, count, out);
+	else
+		mem_free(f.pairs);
 	return rc ? error_set(e, ENOMEM, "out of memory") : 0;
 }
