@@ -1,13 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Decides which of coinciding primitives is present, and whether two coincide. For the latter, one triangle is
- * projected onto the other: they coincide if the corners of the resulting polygon are no farther from the other's plane
- * than the rounding of both triangles' vertices, floats by 2^-24 of each coordinate, and if the polygon is wider than a
- * few such roundings. The corners decide for all of it, because both are planes.
+ * Decides which of coinciding primitives is present, and whether two coincide. For the latter, their planes must have
+ * one direction, which rejects most pairs; then one triangle is projected onto the other: they coincide if the corners
+ * of the resulting polygon are no farther from the other's plane than the rounding of both triangles' vertices, floats
+ * by 2^-24 of each coordinate, and if the polygon is wider than a few such roundings. The corners decide for all of it,
+ * because both are planes.
  */
 #include "worker/render/geom/coincide.h"
 
 #include "common/base/mem.h"
+
+#include <float.h>
 
 enum { CORNERS = 9 }; /* three corners, and one more per cut */
 
@@ -67,16 +70,36 @@ static bool has_width(const struct polygon *a, vec3 n, double cuts)
 	return fabs(area2) > 0x1p-21 * far * around;
 }
 
+struct coincide_facing coincide_facing_of(const struct triangle *t)
+{
+	double length = vec3_length(t->n);
+	if (!(length >= DBL_MIN))
+		return (struct coincide_facing){.altitude = 0};
+	/* More than along any direction, and for the rounding of n. */
+	return (struct coincide_facing){vec3_scale(1 / length, t->n), triangle_altitude(t),
+					2 * t->rounding * largest_coordinate(t)};
+}
+
+/* Whether rounding accounts for the angle between their planes. */
+static bool have_one_direction(const struct triangle *a, const struct triangle *b, double rounded)
+{
+	double across = vec3_length(vec3_cross(a->n, b->n)), lengths = vec3_length(a->n) * vec3_length(b->n);
+	return across * fmin(triangle_altitude(a), triangle_altitude(b)) <= COINCIDE_TILT * rounded * lengths;
+}
+
 bool coincide_triangles(const struct triangle *a, const struct triangle *b, double off, bool *wholly)
 {
 	vec3 n = vec3_normalize(b->n);
+	double rounded = rounded_along(a, n) + rounded_along(b, n) + off;
+	if (!have_one_direction(a, b, rounded))
+		return false;
 	struct polygon over = {{a->v[0], a->v[1], a->v[2]}, 3};
 	for (int i = 0; i < 3 && over.n > 0; i++) {
 		vec3 from = b->v[i], to = b->v[(i + 1) % 3];
 		cut_polygon(&over, from, vec3_cross(n, vec3_sub(to, from)));
 	}
 	/* Twice the rounding error, for the earlier roundings in double and for the sums here. */
-	double within = 2 * (rounded_along(a, n) + rounded_along(b, n) + off);
+	double within = 2 * rounded;
 	for (unsigned i = 0; i < over.n; i++)
 		if (!(fabs(vec3_dot(n, vec3_sub(over.p[i], b->v[0]))) <= within))
 			return false;

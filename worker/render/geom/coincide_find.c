@@ -9,6 +9,10 @@
  * by those triangles of its flat parts that meet the box around the others. Most instances are alone by then, or have
  * none, and cost nothing.
  *
+ * A small mesh that does not emit is one item, too, but a cut does not divide it: it goes to both halves, each with
+ * that part of it which is there, as its spine (coincide_spine.h) tells. Where no cut separates it from others, those
+ * triangles take its place that are near another and as steep.
+ *
  * The search is bounded in steps and in pairs. Where a bound ends it, the result holds what was found so far and is
  * marked `incomplete`, which the user is told. -ENOMEM.
  */
@@ -18,12 +22,14 @@
 #include "common/base/liveness.h"
 #include "common/base/mem.h"
 #include "worker/render/geom/coincide_result.h"
+#include "worker/render/geom/coincide_spine.h"
 #include "worker/render/geom/flat_parts.h"
 
 #include <stdlib.h>
 
-#define WHOLE UINT32_MAX /* as the primitive: an entire instance */
+#define WHOLE UINT32_MAX /* as the primitive: an entire instance or small mesh */
 enum { INSTANCED_MAX = 1 << 22 };
+enum { SMALL = 2048 }; /* triangles */
 enum { FEW = 12, MOST_CUTS = 64, SAMPLE = 129, OTHERS = 32, MANY = 16 * OTHERS };
 
 struct search {
@@ -32,6 +38,8 @@ struct search {
 	size_t pair_count, pair_room, pair_limit;
 	uint64_t work, limit; /* primitives put into parts, and pairs compared */
 	bool incomplete;
+	double low[3], high[3]; /* the box that is being looked into */
+	struct spine *spines;	/* one per shape, of the small meshes; NULL: there are none */
 	struct flat_parts
 		*flat; /* one per shape, that of the first shape sharing the mesh; NULL: there are no instances */
 };
@@ -39,7 +47,20 @@ struct search {
 struct member {
 	struct prim_ref prim;
 	double low[3], high[3];
+	struct spine_part part;	       /* of a small mesh */
+	struct coincide_facing facing; /* known in compare_part only */
 };
+
+static bool is_small(const struct accel_shape *s)
+{
+	return s->triangle_count > 0 && s->triangle_count <= SMALL && !s->is_sphere && !s->place &&
+	       s->rank != SURFACE_SHINES;
+}
+
+static bool is_small_mesh(const struct search *f, struct prim_ref p)
+{
+	return p.prim == WHOLE && !f->shapes[p.shape].place;
+}
 
 static void extent_of_instance(const struct accel_shape *s, uint32_t prim, unsigned axis, double *low, double *high)
 {
@@ -55,10 +76,25 @@ static void extent_of_instance(const struct accel_shape *s, uint32_t prim, unsig
 	*high = fmax(u, fmax(v, w)) + margin;
 }
 
+/* Within the box that is being looked into. */
+static void extent_of_small(const struct search *f, uint32_t shape, struct spine_part part, unsigned axis, double *low,
+			    double *high)
+{
+	spine_extent(&f->spines[shape], part, axis, low, high);
+	*low = fmax(*low, f->low[axis]);
+	*high = fmin(*high, f->high[axis]);
+}
+
 /* The box's extent along an axis, slightly enlarged so that rounded coordinates meet. */
 static void extent(const struct search *f, struct prim_ref p, unsigned axis, double *low, double *high)
 {
 	const struct accel_shape *s = &f->shapes[p.shape];
+	if (is_small_mesh(f, p)) {
+		struct spine_part part;
+		spine_clip(&f->spines[p.shape], f->low, f->high, &part);
+		extent_of_small(f, p.shape, part, axis, low, high);
+		return;
+	}
 	if (s->place) {
 		extent_of_instance(s, p.prim, axis, low, high);
 	} else if (s->is_sphere) {
@@ -80,8 +116,13 @@ static void extent(const struct search *f, struct prim_ref p, unsigned axis, dou
 static struct member member_of(const struct search *f, struct prim_ref p)
 {
 	struct member m = {.prim = p};
+	if (is_small_mesh(f, p))
+		spine_clip(&f->spines[p.shape], f->low, f->high, &m.part);
 	for (unsigned k = 0; k < 3; k++)
-		extent(f, p, k, &m.low[k], &m.high[k]);
+		if (is_small_mesh(f, p))
+			extent_of_small(f, p.shape, m.part, k, &m.low[k], &m.high[k]);
+		else
+			extent(f, p, k, &m.low[k], &m.high[k]);
 	return m;
 }
 
@@ -90,9 +131,11 @@ static bool choose_cut(const struct search *f, const struct prim_ref *items, siz
 {
 	struct member m[SAMPLE];
 	double middle[SAMPLE];
-	size_t count = n < SAMPLE ? n : SAMPLE, least = SIZE_MAX;
-	for (size_t i = 0; i < count; i++)
+	size_t count = n < SAMPLE ? n : SAMPLE, least = SIZE_MAX, small = 0;
+	for (size_t i = 0; i < count; i++) {
 		m[i] = member_of(f, items[(size_t)((double)n * (double)i / (double)count)]);
+		small += is_small_mesh(f, m[i].prim);
+	}
 	for (unsigned k = 0; k < 3; k++) {
 		size_t below = 0, above = 0;
 		for (size_t i = 0; i < count; i++)
@@ -110,7 +153,10 @@ static bool choose_cut(const struct search *f, const struct prim_ref *items, siz
 			*at = cut;
 		}
 	}
-	/* Few can as well be compared: cutting them must at least pay for that. */
+	/* To separate meshes saves comparing their triangles. Few others can as well be compared: cutting them must at
+	 * least pay for that. */
+	if (2 * small > count)
+		return least < SIZE_MAX && least * 4 <= count * 7;
 	return least < SIZE_MAX && (n < MANY ? least * 5 <= count * 7 : least * 3 <= count * 5);
 }
 
@@ -178,7 +224,8 @@ static int compare_all(struct search *f, struct member *m, size_t n)
 			struct coincide_pair p = {
 				.hidden = m[i].prim, .by = m[j].prim, .rank = f->shapes[m[j].prim.shape].rank};
 			f->work++;
-			if (!may_meet(f, &m[i], &m[j]) || !coincide(f, &p))
+			if (!may_meet(f, &m[i], &m[j]) || coincide_faces_away(&m[i].facing, &m[j].facing) ||
+			    !coincide(f, &p))
 				continue;
 			int rc = add_pair(f, &p);
 			if (rc)
@@ -198,8 +245,14 @@ static int compare_part(struct search *f, const struct prim_ref *items, size_t n
 	struct member few[FEW], *m = n <= FEW ? few : mem_alloc(n, sizeof *m);
 	if (!m)
 		return -ENOMEM;
-	for (size_t i = 0; i < n; i++)
+	for (size_t i = 0; i < n; i++) {
+		const struct accel_shape *s = &f->shapes[items[i].shape];
 		m[i] = member_of(f, items[i]);
+		if (s->is_sphere || s->place)
+			continue;
+		const struct triangle t = accel_triangle(s, items[i].prim, 0);
+		m[i].facing = coincide_facing_of(&t);
+	}
 	int rc = compare_all(f, m, n);
 	if (m != few)
 		mem_free(m);
@@ -254,12 +307,14 @@ struct cut {
 	double at;
 };
 
-/* Instances across the cut are expanded; if there are none, every instance is. */
+/* Instances across the cut are expanded; if there is none, every instance and small mesh is. */
 static bool is_divided(const struct search *f, struct prim_ref p, const struct cut *c)
 {
 	double low, high;
 	if (p.prim != WHOLE)
 		return false;
+	if (is_small_mesh(f, p))
+		return !c->is;
 	extent(f, p, c->axis, &low, &high);
 	return !c->is || (low <= c->at && high >= c->at);
 }
@@ -274,10 +329,11 @@ static size_t room_divided(const struct search *f, const struct prim_ref *items,
 {
 	size_t room = n;
 	bool any = false;
-	for (size_t i = 0; f->flat && i < n; i++)
+	for (size_t i = 0; i < n; i++)
 		if (is_divided(f, items[i], c)) {
 			any = true;
-			room += flat_of(f, items[i].shape)->count;
+			room += is_small_mesh(f, items[i]) ? f->shapes[items[i].shape].triangle_count
+							   : flat_of(f, items[i].shape)->count;
 		}
 	return any ? room : 0;
 }
@@ -315,6 +371,89 @@ static size_t divide(struct search *f, uint32_t shape, const struct member *box,
 	return count;
 }
 
+/* What of the items is near the small mesh, at most OTHERS of them; more: OTHERS + 1. */
+static size_t find_near(struct search *f, const struct prim_ref *items, size_t n, const struct member *m,
+			struct member *others)
+{
+	size_t count = 0;
+	f->work += n;
+	for (size_t i = 0; i < n; i++) {
+		const struct member o = member_of(f, items[i]);
+		if (!may_meet(f, m, &o) || f->shapes[o.prim.shape].is_sphere ||
+		    (is_small_mesh(f, o.prim) &&
+		     !spines_meet(&f->spines[m->prim.shape], m->part, &f->spines[o.prim.shape], o.part)))
+			continue;
+		if (count == OTHERS)
+			return OTHERS + 1;
+		others[count++] = o;
+	}
+	return count;
+}
+
+/* What is near a small mesh, and by how much its triangles may lean to be like those of each. */
+struct near {
+	size_t count; /* OTHERS + 1: more */
+	struct member others[OTHERS];
+	double lean[OTHERS];
+};
+
+static bool is_near_any(const struct search *f, struct prim_ref p, const struct near *near)
+{
+	const struct triangle t = accel_triangle(&f->shapes[p.shape], p.prim, 0);
+	double n2 = vec3_dot(t.n, t.n);
+	for (size_t i = 0; i < near->count; i++) {
+		const struct member *o = &near->others[i];
+		if (is_small_mesh(f, o->prim)) {
+			double lean = vec3_dot(t.n, f->spines[o->prim.shape].direction);
+			if (lean * lean > near->lean[i] * near->lean[i] * n2)
+				continue;
+		}
+		const struct member m = member_of(f, p);
+		if (may_meet(f, &m, o))
+			return true;
+	}
+	return false;
+}
+
+static void find_leans(const struct search *f, uint32_t shape, struct near *near)
+{
+	for (size_t i = 0; i < near->count && i < OTHERS; i++)
+		if (is_small_mesh(f, near->others[i].prim))
+			near->lean[i] = spine_lean_at_most(&f->spines[near->others[i].prim.shape], &f->spines[shape]);
+}
+
+/* Whether the triangle belongs into the box that is being looked into, where there is too much to compare it with. */
+static bool is_in_box(const struct search *f, struct prim_ref p)
+{
+	const struct member m = member_of(f, p);
+	for (int k = 0; k < 3; k++)
+		if (m.high[k] < f->low[k] || m.low[k] > f->high[k])
+			return false;
+	return true;
+}
+
+/* Appends the triangles of the small mesh, of these items, that are near another item. */
+static size_t divide_small(struct search *f, const struct prim_ref *items, size_t n, uint32_t shape,
+			   struct prim_ref *out)
+{
+	struct near near = {.count = OTHERS + 1};
+	const struct member mesh = member_of(f, (struct prim_ref){shape, WHOLE, 0});
+	size_t count = 0;
+	if (n <= MANY)
+		near.count = find_near(f, items, n, &mesh, near.others);
+	if (near.count == 0)
+		return 0;
+	find_leans(f, shape, &near);
+	f->work += f->shapes[shape].triangle_count;
+	for (uint32_t k = 0; k < f->shapes[shape].triangle_count; k++) {
+		const struct prim_ref p = {shape, k, 0};
+		if (near.count > OTHERS ? is_in_box(f, p) : is_near_any(f, p, &near))
+			out[count++] = p;
+	}
+	tick();
+	return count;
+}
+
 static size_t divide_all(struct search *f, const struct prim_ref *items, size_t n, const struct cut *c,
 			 struct prim_ref *out)
 {
@@ -324,10 +463,25 @@ static size_t divide_all(struct search *f, const struct prim_ref *items, size_t 
 			out[count++] = items[i];
 			continue;
 		}
+		if (is_small_mesh(f, items[i])) {
+			count += divide_small(f, items, n, items[i].shape, out + count);
+			continue;
+		}
 		const struct member box = box_of_others(f, items, n, i);
 		count += divide(f, items[i].shape, &box, out + count);
 	}
 	return count;
+}
+
+/* The half is the box that is being looked into. */
+static bool is_in_half(const struct search *f, struct prim_ref p, bool upper, const struct cut *c)
+{
+	double low, high;
+	struct spine_part unused;
+	if (is_small_mesh(f, p))
+		return spine_clip(&f->spines[p.shape], f->low, f->high, &unused);
+	extent(f, p, c->axis, &low, &high);
+	return upper ? high >= c->at : low <= c->at;
 }
 
 static int look_into_halves(struct search *f, const struct prim_ref *items, size_t n, unsigned cuts,
@@ -336,16 +490,17 @@ static int look_into_halves(struct search *f, const struct prim_ref *items, size
 	struct prim_ref *half = mem_alloc(n, sizeof *half);
 	int rc = half ? 0 : -ENOMEM;
 	for (int upper = 0; upper < 2 && !rc; upper++) {
+		double *side = upper ? &f->low[c->axis] : &f->high[c->axis], whole = *side;
 		size_t count = 0;
+		*side = c->at;
 		for (size_t i = 0; i < n; i++) {
-			double low, high;
-			extent(f, items[i], c->axis, &low, &high);
-			if (upper ? high >= c->at : low <= c->at)
+			if (is_in_half(f, items[i], upper, c))
 				half[count++] = items[i];
 			if (i % 4096 == 0)
 				tick();
 		}
 		rc = look_into(f, half, count, cuts - 1);
+		*side = whole;
 	}
 	mem_free(half);
 	return rc;
@@ -377,17 +532,18 @@ static int look_into(struct search *f, struct prim_ref *items, size_t n, unsigne
 	return rc;
 }
 
-/* All primitives by rank; instances as single items. */
+/* All primitives by rank; instances and small meshes as single items. */
 static size_t list_primitives(const struct accel_shape *shapes, uint32_t count, struct prim_ref *items)
 {
 	size_t n = 0;
 	for (unsigned rank = 0; rank < SURFACE_RANKS; rank++)
 		for (uint32_t i = 0; i < count; i++) {
-			bool whole = shapes[i].is_sphere || shapes[i].place;
+			bool whole = shapes[i].is_sphere || shapes[i].place || is_small(&shapes[i]);
 			uint32_t prims = whole ? !accel_moves(&shapes[i]) : shapes[i].triangle_count;
 			for (uint32_t k = 0; shapes[i].rank == rank && k < prims; k++, n++)
 				if (items)
-					items[n] = (struct prim_ref){i, shapes[i].place ? WHOLE : k, 0};
+					items[n] = (struct prim_ref){
+						i, shapes[i].place || is_small(&shapes[i]) ? WHOLE : k, 0};
 		}
 	return n;
 }
@@ -410,18 +566,35 @@ static int find_flat_parts(struct search *f, uint32_t count, size_t *moved)
 	return 0;
 }
 
+/* *triangles: the total number in small meshes. */
+static int find_spines(struct search *f, uint32_t count, size_t *triangles)
+{
+	*triangles = 0;
+	for (uint32_t i = 0; i < count; i++) {
+		if (!is_small(&f->shapes[i]))
+			continue;
+		if (!f->spines && !(f->spines = mem_alloc(count, sizeof *f->spines)))
+			return -ENOMEM;
+		f->spines[i] = spine_of(&f->shapes[i]);
+		*triangles += f->shapes[i].triangle_count;
+		tick();
+	}
+	return 0;
+}
+
 static int find(struct search *f, uint32_t count, size_t n)
 {
-	size_t moved;
+	size_t moved, small;
 	int rc = find_flat_parts(f, count, &moved);
+	rc = rc ? rc : find_spines(f, count, &small);
 	struct prim_ref *items = rc ? NULL : mem_alloc(n, sizeof *items);
 	if (!items)
 		return -ENOMEM;
 	/* Enough for complete sorting and for each primitive to meet dozens of others; not for all triangles of very
 	 * many instances. */
-	size_t most = moved < INSTANCED_MAX ? moved : INSTANCED_MAX;
-	f->limit = 128 * (uint64_t)n + (1u << 25) + 16 * (uint64_t)most;
-	f->pair_limit = 4 * n + (1u << 16) + most;
+	size_t all = n + small, most = moved < INSTANCED_MAX ? moved : INSTANCED_MAX;
+	f->limit = 128 * (uint64_t)all + (1u << 25) + 16 * (uint64_t)most;
+	f->pair_limit = 4 * all + (1u << 16) + most;
 	list_primitives(f->shapes, count, items);
 	rc = look_into(f, items, n, MOST_CUTS);
 	mem_free(items);
@@ -431,11 +604,13 @@ static int find(struct search *f, uint32_t count, size_t n)
 int coincide_find(struct coincidence **out, const struct accel_shape *shapes, uint32_t count, struct error *e)
 {
 	*out = NULL;
-	struct search f = {.shapes = shapes};
+	struct search f = {
+		.shapes = shapes, .low = {-INFINITY, -INFINITY, -INFINITY}, .high = {INFINITY, INFINITY, INFINITY}};
 	int rc = find(&f, count, list_primitives(shapes, count, NULL));
 	for (uint32_t i = 0; f.flat && i < count; i++)
 		mem_free(f.flat[i].prim);
 	mem_free(f.flat);
+	mem_free(f.spines);
 	if (!rc && (f.pair_count > 0 || f.incomplete))
 		rc = coincide_result(f.pairs, f.pair_count, f.incomplete, count, out);
 	else

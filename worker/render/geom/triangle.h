@@ -67,6 +67,14 @@ static inline double triangle_height(const struct triangle *t, vec3 p)
 	return fabs(h) <= 0x1p-49 * t->edges * (triangle_norm1(p) + triangle_norm1(to)) ? 0 : h;
 }
 
+/* The smallest of its three altitudes; 0 if it is a point. */
+static inline double triangle_altitude(const struct triangle *t)
+{
+	vec3 e[3] = {vec3_sub(t->v[1], t->v[0]), vec3_sub(t->v[2], t->v[1]), vec3_sub(t->v[0], t->v[2])};
+	double longest2 = fmax(vec3_dot(e[0], e[0]), fmax(vec3_dot(e[1], e[1]), vec3_dot(e[2], e[2])));
+	return longest2 > 0 ? sqrt(vec3_dot(t->n, t->n) / longest2) : 0;
+}
+
 /* Largest side of its bounding box. */
 float triangle_extent(const float (*position)[3], const uint32_t i[3]);
 

@@ -271,6 +271,77 @@ static void test_crossing_leaves(void **state)
 	assert_null(c);
 }
 
+enum { TUBES = 400, TWINS = 2, AROUND = 256 };
+
+struct tube {
+	float position[2 * AROUND + 2][3];
+	uint32_t index[2 * AROUND][3];
+};
+
+/* The part [first, last] of the tube from a to b. */
+static struct accel_shape make_tube(struct tube *t, vec3 a, vec3 b, double first, double last)
+{
+	struct frame f = frame_around(vec3_normalize(vec3_sub(b, a)));
+	for (uint32_t i = 0; i < 2 * AROUND; i++) {
+		double phi = 2 * M_PI * (i / 2) / AROUND, radius = 0.001;
+		vec3 p = vec3_madd(a, i % 2 ? last : first, vec3_sub(b, a));
+		p = vec3_madd(vec3_madd(p, radius * cos(phi), f.s), radius * sin(phi), f.t);
+		t->position[i][0] = (float)p.x;
+		t->position[i][1] = (float)p.y;
+		t->position[i][2] = (float)p.z;
+		for (uint32_t k = 0; k < 3; k++)
+			t->index[i][k] = (i + k) % (2 * AROUND);
+	}
+	return (struct accel_shape){.vertex_count = 2 * AROUND,
+				    .triangle_count = 2 * AROUND,
+				    .position = (const float(*)[3])t->position,
+				    .index = (const uint32_t(*)[3])t->index,
+				    .rank = SURFACE_OPAQUE};
+}
+
+/* Long thin tubes that lie askew, whose boxes overlap everywhere: the search gets to its end, which to compare the
+ * triangles of a few per cent of the pairs would not, and finds each that is a part of another. */
+static void test_tubes(void **state)
+{
+	(void)state;
+	struct tube *tube = mem_alloc(TUBES + TWINS, sizeof *tube);
+	static struct accel_shape shape[TUBES + TWINS];
+	struct dice d = dice_of("tubes");
+	struct coincidence *c;
+	struct error e;
+	assert_non_null(tube);
+	for (int i = 0; i < TUBES; i++) {
+		vec3 a, b;
+		do {
+			a = (vec3){dice_between(&d, -0.5, 0.5), dice_between(&d, -0.5, 0.5),
+				   dice_between(&d, -0.5, 0.5)};
+			b = (vec3){dice_between(&d, -0.5, 0.5), dice_between(&d, -0.5, 0.5),
+				   dice_between(&d, -0.5, 0.5)};
+		} while (vec3_length(vec3_sub(b, a)) < 0.2);
+		shape[i] = make_tube(&tube[i], a, b, 0, 1);
+		if (i < TWINS)
+			shape[TUBES + i] = make_tube(&tube[TUBES + i], a, b, 0.3, 0.8);
+	}
+	assert_int_equal(coincide_find(&c, shape, TUBES + TWINS, &e), 0);
+	assert_non_null(c);
+	assert_false(c->incomplete);
+	for (uint32_t i = 0; i < TWINS; i++) {
+		bool seen[2 * AROUND] = {false};
+		size_t hidden = 0;
+		for (size_t k = c->first[TUBES + i]; k < c->first[TUBES + i + 1]; k++)
+			if (c->pairs[k].by.shape == i && !seen[c->pairs[k].hidden.prim]) {
+				seen[c->pairs[k].hidden.prim] = true;
+				hidden++;
+			}
+		if (hidden != 2 * AROUND)
+			fail_msg("of a part of tube %u %zu triangles of %d are seen to be one with it", i, hidden,
+				 2 * AROUND);
+	}
+	print_message("%zu pairs of primitives, %zu of shapes\n", c->pair_count, c->shapes_count);
+	coincide_free(c);
+	mem_free(tube);
+}
+
 /* A stack of equal triangles is no square; a heap that is one ends with what the bounds allow. Where nothing coincides
  * nothing is kept, one sphere hides another, and without memory there is a sentence. */
 static void test_bounds(void **state)
@@ -434,9 +505,9 @@ static void test_fan(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_two),    cmocka_unit_test(test_neighbours),      cmocka_unit_test(test_search),
-		cmocka_unit_test(test_bounds), cmocka_unit_test(test_crossing_leaves), cmocka_unit_test(test_rays),
-		cmocka_unit_test(test_fan)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_two),	  cmocka_unit_test(test_neighbours),
+					   cmocka_unit_test(test_search), cmocka_unit_test(test_bounds),
+					   cmocka_unit_test(test_tubes),  cmocka_unit_test(test_crossing_leaves),
+					   cmocka_unit_test(test_rays),	  cmocka_unit_test(test_fan)};
 	return cmocka_run_group_tests_name("coinciding surfaces", tests, NULL, NULL);
 }

@@ -1,0 +1,172 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/geom/coincide_spine.h"
+
+#include "worker/render/geom/coincide.h"
+
+#include <float.h>
+
+/* The direction in which the points of the mesh lie the farthest apart, in squares: power iteration, which needs few
+ * steps where it matters, in long thin meshes; in others any direction will do. */
+static vec3 main_direction(const struct accel_shape *s, vec3 center, vec3 start)
+{
+	double c[6] = {0};
+	vec3 d = start;
+	for (uint32_t i = 0; i < s->vertex_count; i++) {
+		vec3 v = vec3_sub(triangle_vertex(s->position, i), center);
+		const double products[6] = {v.x * v.x, v.x * v.y, v.x * v.z, v.y * v.y, v.y * v.z, v.z * v.z};
+		for (int k = 0; k < 6; k++)
+			c[k] += products[k];
+	}
+	for (int step = 0; step < 4; step++) {
+		vec3 next = {c[0] * d.x + c[1] * d.y + c[2] * d.z, c[1] * d.x + c[3] * d.y + c[4] * d.z,
+			     c[2] * d.x + c[4] * d.y + c[5] * d.z};
+		double length = vec3_length(next);
+		if (!(length >= DBL_MIN))
+			break;
+		d = vec3_scale(1 / length, next);
+	}
+	return d;
+}
+
+static void add_to_box(struct spine *s, vec3 v)
+{
+	for (unsigned k = 0; k < 3; k++) {
+		s->low[k] = fmin(s->low[k], vec3_along(v, k));
+		s->high[k] = fmax(s->high[k], vec3_along(v, k));
+	}
+}
+
+static vec3 box_middle(const struct spine *s)
+{
+	return (vec3){s->low[0] / 2 + s->high[0] / 2, s->low[1] / 2 + s->high[1] / 2, s->low[2] / 2 + s->high[2] / 2};
+}
+
+/* The segment along s->direction around all vertices, and its radius. */
+static void lay_segment(struct spine *s, const struct accel_shape *mesh, vec3 center)
+{
+	double first = INFINITY, last = -INFINITY;
+	for (uint32_t i = 0; i < mesh->vertex_count; i++) {
+		vec3 v = vec3_sub(triangle_vertex(mesh->position, i), center);
+		double t = vec3_dot(v, s->direction);
+		first = fmin(first, t);
+		last = fmax(last, t);
+		s->radius = fmax(s->radius, vec3_length(vec3_sub(v, vec3_scale(t, s->direction))));
+	}
+	s->from = vec3_madd(center, first, s->direction);
+	s->along = vec3_scale(last - first, s->direction);
+}
+
+static double largest_coordinate(const struct spine *s)
+{
+	double far = 0;
+	for (int k = 0; k < 3; k++)
+		far = fmax(far, fmax(fabs(s->low[k]), fabs(s->high[k])));
+	return far;
+}
+
+static void read_triangles(struct spine *s, const struct accel_shape *mesh)
+{
+	for (uint32_t i = 0; i < mesh->triangle_count; i++) {
+		const struct triangle t = accel_triangle(mesh, i, 0);
+		double n = vec3_length(t.n), height = triangle_altitude(&t);
+		s->height = fmin(s->height, height);
+		s->lean = n > 0 ? fmax(s->lean, fabs(vec3_dot(t.n, s->direction)) / n) : 1;
+	}
+}
+
+struct spine spine_of(const struct accel_shape *mesh)
+{
+	struct spine s = {
+		.low = {INFINITY, INFINITY, INFINITY}, .high = {-INFINITY, -INFINITY, -INFINITY}, .height = INFINITY};
+	for (uint32_t i = 0; i < mesh->vertex_count; i++)
+		add_to_box(&s, triangle_vertex(mesh->position, i));
+	vec3 center = box_middle(&s), start = {s.high[0] - s.low[0], s.high[1] - s.low[1], s.high[2] - s.low[2]};
+	/* Along no diagonal of the box exactly, each of which may be at a right angle to what is looked for. */
+	start = vec3_add(start, (vec3){0.37 * start.y, -0.41 * start.z, 0.43 * start.x});
+	double length = vec3_length(start), far = largest_coordinate(&s);
+	if (length >= DBL_MIN)
+		s.direction = main_direction(mesh, center, vec3_scale(1 / length, start));
+	lay_segment(&s, mesh, center);
+	read_triangles(&s, mesh);
+	s.rounded = far * 0x1p-23;
+	double margin = far * 0x1p-20;
+	s.radius += margin;
+	for (int k = 0; k < 3; k++) {
+		s.low[k] -= margin;
+		s.high[k] += margin;
+	}
+	return s;
+}
+
+bool spine_clip(const struct spine *s, const double low[3], const double high[3], struct spine_part *part)
+{
+	*part = (struct spine_part){0, 1};
+	for (unsigned k = 0; k < 3; k++) {
+		double at = vec3_along(s->from, k), d = vec3_along(s->along, k), least = low[k] - s->radius,
+		       most = high[k] + s->radius;
+		if (s->high[k] < low[k] || s->low[k] > high[k])
+			return false;
+		/* Along this axis it does not get beyond the box, or by no more than the margin in its radius. */
+		if (fmin(at, at + d) >= least && fmax(at, at + d) <= most)
+			continue;
+		if (!(fabs(d) > 0x1p-24 * s->radius)) {
+			if (at > most + fabs(d) || at < least - fabs(d))
+				return false;
+			continue;
+		}
+		double t = (least - at) / d, u = (most - at) / d;
+		part->first = fmax(part->first, fmin(t, u));
+		part->last = fmin(part->last, fmax(t, u));
+	}
+	return part->first <= part->last;
+}
+
+void spine_extent(const struct spine *s, struct spine_part part, unsigned axis, double *low, double *high)
+{
+	double at = vec3_along(s->from, axis), d = vec3_along(s->along, axis), t = at + part.first * d,
+	       u = at + part.last * d;
+	*low = fmax(fmin(t, u) - s->radius, s->low[axis]);
+	*high = fmin(fmax(t, u) + s->radius, s->high[axis]);
+}
+
+static double clamped(double t)
+{
+	return fmin(fmax(t, 0), 1);
+}
+
+/* The least squared distance of two segments. */
+static double least_distance2(vec3 p, vec3 d, vec3 q, vec3 e)
+{
+	vec3 r = vec3_sub(p, q);
+	double a = vec3_dot(d, d), b = vec3_dot(d, e), c = vec3_dot(e, e), f = vec3_dot(d, r), g = vec3_dot(e, r),
+	       slope = a * c - b * b, least = INFINITY;
+	/* Where the lines are the nearest; and the nearest point to each end, which alone counts where these lie
+	 * outside or the lines are parallel. */
+	const double ends[5][2] = {
+		{slope > 0 ? clamped((b * g - c * f) / slope) : 0, NAN}, {0, NAN}, {1, NAN}, {NAN, 0}, {NAN, 1}};
+	for (int i = 0; i < 5; i++) {
+		double t = ends[i][0], u = ends[i][1];
+		if (i < 3)
+			u = c > 0 ? clamped((b * t + g) / c) : 0;
+		else
+			t = a > 0 ? clamped((b * u - f) / a) : 0;
+		vec3 between = vec3_add(r, vec3_sub(vec3_scale(t, d), vec3_scale(u, e)));
+		least = fmin(least, vec3_dot(between, between));
+	}
+	return least;
+}
+
+bool spines_meet(const struct spine *a, struct spine_part part, const struct spine *b, struct spine_part other)
+{
+	double reach = a->radius + b->radius;
+	vec3 p = vec3_madd(a->from, part.first, a->along), q = vec3_madd(b->from, other.first, b->along);
+	return least_distance2(p, vec3_scale(part.last - part.first, a->along), q,
+			       vec3_scale(other.last - other.first, b->along)) <= reach * reach;
+}
+
+double spine_lean_at_most(const struct spine *s, const struct spine *from)
+{
+	double height = fmin(s->height, from->height), off = 1.5 * COINCIDE_TILT * (s->rounded + from->rounded);
+	/* Unit normals at an angle differ by at most sqrt(2) times its sine, up to the sign. */
+	return off < height ? s->lean + off / height : 2;
+}
