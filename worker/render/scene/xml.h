@@ -16,7 +16,7 @@
 
 enum {
 	XML_DEPTH_MAX = 64,   /* nesting of elements, and of objects that refer to objects */
-	XML_INCLUDE_MAX = 8,  /* files that include files */
+	XML_INCLUDE_MAX = 15, /* files that include files */
 	XML_FILES_MAX = 1024, /* files included in total */
 	XML_PATHS_MAX = 16,   /* folders that are searched for files */
 	XML_NOTES_MAX = 8,    /* on a file as a whole */

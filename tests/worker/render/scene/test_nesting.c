@@ -183,7 +183,30 @@ static void test_includes(void **state)
 	strcpy(text[9], "<scene version='3.0.0'>\n<include filename='9.xml'/></scene>");
 	files[9].size = strlen(text[9]);
 	assert_int_equal(read_files(files, &e), -ELOOP);
-	assert_non_null(strstr(e.text, "9.xml:2: <include>: files include each other more than 8 deep"));
+	assert_non_null(strstr(e.text, "9.xml:2: <include>: files include each other more than 15 deep"));
+}
+
+/* Files one inside the other, each the only one that the one before includes: as deep as in Mitsuba 3, and no deeper. */
+static void test_includes_in_a_row(void **state)
+{
+	(void)state;
+	enum { DEEPEST = 15 };
+	static char text[DEEPEST + 2][128], name[DEEPEST + 2][16];
+	for (int deep = DEEPEST; deep <= DEEPEST + 1; deep++) {
+		struct memory_file files[DEEPEST + 3] = {{0}};
+		for (int i = 0; i <= deep; i++) {
+			int n = snprintf(text[i], sizeof text[i], "<scene version='3.0.0'>\n<%s%d.xml'/></scene>",
+					 i < deep ? "include filename='" : "default name='a' value='", i + 1);
+			snprintf(name[i], sizeof name[i], "%d.xml", i);
+			files[i] = (struct memory_file){name[i], text[i], (size_t)n};
+		}
+		struct error e = {""};
+		int r = read_files(files, &e);
+		if (strstr(e.text, "include each other") ? deep == DEEPEST : deep > DEEPEST)
+			fail_msg("%d files in a row: %d, %s", deep, r, e.text);
+		if (deep > DEEPEST)
+			assert_non_null(strstr(e.text, "15.xml:2: <include>: files include each other more than 15"));
+	}
 }
 
 /* Included as often as allowed, a file of blanks would keep its reader busy for minutes. Six are too many; in a comment
@@ -261,6 +284,7 @@ int main(void)
 		cmocka_unit_test(test_chains),
 		cmocka_unit_test(test_the_deepest_is_built),
 		cmocka_unit_test(test_includes),
+		cmocka_unit_test(test_includes_in_a_row),
 		cmocka_unit_test(test_bytes_included),
 		cmocka_unit_test(test_long_spectra),
 		cmocka_unit_test(test_many_missing_names),
