@@ -186,7 +186,7 @@ static void test_includes(void **state)
 	assert_non_null(strstr(e.text, "9.xml:2: <include>: files include each other more than 15 deep"));
 }
 
-/* Files one inside the other, each the only one that the one before includes: as deep as in Mitsuba 3, and no deeper. */
+/* Files one inside the other, each the only one that the one before includes: as deep as in Mitsuba 3, no deeper. */
 static void test_includes_in_a_row(void **state)
 {
 	(void)state;
