@@ -77,8 +77,8 @@ static void test_lines_of_objects(void **state)
 	/* clang-format on */
 	static const char *const notes[] = {
 		"s.xml:2: <sensor type=\"perspective\">: `focusDistance` has no effect on light and is ignored",
-		"s.xml:3: <film type=\"hdrfilm\">: `banner`, `pixelFormat`, `componentFormat` have no effect on light and "
-		"are ignored",
+		("s.xml:3: <film type=\"hdrfilm\">: `banner`, `pixelFormat`, `componentFormat` have no effect on light and "
+		 "are ignored"),
 		"s.xml:4: <film type=\"hdrfilm\">: `fork` is not known and is ignored",
 		"s.xml:7: <film type=\"hdrfilm\">: `fileFormat` has no effect on light and is ignored"};
 	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {0}};
