@@ -17,7 +17,7 @@
  */
 #include "worker/render/bsdf/create.h"
 #include "worker/render/math/measured_media.h"
-#include "worker/render/medium/phase.h"
+#include "worker/render/medium/medium.h"
 
 #include <math.h>
 #include <string.h>
@@ -85,12 +85,11 @@ static spectrum hk_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 
 /* Light that goes straight through, as a share of all that the layer lets out, were it scattered into no other layer.
  */
-static double straight_chance(const struct bsdf *b, const struct bsdf_point *p, vec3 wo)
+static double straight_chance(spectrum depth, spectrum scattered, double cosine)
 {
 	double straight = 0, other = 0;
-	spectrum scattered, depth = depth_at(b->data, p, &scattered);
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
-		double direct = transmittance(depth.v[i], fabs(wo.z));
+		double direct = transmittance(depth.v[i], cosine);
 		straight += direct;
 		other += scattered.v[i] * (1 - direct);
 	}
@@ -102,7 +101,8 @@ static double hk_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, 
 	const struct layer *l = b->data;
 	if (!(fabs(wo.z) >= COSINE_MIN && fabs(wi.z) >= COSINE_MIN))
 		return 0;
-	return (1 - straight_chance(b, p, wo)) * phase_eval(&l->phase, p->where.p, wo, wi);
+	spectrum scattered, depth = depth_at(l, p, &scattered);
+	return (1 - straight_chance(depth, scattered, fabs(wo.z))) * phase_eval(&l->phase, p->where.p, wo, wi);
 }
 
 static spectrum hk_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
@@ -110,11 +110,11 @@ static spectrum hk_eval_delta(const struct bsdf *b, const struct bsdf_point *p, 
 {
 	if (!(mode & BSDF_STRAIGHT) || !(fabs(wo.z) >= COSINE_MIN))
 		return spectrum_of(0);
-	spectrum unused, f = depth_at(b->data, p, &unused);
+	spectrum scattered, f = depth_at(b->data, p, &scattered);
+	*wi = vec3_neg(wo);
+	*chance = straight_chance(f, scattered, fabs(wo.z));
 	for (int i = 0; i < SPECTRUM_LANES; i++)
 		f.v[i] = transmittance(f.v[i], fabs(wo.z));
-	*wi = vec3_neg(wo);
-	*chance = straight_chance(b, p, wo);
 	return f;
 }
 
@@ -125,7 +125,8 @@ static bool hk_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo,
 	double unused;
 	if (!(fabs(wo.z) >= COSINE_MIN))
 		return false;
-	if (u[2] < straight_chance(b, p, wo))
+	spectrum scattered, depth = depth_at(l, p, &scattered);
+	if (u[2] < straight_chance(depth, scattered, fabs(wo.z)))
 		return bsdf_sample_delta(b, p, wo, BSDF_TRANSMIT | BSDF_STRAIGHT, out);
 	return bsdf_sample_smooth(b, p, wo, phase_sample(&l->phase, p->where.p, wo, u, &unused), out);
 }
@@ -156,17 +157,11 @@ static int read_coefficients(struct layer *l, struct bsdf *b, const struct scene
 	l->by_albedo = node_find(n, "sigma_t") || node_find(n, "albedo");
 	if (l->by_albedo && (apart || !(node_find(n, "sigma_t") && node_find(n, "albedo"))))
 		return node_error(n, e, EINVAL, "either sigma_s and sigma_a, or sigma_t and albedo");
-	char list[300];
-	const char *name = node_string(n, "material", MEASURED_DEFAULT);
-	const struct measured_medium *m = measured_find(name, list, sizeof list);
-	if (!m)
-		return node_error(n, e, EINVAL, "there is no material '%.64s' (supported: %s)", name, list);
 	double a[3], s[3];
-	for (int k = 0; k < 3; k++) {
-		a[k] = MEASURED_SCALE * m->sigma_a[k];
-		s[k] = MEASURED_SCALE * m->sigma_s[k] * (1 - m->g[k]);
-	}
-	int code = read_coefficient(&l->first, b, n, l->by_albedo ? "sigma_t" : "sigma_a", a, build, e);
+	int code = medium_measured(n, node_string(n, "material", MEASURED_DEFAULT), true, a, s, e);
+	if (code)
+		return code;
+	code = read_coefficient(&l->first, b, n, l->by_albedo ? "sigma_t" : "sigma_a", a, build, e);
 	return code ? code : read_coefficient(&l->second, b, n, l->by_albedo ? "albedo" : "sigma_s", s, build, e);
 }
 

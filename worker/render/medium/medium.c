@@ -66,20 +66,26 @@ static int fill_in(struct medium *m, const struct scene_node *n)
 	return rc;
 }
 
-/* -EINVAL: no such material. */
-static int read_measured(struct medium *m, const struct scene_node *n, const char *name, struct error *e)
+int medium_measured(const struct scene_node *n, const char *name, bool reduced, double sigma_a[3], double sigma_s[3],
+		    struct error *e)
 {
 	char list[300];
 	const struct measured_medium *found = measured_find(name, list, sizeof list);
 	if (!found)
 		return node_error(n, e, EINVAL, "there is no material '%.64s' (supported: %s)", name, list);
-	double s[3], a[3];
-	bool own = node_find(n, "g");
 	for (int k = 0; k < 3; k++) {
-		s[k] = MEASURED_SCALE * found->sigma_s[k] * (own ? 1 : 1 - found->g[k]);
-		a[k] = MEASURED_SCALE * found->sigma_a[k];
+		sigma_s[k] = MEASURED_SCALE * found->sigma_s[k] * (reduced ? 1 - found->g[k] : 1);
+		sigma_a[k] = MEASURED_SCALE * found->sigma_a[k];
 	}
-	int rc = color_from_rgb(a, COLOR_UNBOUNDED, &m->first.color);
+	return 0;
+}
+
+static int read_measured(struct medium *m, const struct scene_node *n, const char *name, struct error *e)
+{
+	double s[3], a[3];
+	int rc = medium_measured(n, name, !node_find(n, "g"), a, s, e);
+	if (!rc)
+		rc = color_from_rgb(a, COLOR_UNBOUNDED, &m->first.color);
 	return rc ? rc : color_from_rgb(s, COLOR_UNBOUNDED, &m->second.color);
 }
 

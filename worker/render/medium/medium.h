@@ -26,6 +26,10 @@ struct medium {
 
 extern const struct plugin_decl medium_decls[]; /* ends with a NULL type */
 
+/* The coefficients of 0.6's measured material of that name. reduced: sigma_s is less by the mean cosine, for a phase
+ * function that is the same in all directions. -EINVAL: there is none; n is to blame. */
+int medium_measured(const struct scene_node *n, const char *name, bool reduced, double sigma_a[3], double sigma_s[3],
+		    struct error *e);
 int medium_create(struct medium *m, const struct scene_node *n, const struct volume_build *build, struct error *e);
 
 /* Lets it shine by the emitter n. -EINVAL, -ENOTSUP: see emission.h. */
