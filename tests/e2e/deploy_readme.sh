@@ -46,7 +46,7 @@ at() {
 		case $line in
 		hslt-coordinator*)
 			coordinator=$!
-			until_true 10 sh -c "grep -q ':$(printf '%04X' "$port") ' /proc/net/tcp" || fail "the coordinator does not listen"
+			until_true 10 sh -c "grep -q ':$(printf '%04X' "$port") 00000000:0000 0A' /proc/net/tcp" || fail "the coordinator does not listen"
 			;;
 		esac
 		;;

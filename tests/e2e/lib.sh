@@ -121,19 +121,21 @@ until_true() {
 	done
 }
 
-# free_ports COUNT: so many in a row that nobody uses, below those that the kernel gives out; the first one is in port. Tests that
-# run at the same time (HSLT_TEST_SLOT: 0 or 1) look in different places.
+# free_ports COUNT: so many in a row that nobody uses, below those that the kernel gives out (from 32768); the first one is in port.
+# Tests that run at the same time look in different places: tests/run.sh runs three scripts at once, with HSLT_TEST_SLOT from 0 to 2.
 free_ports() {
-	port=$((10000 + ${HSLT_TEST_SLOT:-0} * 11000 + $$ * 4 % 10000))
-	while [ $port -lt 32000 ]; do
+	first_port=$((10000 + ${HSLT_TEST_SLOT:-0} % 3 * 7000))
+	port=$((first_port + $$ * 4 % 6000))
+	while [ $port -lt $((first_port + 6990)) ]; do
 		busy=0
 		for k in $(seq 0 $(($1 - 1))); do
 			hex=$(printf ':%04X ' $((port + k)))
 			! cat /proc/net/tcp /proc/net/tcp6 2>/dev/null | grep -q "$hex" || busy=1
 		done
-		[ $busy = 1 ] || break
+		[ $busy = 1 ] || return 0
 		port=$((port + $1))
 	done
+	fail "no $1 free ports in a row from $first_port to $((first_port + 6990))"
 }
 
 # the coordinator has read the jobs from before its restart, or is gone
