@@ -3,8 +3,8 @@
 #ifndef TESTS_SUPPORT_IMAGE_READ_H
 #define TESTS_SUPPORT_IMAGE_READ_H
 
-#include "worker/render/scene/asset.h"
-#include "worker/render/scene/image.h"
+#include "worker/render/asset/asset.h"
+#include "worker/render/image/image.h"
 
 static inline int image_read(const struct asset_source *assets, const char *name, bool raw, struct arena *arena,
 			     struct image *out, struct error *e)

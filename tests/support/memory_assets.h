@@ -3,7 +3,7 @@
 #ifndef TESTS_SUPPORT_MEMORY_ASSETS_H
 #define TESTS_SUPPORT_MEMORY_ASSETS_H
 
-#include "worker/render/scene/asset.h"
+#include "worker/render/asset/asset.h"
 
 struct memory_file {
 	const char *name;

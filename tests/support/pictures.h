@@ -6,7 +6,7 @@
 #ifndef TESTS_SUPPORT_PICTURES_H
 #define TESTS_SUPPORT_PICTURES_H
 
-#include "worker/render/scene/asset.h"
+#include "worker/render/asset/asset.h"
 
 #include <stdint.h>
 

@@ -9,7 +9,7 @@
 #include "tests/support/length.h"
 #include "tests/support/scene_trial.h"
 #include "worker/render/render.h"
-#include "worker/render/scene/plugin.h"
+#include "worker/render/plugin/plugin.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -4,7 +4,7 @@
 #define WORKER_CLI_BASE_GUARDED_SOURCE_H
 
 #include "common/exr/output_files.h"
-#include "worker/render/scene/asset.h"
+#include "worker/render/asset/asset.h"
 
 struct guarded_source {
 	struct asset_source inner;

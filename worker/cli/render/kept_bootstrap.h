@@ -21,7 +21,7 @@
 
 #include "common/estimate/merge.h"
 #include "worker/cli/base/options.h"
-#include "worker/render/scene/asset.h"
+#include "worker/render/asset/asset.h"
 
 enum { KEPT_PATH = 4096, KEPT_TEXT = 8192 };
 

@@ -11,10 +11,10 @@
 #include "worker/render/scene/depth.h"
 #include "worker/render/scene/integrators.h"
 #include "worker/render/scene/lenient.h"
-#include "worker/render/scene/plugin.h"
+#include "worker/render/plugin/plugin.h"
 #include "worker/render/scene/spectral.h"
 #include "worker/render/scene/subsurface.h"
-#include "worker/render/scene/upgrade.h"
+#include "worker/render/xml/upgrade.h"
 #include "worker/render/scene/value.h"
 
 #include <string.h>

@@ -12,7 +12,7 @@
 #include "common/base/mem.h"
 #include "common/blob/blob.h"
 #include "worker/cli/base/place.h"
-#include "worker/render/scene/gltf.h"
+#include "worker/render/gltf/gltf.h"
 #include "worker/render/scene/lenient.h"
 
 #include <jansson.h>

@@ -4,7 +4,7 @@
 #include "common/base/spelling.h"
 #include "common/base/text.h"
 #include "worker/render/math/spectrum.h"
-#include "worker/render/scene/number.h"
+#include "worker/render/text/number.h"
 
 #include <string.h>
 #include <strings.h>

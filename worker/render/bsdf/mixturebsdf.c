@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Any number of BSDFs by fixed weights; what these leave of 1 is absorbed, and they are scaled if they exceed it. */
 #include "worker/render/bsdf/blend.h"
-#include "worker/render/scene/number.h"
+#include "worker/render/text/number.h"
 
 /* As many weights as parts. */
 static int read_weights(struct blend *m, const struct scene_node *n, struct error *e)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/medium/flakes.h"
 
-#include "worker/render/scene/number.h"
+#include "worker/render/text/number.h"
 #include "worker/render/volume/grid_file.h"
 
 #include <math.h>

@@ -6,7 +6,7 @@
  * Failures: not as many weights as phase functions; negative ones; all 0.
  */
 #include "worker/render/medium/phase_parts.h"
-#include "worker/render/scene/number.h"
+#include "worker/render/text/number.h"
 
 #include <float.h>
 

@@ -8,7 +8,7 @@
  */
 #include "worker/render/math/search.h"
 #include "worker/render/medium/phase.h"
-#include "worker/render/scene/number.h"
+#include "worker/render/text/number.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/scene/animation.h"
 
-#include "worker/render/scene/number.h"
+#include "worker/render/text/number.h"
 #include "worker/render/scene/transform.h"
 
 #include <string.h>

@@ -5,7 +5,7 @@
 
 #include "common/base/arena.h"
 #include "worker/render/scene/node.h"
-#include "worker/render/scene/xml.h"
+#include "worker/render/xml/xml.h"
 
 /* Replaces *el, an <animation>, by the first of its transforms. *out: all of them; NULL: they are the same. Errors:
  * times that do not ascend; transforms between which something would be flat. */

@@ -4,7 +4,7 @@
 #define WORKER_RENDER_SCENE_ASSET_LIST_H
 
 #include "common/base/arena.h"
-#include "worker/render/scene/element.h"
+#include "worker/render/xml/element.h"
 
 struct asset_use {
 	const char *name;

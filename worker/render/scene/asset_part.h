@@ -8,7 +8,7 @@
 #ifndef WORKER_RENDER_SCENE_ASSET_PART_H
 #define WORKER_RENDER_SCENE_ASSET_PART_H
 
-#include "worker/render/scene/asset_range.h"
+#include "worker/render/asset/asset_range.h"
 #include "worker/render/scene/scene.h"
 
 /* Errors as of asset_range_open, with the node's place. asset_range_close after 0 alone. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/scene/fov.h"
-#include "worker/render/scene/number.h"
+#include "worker/render/text/number.h"
 
 #include <stdio.h>
 #include <string.h>

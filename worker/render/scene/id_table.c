@@ -2,7 +2,7 @@
 #include "worker/render/scene/id_table.h"
 
 #include "common/base/spelling.h"
-#include "worker/render/scene/plugin.h"
+#include "worker/render/plugin/plugin.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -4,7 +4,7 @@
 #define WORKER_RENDER_SCENE_ID_TABLE_H
 
 #include "worker/render/scene/report.h"
-#include "worker/render/scene/xml.h"
+#include "worker/render/xml/xml.h"
 
 struct id_entry {
 	const char *id;

@@ -6,9 +6,9 @@
  */
 #include "worker/render/scene/lenient.h"
 
-#include "worker/render/scene/asset_name.h"
-#include "worker/render/scene/plugin.h"
-#include "worker/render/scene/snake_case.h"
+#include "worker/render/asset/asset_name.h"
+#include "worker/render/plugin/plugin.h"
+#include "worker/render/text/snake_case.h"
 
 #include <string.h>
 #include <strings.h>

@@ -6,10 +6,10 @@
 #ifndef WORKER_RENDER_SCENE_LENIENT_H
 #define WORKER_RENDER_SCENE_LENIENT_H
 
-#include "worker/render/scene/asset.h"
+#include "worker/render/asset/asset.h"
 #include "worker/render/scene/id_table.h"
 #include "worker/render/scene/node.h"
-#include "worker/render/scene/param.h"
+#include "worker/render/plugin/param.h"
 
 #include <stdbool.h>
 

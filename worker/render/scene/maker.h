@@ -11,7 +11,7 @@
 #include "worker/render/scene/id_table.h"
 #include "worker/render/scene/notes.h"
 #include "worker/render/scene/report.h"
-#include "worker/render/scene/xml.h"
+#include "worker/render/xml/xml.h"
 
 struct scene;
 

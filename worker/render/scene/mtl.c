@@ -12,10 +12,10 @@
  */
 #include "worker/render/scene/mtl.h"
 
-#include "worker/render/scene/asset_name.h"
-#include "worker/render/scene/element_make.h"
-#include "worker/render/scene/number.h"
-#include "worker/render/scene/text_lines.h"
+#include "worker/render/asset/asset_name.h"
+#include "worker/render/xml/element_make.h"
+#include "worker/render/text/number.h"
+#include "worker/render/text/text_lines.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -8,8 +8,8 @@
 #define WORKER_RENDER_SCENE_MTL_H
 
 #include "common/base/arena.h"
-#include "worker/render/scene/asset.h"
-#include "worker/render/scene/element.h"
+#include "worker/render/asset/asset.h"
+#include "worker/render/xml/element.h"
 
 struct mtl_value {
 	int line;	  /* 0: not given */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/scene/nesting.h"
 
-#include "worker/render/scene/plugin.h"
+#include "worker/render/plugin/plugin.h"
 
 int nesting_take(struct xml_nesting *owner, enum plugin_class cls, const struct xml_element *el,
 		 const struct xml_element *taken, bool once, struct error *e)

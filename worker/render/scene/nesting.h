@@ -8,8 +8,8 @@
 #define WORKER_RENDER_SCENE_NESTING_H
 
 #include "common/base/error.h"
-#include "worker/render/scene/param.h"
-#include "worker/render/scene/xml.h"
+#include "worker/render/plugin/param.h"
+#include "worker/render/xml/xml.h"
 
 #define NESTING_HEIGHT_MAX 8192
 #define NESTING_PARTS_MAX 65536	     /* of one material or texture: an evaluation may visit them all */

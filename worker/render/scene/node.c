@@ -3,7 +3,7 @@
 
 #include "common/base/arena.h"
 #include "common/base/text.h"
-#include "worker/render/scene/plugin.h"
+#include "worker/render/plugin/plugin.h"
 
 #include <stdarg.h>
 #include <stdio.h>

@@ -5,7 +5,7 @@
 
 #include "common/base/error.h"
 #include "worker/render/math/motion.h"
-#include "worker/render/scene/param.h"
+#include "worker/render/plugin/param.h"
 
 #include <stdbool.h>
 #include <stdint.h>

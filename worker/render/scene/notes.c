@@ -3,8 +3,8 @@
 
 #include "common/base/spelling.h"
 #include "common/base/text.h"
-#include "worker/render/scene/plugin.h"
-#include "worker/render/scene/snake_case.h"
+#include "worker/render/plugin/plugin.h"
+#include "worker/render/text/snake_case.h"
 #include "worker/render/scene/value.h"
 
 #include <ctype.h>

@@ -6,8 +6,8 @@
 #ifndef WORKER_RENDER_SCENE_NOTES_H
 #define WORKER_RENDER_SCENE_NOTES_H
 
-#include "worker/render/scene/element.h"
-#include "worker/render/scene/param.h"
+#include "worker/render/xml/element.h"
+#include "worker/render/plugin/param.h"
 #include "worker/render/scene/report.h"
 
 struct notes {

@@ -14,9 +14,9 @@
 
 #include "common/base/fnv.h"
 #include "common/base/liveness.h"
-#include "worker/render/scene/element_make.h"
+#include "worker/render/xml/element_make.h"
 #include "worker/render/scene/mtl.h"
-#include "worker/render/scene/text_lines.h"
+#include "worker/render/text/text_lines.h"
 
 #include <stdio.h>
 #include <string.h>

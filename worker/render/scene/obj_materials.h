@@ -10,7 +10,7 @@
 #include "worker/render/scene/asset_list.h"
 #include "worker/render/scene/id_table.h"
 #include "worker/render/scene/report.h"
-#include "worker/render/scene/xml.h"
+#include "worker/render/xml/xml.h"
 
 enum { OBJ_MATERIALS_MAX = 4096 }; /* of a file */
 

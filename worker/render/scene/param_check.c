@@ -2,8 +2,8 @@
 #include "worker/render/scene/param_check.h"
 
 #include "common/base/spelling.h"
-#include "worker/render/scene/plugin.h"
-#include "worker/render/scene/snake_case.h"
+#include "worker/render/plugin/plugin.h"
+#include "worker/render/text/snake_case.h"
 #include "worker/render/scene/value.h"
 
 #include <float.h>

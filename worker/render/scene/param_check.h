@@ -6,7 +6,7 @@
 
 #include "worker/render/scene/node.h"
 #include "worker/render/scene/notes.h"
-#include "worker/render/scene/param.h"
+#include "worker/render/plugin/param.h"
 
 /* Converts v to a number if p takes no colour and v is an integer or a colour without hue. Errors have the place of
  * el: EINVAL for a wrong type or choice, with what is supported; ERANGE. */

@@ -2,9 +2,9 @@
 #include "worker/render/scene/refuse.h"
 
 #include "common/base/spelling.h"
-#include "worker/render/scene/gltf.h"
+#include "worker/render/gltf/gltf.h"
 #include "worker/render/scene/lenient.h"
-#include "worker/render/scene/plugin.h"
+#include "worker/render/plugin/plugin.h"
 #include "worker/render/scene/value.h"
 
 #include <stdio.h>

@@ -4,8 +4,8 @@
 #ifndef WORKER_RENDER_SCENE_REFUSE_H
 #define WORKER_RENDER_SCENE_REFUSE_H
 
-#include "worker/render/scene/element.h"
-#include "worker/render/scene/param.h"
+#include "worker/render/xml/element.h"
+#include "worker/render/plugin/param.h"
 
 /* An element that is not allowed where it stands. */
 int refuse_element(const struct xml_element *el, struct error *e);

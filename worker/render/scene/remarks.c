@@ -8,7 +8,7 @@
 
 #include "worker/render/scene/depth.h"
 #include "worker/render/scene/integrators.h"
-#include "worker/render/scene/plugin.h"
+#include "worker/render/plugin/plugin.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -8,8 +8,8 @@
 
 #include "common/base/arena.h"
 #include "common/base/error.h"
-#include "worker/render/scene/asset.h"
-#include "worker/render/scene/define.h"
+#include "worker/render/asset/asset.h"
+#include "worker/render/xml/define.h"
 #include "worker/render/scene/node.h"
 
 #include <stdbool.h>

@@ -14,7 +14,7 @@
 #include "worker/render/scene/depth.h"
 #include "worker/render/scene/film.h"
 #include "worker/render/scene/integrators.h"
-#include "worker/render/scene/number.h"
+#include "worker/render/text/number.h"
 
 #include <stdio.h>
 #include <string.h>

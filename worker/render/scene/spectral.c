@@ -10,7 +10,7 @@
 
 #include "common/base/spelling.h"
 #include "worker/render/math/cie.h"
-#include "worker/render/scene/number.h"
+#include "worker/render/text/number.h"
 
 #include <string.h>
 

@@ -7,9 +7,9 @@
 #ifndef WORKER_RENDER_SCENE_SPECTRAL_H
 #define WORKER_RENDER_SCENE_SPECTRAL_H
 
-#include "worker/render/scene/asset.h"
+#include "worker/render/asset/asset.h"
 #include "worker/render/scene/node.h"
-#include "worker/render/scene/xml.h"
+#include "worker/render/xml/xml.h"
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/scene/substitute.h"
 
-#include "worker/render/scene/asset_name.h"
-#include "worker/render/scene/plugin.h"
+#include "worker/render/asset/asset_name.h"
+#include "worker/render/plugin/plugin.h"
 #include "worker/render/scene/refuse.h"
 
 #include <string.h>

@@ -9,9 +9,9 @@
 #include "worker/render/scene/subsurface.h"
 
 #include "worker/render/math/measured_media.h"
-#include "worker/render/scene/element_make.h"
-#include "worker/render/scene/number.h"
-#include "worker/render/scene/snake_case.h"
+#include "worker/render/xml/element_make.h"
+#include "worker/render/text/number.h"
+#include "worker/render/text/snake_case.h"
 #include "worker/render/scene/value.h"
 
 #include <math.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/scene/texture_names.h"
 
-#include "worker/render/scene/element_make.h"
+#include "worker/render/xml/element_make.h"
 #include "worker/render/scene/spectral.h"
 
 #include <string.h>

@@ -5,8 +5,8 @@
 #define WORKER_RENDER_SCENE_TEXTURE_NAMES_H
 
 #include "worker/render/scene/id_table.h"
-#include "worker/render/scene/plugin.h"
-#include "worker/render/scene/xml.h"
+#include "worker/render/plugin/plugin.h"
+#include "worker/render/xml/xml.h"
 
 /* <spectrum type="bitmap"> becomes a <texture>, <texture type="uniform"> a <spectrum>, in all of the tree. */
 void texture_names_settle(const struct plugin_decl *decls, struct xml_element *root);

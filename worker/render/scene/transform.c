@@ -13,7 +13,7 @@
 
 #include "common/base/spelling.h"
 #include "worker/render/math/frame.h"
-#include "worker/render/scene/number.h"
+#include "worker/render/text/number.h"
 
 #include <string.h>
 

@@ -5,7 +5,7 @@
 
 #include "worker/render/scene/node.h"
 #include "worker/render/scene/report.h"
-#include "worker/render/scene/xml.h"
+#include "worker/render/xml/xml.h"
 
 int transform_read(const struct xml_element *el, mat4 *out, struct error *e);
 

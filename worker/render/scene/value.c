@@ -6,10 +6,10 @@
 #include "worker/render/scene/value.h"
 
 #include "common/base/spelling.h"
-#include "worker/render/scene/number.h"
+#include "worker/render/text/number.h"
 #include "worker/render/scene/spectral.h"
 #include "worker/render/scene/transform.h"
-#include "worker/render/scene/srgb.h"
+#include "worker/render/image/srgb.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -5,7 +5,7 @@
 #define WORKER_RENDER_SCENE_VALUE_H
 
 #include "worker/render/scene/node.h"
-#include "worker/render/scene/xml.h"
+#include "worker/render/xml/xml.h"
 
 /* Whether it is the name of a value's element (float, rgb, ... including refused ones such as animation). */
 bool value_is_element(const char *name);

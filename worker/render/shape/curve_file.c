@@ -11,8 +11,8 @@
 
 #include "common/base/bytes.h"
 #include "common/base/liveness.h"
-#include "worker/render/scene/number.h"
-#include "worker/render/scene/text_lines.h"
+#include "worker/render/text/number.h"
+#include "worker/render/text/text_lines.h"
 #include "worker/render/shape/mesh.h"
 
 #include <string.h>

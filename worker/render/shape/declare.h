@@ -3,7 +3,7 @@
 #ifndef WORKER_RENDER_SHAPE_DECLARE_H
 #define WORKER_RENDER_SHAPE_DECLARE_H
 
-#include "worker/render/scene/param.h"
+#include "worker/render/plugin/param.h"
 #include "worker/render/shape/displace.h"
 
 /* For meshes from files (smooth.h). */

@@ -2,13 +2,13 @@
 /*
  * A primitive of a glTF 2.0 mesh, as numbers in a buffer: `position`, `normal`, `texcoord` and `index` are each "first
  * stride count type", with bytes from the buffer's beginning and type one of f32 u8 u16 u32 (texture coordinates in u8
- * and u16 represent 0 to 1). The reader of glTF scenes (worker/render/scene/gltf.h) writes them; everything is checked
+ * and u16 represent 0 to 1). The reader of glTF scenes (worker/render/gltf/gltf.h) writes them; everything is checked
  * again here.
  *
  * Failures: numbers that exceed the buffer, indices out of range, more vertices or triangles than a mesh may have.
  */
 #include "worker/render/scene/asset_part.h"
-#include "worker/render/scene/number.h"
+#include "worker/render/text/number.h"
 #include "worker/render/shape/declare.h"
 #include "worker/render/shape/mesh.h"
 

@@ -9,7 +9,7 @@
  *
  * Failures: neither a file nor a bitmap, an image of less than 2 x 2 pixels or of more than a mesh may have.
  */
-#include "worker/render/scene/image.h"
+#include "worker/render/image/image.h"
 #include "worker/render/shape/declare.h"
 #include "worker/render/shape/mesh.h"
 

@@ -13,8 +13,8 @@
 
 #include "common/base/liveness.h"
 #include "common/base/mem.h"
-#include "worker/render/scene/number.h"
-#include "worker/render/scene/srgb.h"
+#include "worker/render/text/number.h"
+#include "worker/render/image/srgb.h"
 #include "worker/render/shape/polygon.h"
 
 #include <string.h>

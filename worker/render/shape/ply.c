@@ -12,8 +12,8 @@
  * the header are checked against the file's size before anything is allocated.
  */
 #include "common/base/liveness.h"
-#include "worker/render/scene/number.h"
-#include "worker/render/scene/srgb.h"
+#include "worker/render/text/number.h"
+#include "worker/render/image/srgb.h"
 #include "worker/render/shape/attribute_names.h"
 #include "worker/render/shape/declare.h"
 #include "worker/render/shape/mesh.h"

@@ -2,7 +2,7 @@
 #include "worker/render/texture/attribute_table.h"
 
 #include "common/base/spelling.h"
-#include "worker/render/scene/srgb.h"
+#include "worker/render/image/srgb.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -9,7 +9,7 @@
 
 #include "common/base/arena.h"
 #include "common/base/error.h"
-#include "worker/render/scene/image_pixels.h"
+#include "worker/render/image/image_pixels.h"
 
 #include <stddef.h>
 

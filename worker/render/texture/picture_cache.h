@@ -6,7 +6,7 @@
 #ifndef WORKER_RENDER_TEXTURE_PICTURE_CACHE_H
 #define WORKER_RENDER_TEXTURE_PICTURE_CACHE_H
 
-#include "worker/render/scene/image.h"
+#include "worker/render/image/image.h"
 #include "worker/render/texture/indexed_image.h"
 
 struct picture_entry;

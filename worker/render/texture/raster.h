@@ -7,7 +7,7 @@
 #define WORKER_RENDER_TEXTURE_RASTER_H
 
 #include "worker/render/scene/asset_part.h"
-#include "worker/render/scene/image.h"
+#include "worker/render/image/image.h"
 #include "worker/render/scene/scene.h"
 #include "worker/render/texture/indexed_image.h"
 #include "worker/render/texture/picture_cache.h"

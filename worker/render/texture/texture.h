@@ -7,7 +7,7 @@
 #define WORKER_RENDER_TEXTURE_TEXTURE_H
 
 #include "worker/render/texture/color.h"
-#include "worker/render/scene/image.h"
+#include "worker/render/image/image.h"
 
 struct texture;
 struct attribute_table;

@@ -13,7 +13,7 @@
 #include "worker/render/bsdf/diffuse.h"
 #include "worker/render/bsdf/twosided.h"
 #include "worker/render/geom/curves.h"
-#include "worker/render/scene/asset_keeper.h"
+#include "worker/render/asset/asset_keeper.h"
 #include "worker/render/shape/obj_read.h"
 #include "worker/render/texture/picture_cache.h"
 #include "worker/render/world/build_media.h"

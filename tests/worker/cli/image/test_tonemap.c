@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/cli/image/tonemap.h"
 
-#include "worker/render/scene/srgb.h"
+#include "worker/render/image/srgb.h"
 
 #include <float.h>
 #include <math.h>

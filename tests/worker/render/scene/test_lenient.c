@@ -5,7 +5,7 @@
 #include "tests/worker/render/bsdf/bsdf_cases.h"
 #include "worker/render/render.h"
 #include "worker/render/scene/lenient.h"
-#include "worker/render/scene/plugin.h"
+#include "worker/render/plugin/plugin.h"
 #include "worker/render/scene/settings.h"
 
 #include <setjmp.h>

@@ -7,7 +7,7 @@
 #include "tests/support/memory_assets.h"
 #include "tests/support/mesh_files.h"
 #include "tests/support/scene_tables.h"
-#include "worker/render/scene/srgb.h"
+#include "worker/render/image/srgb.h"
 #include "worker/render/shape/attribute_names.h"
 #include "worker/render/shape/mesh.h"
 #include "worker/render/shape/shape.h"

@@ -1,0 +1,230 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* TGA files written by hand, from the format's description: all kinds, plain and packed, from all corners, and lies. */
+#include "tests/support/memory_assets.h"
+#include "worker/render/image/image.h"
+#include "worker/render/image/srgb.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { WIDTH = 7, HEIGHT = 4, FILE_MAX = 2048, COLOURS = 9, FIRST = 3, MAPPED = 1, COLOUR = 2, GREY = 3, PACKED = 8 };
+
+struct file {
+	unsigned char bytes[FILE_MAX];
+	size_t size;
+};
+
+struct form {
+	unsigned kind, bits;
+	bool packed, down, leftwards;
+};
+
+/* Runs in some rows, across the ends of others, and none. */
+static unsigned level_at(unsigned x, unsigned y, unsigned k)
+{
+	unsigned run = y == 1 ? 0 : y == 2 ? x / 3 : x;
+	return k == 3 ? 100 + 20 * y : 10 + 20 * run + 3 * k;
+}
+
+static unsigned index_at(unsigned x, unsigned y)
+{
+	return (y == 1 ? 5 : 2 * x + y) % COLOURS;
+}
+
+static unsigned map_level(unsigned i, unsigned k)
+{
+	return 20 * i + 7 * k;
+}
+
+static void put(struct file *f, unsigned value)
+{
+	assert_true(f->size < FILE_MAX);
+	f->bytes[f->size++] = (unsigned char)value;
+}
+
+static unsigned pixel_of(const struct form *o, unsigned n, unsigned char out[4])
+{
+	unsigned i = n % WIDTH, j = n / WIDTH, x = o->leftwards ? WIDTH - 1 - i : i, y = o->down ? j : HEIGHT - 1 - j;
+	if (o->kind == MAPPED)
+		out[0] = (unsigned char)(FIRST + index_at(x, y));
+	for (unsigned k = 0; k < o->bits / 8 && o->kind != MAPPED; k++)
+		out[k] = (unsigned char)level_at(x, y, k == 3 || o->kind == GREY ? k : 2 - k);
+	return o->kind == MAPPED ? 1 : o->bits / 8;
+}
+
+/* Packets of at most four pixels. */
+static void put_pixels(struct file *f, const struct form *o)
+{
+	for (unsigned n = 0; n < WIDTH * HEIGHT;) {
+		unsigned char first[4] = {0}, next[4] = {0};
+		unsigned bytes = pixel_of(o, n, first), run = 1;
+		while (o->packed && run < 4 && n + run < WIDTH * HEIGHT && pixel_of(o, n + run, next) &&
+		       memcmp(first, next, bytes) == 0)
+			run++;
+		if (o->packed)
+			put(f, run > 1 ? 0x80 | (run - 1) : 0);
+		for (unsigned k = 0; k < bytes; k++)
+			put(f, first[k]);
+		n += run;
+	}
+}
+
+static struct file file_of(const struct form *o)
+{
+	struct file f = {.size = 0};
+	bool mapped = o->kind == MAPPED;
+	const unsigned header[18] = {3,
+				     mapped,
+				     o->kind | (o->packed ? PACKED : 0),
+				     mapped ? FIRST : 0,
+				     0,
+				     mapped ? COLOURS : 0,
+				     0,
+				     mapped ? o->bits : 0,
+				     1,
+				     0,
+				     2,
+				     0,
+				     WIDTH,
+				     0,
+				     HEIGHT,
+				     0,
+				     mapped ? 8 : o->bits,
+				     (o->bits == 32 ? 8u : 0) | (o->leftwards ? 0x10u : 0) | (o->down ? 0x20u : 0)};
+	for (int i = 0; i < 18; i++)
+		put(&f, header[i]);
+	for (int i = 0; i < 3; i++)
+		put(&f, 'x');
+	for (unsigned i = 0; i < COLOURS && mapped; i++)
+		for (unsigned k = 0; k < o->bits / 8; k++)
+			put(&f, map_level(i, k == 3 ? 3 : 2 - k));
+	put_pixels(&f, o);
+	return f;
+}
+
+static int decode(const struct file *f, size_t size, const char *name, enum image_channel channel, struct arena *a,
+		  struct image *img, struct error *e)
+{
+	return image_decode(f->bytes, size, name, false, channel, a, img, e);
+}
+
+static void refuses(const struct file *f, size_t size, const char *text)
+{
+	struct arena a = {0};
+	struct image img;
+	struct error e = {""};
+	int r = decode(f, size, "i.tga", IMAGE_ALL, &a, &img, &e);
+	if (r >= 0 || !strstr(e.text, text))
+		fail_msg("%zu bytes gave %d: %s\n not: %s", size, r, e.text, text);
+	assert_null(img.pixels);
+	arena_fini(&a);
+}
+
+static unsigned stored_level(const struct form *o, unsigned x, unsigned y, unsigned k)
+{
+	return o->kind == MAPPED ? map_level(index_at(x, y), k) : level_at(x, y, k);
+}
+
+static void check(const struct form *o, enum image_channel channel)
+{
+	struct file f = file_of(o);
+	struct arena a = {0};
+	struct image img;
+	struct error e = {""};
+	bool alpha = channel == IMAGE_ALPHA;
+	if (decode(&f, f.size, "Leaf.TGA", channel, &a, &img, &e))
+		fail_msg("%s", e.text);
+	unsigned channels = o->kind == GREY || alpha ? 1 : 3;
+	assert_true(img.width == WIDTH && img.height == HEIGHT && img.channels == channels);
+	for (unsigned y = 0; y < HEIGHT; y++)
+		for (unsigned x = 0; x < WIDTH; x++)
+			for (unsigned k = 0; k < channels; k++) {
+				double due = alpha ? o->bits == 32 ? stored_level(o, x, y, 3) / 255.0 : 1
+						   : srgb_to_linear(stored_level(o, x, y, k) / 255.0);
+				double found = (double)img.pixels[(y * WIDTH + x) * channels + k];
+				if (!(fabs(found - due) < 1e-6))
+					fail_msg("kind %u, %u bits, (%u, %u, %u): %g, not %g", o->kind, o->bits, x, y,
+						 k, found, due);
+			}
+	arena_fini(&a);
+	for (size_t n = 0; n < f.size; n++)
+		refuses(&f, n, "i.tga: ");
+}
+
+static void test_all_kinds(void **state)
+{
+	(void)state;
+	static const unsigned kinds[][2] = {{MAPPED, 24}, {MAPPED, 32}, {COLOUR, 24}, {COLOUR, 32}, {GREY, 8}};
+	for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
+		for (int way = 0; way < 8; way++) {
+			const struct form o = {kinds[i][0], kinds[i][1], way & 1, way & 2, way & 4};
+			check(&o, IMAGE_ALL);
+			check(&o, IMAGE_ALPHA);
+		}
+}
+
+/* Without a name, the signature of version 2 tells. */
+static void test_signature(void **state)
+{
+	(void)state;
+	const struct form o = {COLOUR, 24, false, true, false};
+	struct file f = file_of(&o);
+	struct arena a = {0};
+	struct image img;
+	struct error e;
+	assert_int_equal(decode(&f, f.size, "i", IMAGE_ALL, &a, &img, &e), -EINVAL);
+	assert_non_null(strstr(e.text, "unknown image format"));
+	f.size += 8;
+	memcpy(f.bytes + f.size, "TRUEVISION-XFILE.", 18);
+	f.size += 18;
+	assert_int_equal(decode(&f, f.size, "i", IMAGE_ALL, &a, &img, &e), 0);
+	arena_fini(&a);
+}
+
+static void refuses_changed(unsigned kind, unsigned bits, size_t at, unsigned value, const char *text)
+{
+	const struct form o = {kind, bits, false, false, false};
+	struct file f = file_of(&o);
+	f.bytes[at] = (unsigned char)value;
+	refuses(&f, f.size, text);
+}
+
+static void test_lies(void **state)
+{
+	(void)state;
+	refuses_changed(COLOUR, 24, 2, 4, "pixels of kind 4 with 24 bits");
+	refuses_changed(COLOUR, 24, 2, 0, "pixels of kind 0");
+	refuses_changed(COLOUR, 24, 16, 16, "with 16 bits");
+	refuses_changed(GREY, 8, 16, 24, "pixels of kind 3 with 24 bits");
+	refuses_changed(COLOUR, 24, 17, 0x40, "interleaved");
+	refuses_changed(COLOUR, 24, 12, 0, "pixels; at most");
+	refuses_changed(COLOUR, 24, 13, 100, "too short for");
+	refuses_changed(COLOUR, 24, 0, 255, "the header ends too early");
+	refuses_changed(COLOUR, 24, 1, 2, "a palette that is not there");
+	refuses_changed(MAPPED, 24, 1, 0, "a palette that is not there");
+	refuses_changed(MAPPED, 24, 6, 255, "the palette ends too early");
+	refuses_changed(MAPPED, 24, 7, 16, "a palette of 16 bits");
+	refuses_changed(MAPPED, 24, 3, FIRST + 1, "beyond the palette");
+	refuses_changed(MAPPED, 24, 3, FIRST - 1, "beyond the palette");
+	const struct form o = {COLOUR, 24, true, false, false};
+	struct file f = file_of(&o);
+	f.bytes[13] = 8; /* the best compression could not hold so many */
+	f.bytes[15] = 8;
+	refuses(&f, f.size, "too short for");
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_all_kinds),
+		cmocka_unit_test(test_signature),
+		cmocka_unit_test(test_lies),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

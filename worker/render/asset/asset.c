@@ -1,0 +1,346 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Opens the files of a scene on behalf of one that is not trusted: every name must stay below the scene's folder or
+ * one that the user added.
+ *
+ * Happy path: search_open tries the folders in order. open_below opens the folder and lets the kernel resolve the name
+ * beneath it (openat2, RESOLVE_BENEATH); read_all then reads the file into memory. A name that leads out of the
+ * scene's folder or is absolute (asset_name_up) is resolved by its text alone, and opened if it ends below one of the
+ * folders.
+ *
+ * Failures are one sentence in struct error: a name that leads out (-EINVAL, with the --path that would allow it), one
+ * that is not there (-ENOENT, with the --path that would find it, or a name like it), anything but a regular file, a
+ * file above 4 GB or one that shrinks while it is read. Kernels without openat2 do not follow symbolic links at all.
+ */
+#include "worker/render/asset/asset.h"
+
+#include "common/base/io.h"
+#include "common/base/mem.h"
+#include "common/base/spelling.h"
+#include "worker/render/asset/asset_name.h"
+
+#include <dirent.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <linux/openat2.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+enum { NAME_MAX_BYTES = 4096 };
+#define ASSET_SIZE_MAX ((off_t)1 << 32)
+
+static bool is_below(const char *name)
+{
+	if (!*name || *name == '/' || strlen(name) >= NAME_MAX_BYTES)
+		return false;
+	for (const char *part = name; *part; part += strspn(part, "/")) {
+		size_t n = strcspn(part, "/");
+		if (n == 2 && part[0] == '.' && part[1] == '.')
+			return false;
+		part += n;
+	}
+	return true;
+}
+
+/* Where the kernel cannot keep the look-up below the folder, symbolic links are not followed at all. */
+static int open_step_by_step(int folder, const char *name)
+{
+	int at = dup(folder);
+	while (at >= 0) {
+		char part[256];
+		name += strspn(name, "/");
+		size_t n = strcspn(name, "/");
+		const char *rest = name + n + strspn(name + n, "/");
+		int next = -1;
+		if (n < sizeof part) {
+			memcpy(part, name, n);
+			part[n] = 0;
+			next = openat(at, part,
+				      O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW | (*rest ? O_DIRECTORY : 0));
+		} else {
+			errno = ENAMETOOLONG;
+		}
+		int saved = errno;
+		close(at);
+		errno = saved;
+		if (next < 0 || !*rest)
+			return next;
+		at = next;
+		name = rest;
+	}
+	return -1;
+}
+
+static int open_below(const char *folder, const char *name)
+{
+	int at = open(*folder ? folder : ".", O_PATH | O_DIRECTORY | O_CLOEXEC);
+	if (at < 0)
+		return -1;
+	struct open_how how = {.flags = O_RDONLY | O_CLOEXEC | O_NONBLOCK,
+			       .resolve = RESOLVE_BENEATH | RESOLVE_NO_MAGICLINKS};
+	int fd = (int)syscall(SYS_openat2, at, name, &how, sizeof how);
+	if (fd < 0 && (errno == ENOSYS || errno == EPERM || errno == EINVAL))
+		fd = open_step_by_step(at, name);
+	int saved = errno;
+	close(at);
+	errno = saved;
+	return fd;
+}
+
+/* Read, not mapped: a file that another process shortens must not kill this one. */
+static int read_all(int fd, const char *name, struct asset *out, struct error *e)
+{
+	struct stat st;
+	if (fstat(fd, &st) != 0)
+		return error_set(e, errno, "%s: %s", name, strerror(errno));
+	if (!S_ISREG(st.st_mode))
+		return error_set(e, EINVAL, "%s: not a regular file", name);
+	if (st.st_size > ASSET_SIZE_MAX)
+		return error_set(e, EFBIG, "%s: larger than %lld MB", name, (long long)(ASSET_SIZE_MAX >> 20));
+	size_t size = (size_t)st.st_size;
+	unsigned char *bytes = mem_alloc(size, 1);
+	if (!bytes)
+		return error_set(e, ENOMEM, "%s: out of memory", name);
+	ssize_t n = io_read_all(fd, bytes, size);
+	if (n != st.st_size) {
+		int code = n < 0 ? (int)-n : EIO;
+		mem_free(bytes);
+		return error_set(e, code, "%s: %s", name, n < 0 ? strerror(code) : "became shorter while it was read");
+	}
+	*out = (struct asset){.bytes = bytes, .size = size, .handle = bytes, .device = st.st_dev, .inode = st.st_ino};
+	return 0;
+}
+
+/* `shown` is the name for the user, who wrote another one where it leads out of the scene's folder. */
+static int open_in(const char *folder, const char *name, const char *shown, struct asset *out, struct error *e)
+{
+	*out = (struct asset){0};
+	if (!is_below(name))
+		return error_set(e, EINVAL, "%.256s: files must lie below the scene's folder, or one given with --path",
+				 shown);
+	int fd = open_below(folder, name);
+	if (fd < 0)
+		return error_set(e, errno, "%.256s: %s", shown,
+				 errno == EXDEV ? "leads out of the scene's folder" : strerror(errno));
+	int r = read_all(fd, shown, out, e);
+	close(fd);
+	return r;
+}
+
+static const char *path_after(const char *folder, const char *path)
+{
+	size_t n = strlen(folder);
+	while (n > 0 && folder[n - 1] == '/')
+		n--;
+	return strncmp(path, folder, n) == 0 && path[n] == '/' ? path + n + 1 : NULL;
+}
+
+/* The part of an absolute path after the folder, compared as written or with the folder's links resolved; NULL: it is
+ * not below the folder. */
+static const char *path_below(const char *folder, const char *path)
+{
+	char real[PATH_MAX];
+	const char *name = *folder == '/' ? path_after(folder, path) : NULL;
+	return name || !realpath(*folder ? folder : ".", real) ? name : path_after(real, path);
+}
+
+/* A name that leads `up` folders out of the scene's own, or to the top of all, and then to `rest`. */
+static int open_outside(const struct asset_folders *f, const char *canonical, struct asset *out, struct error *e)
+{
+	char path[PATH_MAX + NAME_MAX_BYTES], shown[NAME_MAX_BYTES];
+	const char *rest;
+	size_t up = asset_name_up(canonical, &rest);
+	*out = (struct asset){0};
+	if (strlen(canonical) >= sizeof shown || !realpath(*f->folder[0] ? f->folder[0] : ".", path))
+		return error_set(e, ENAMETOOLONG, "%.256s: the name is too long", rest);
+	asset_name_shown(canonical, shown, sizeof shown);
+	size_t end = up == ASSET_NAME_ABSOLUTE ? 0 : strlen(path);
+	for (size_t i = 0; i < up && end > 0; i++)
+		while (end > 0 && path[--end] != '/')
+			;
+	size_t top = end; /* the folder to which ".." leads: it has all that is named by as many */
+	snprintf(path + end, sizeof path - end, "/%s", rest);
+	int rc = 0;
+	for (size_t i = 0; i < f->count && (rc == 0 || rc == -ENOENT || rc == -ENOTDIR); i++) {
+		const char *name = path_below(f->folder[i], path);
+		if (name && !(rc = open_in(f->folder[i], name, shown, out, e)))
+			return 0;
+	}
+	if (rc)
+		return rc;
+	if (up == ASSET_NAME_ABSOLUTE && access(path, F_OK) != 0)
+		return error_set(e, ENOENT, "%.256s: no such file on this machine", shown);
+	*(top > 0 ? path + top : strrchr(path, '/')) = 0;
+	return error_set(e, EINVAL, "%.256s: leads out of the scene's folder; to allow that, give --path %.400s", shown,
+			 *path ? path : "/");
+}
+
+static int open_any(const struct asset_folders *f, const char *name, struct asset *out, struct error *e)
+{
+	const char *rest;
+	int rc = -ENOENT;
+	if (asset_name_up(name, &rest) > 0 && is_below(rest))
+		return open_outside(f, name, out, e);
+	for (size_t i = 0; i < f->count && (rc == -ENOENT || rc == -ENOTDIR); i++)
+		rc = open_in(f->folder[i], name, name, out, e);
+	return rc;
+}
+
+static bool has_file(const char *folder, const char *name)
+{
+	int fd = open_below(folder, name);
+	if (fd >= 0)
+		close(fd);
+	return fd >= 0;
+}
+
+/* The folder, to be given with --path, in which the file is: the current one, from which the scene was perhaps written,
+ * or one around the scene's. NULL: none. */
+static const char *find_elsewhere(const char *scene_folder, const char *name, char path[PATH_MAX])
+{
+	enum { UP = 8 };
+	if (!is_below(name))
+		return NULL;
+	if (has_file(".", name))
+		return strcpy(path, ".");
+	char *end = realpath(*scene_folder ? scene_folder : ".", path) ? strrchr(path, '/') : NULL;
+	for (int i = 0; i < UP && end && end > path; i++, end = strrchr(path, '/')) {
+		*end = 0;
+		if (has_file(path, name))
+			return path;
+	}
+	return NULL;
+}
+
+/* One of mesh_1.obj is not a mistyped mesh_2.obj. */
+static bool has_same_digits(const char *a, const char *b)
+{
+	for (;; a++, b++) {
+		a += strcspn(a, "0123456789");
+		b += strcspn(b, "0123456789");
+		if (*a != *b)
+			return false;
+		if (!*a)
+			return true;
+	}
+}
+
+/* The entry of that folder whose name is nearest; of large folders some are compared, since thousands of files may be
+ * missing. */
+static bool find_entry(const char *folder, const char *inside, const char *wanted, char best[NAME_MAX + 1])
+{
+	enum { COMPARED_MAX = 1024 };
+	int fd = open_below(folder, *inside ? inside : ".");
+	DIR *all = fd < 0 ? NULL : fdopendir(fd);
+	if (!all) {
+		if (fd >= 0)
+			close(fd);
+		return false;
+	}
+	struct spelling s = {.wanted = wanted};
+	const struct dirent *one;
+	for (int i = 0; i < COMPARED_MAX && (one = readdir(all)); i++) {
+		if (one->d_name[0] == '.' || !has_same_digits(one->d_name, wanted))
+			continue;
+		spelling_offer(&s, one->d_name);
+	}
+	closedir(all);
+	if (s.best)
+		snprintf(best, NAME_MAX + 1, "%s", s.best);
+	return s.best != NULL;
+}
+
+static bool is_file(const char *folder, const char *name)
+{
+	struct stat st;
+	int fd = open_below(folder, name);
+	bool regular = fd >= 0 && fstat(fd, &st) == 0 && S_ISREG(st.st_mode);
+	if (fd >= 0)
+		close(fd);
+	return regular;
+}
+
+/* The file in that folder whose name is nearest: what is not there of each part of the path is replaced. Names of
+ * Windows often differ in capitals only. */
+static bool find_near(const char *folder, const char *name, char near[NAME_MAX_BYTES])
+{
+	size_t used = 0;
+	near[0] = 0;
+	for (const char *part = name + strspn(name, "/"); *part; part += strspn(part, "/")) {
+		char wanted[NAME_MAX + 1], best[NAME_MAX + 1];
+		size_t n = strcspn(part, "/");
+		if (n > NAME_MAX || used + NAME_MAX + 2 > NAME_MAX_BYTES)
+			return false;
+		memcpy(wanted, part, n);
+		wanted[n] = 0;
+		part += n;
+		snprintf(near + used, NAME_MAX_BYTES - used, "%s%s", used ? "/" : "", wanted);
+		if (!has_file(folder, near)) {
+			near[used] = 0;
+			if (!find_entry(folder, near, wanted, best))
+				return false;
+			snprintf(near + used, NAME_MAX_BYTES - used, "%s%s", used ? "/" : "", best);
+		}
+		used = strlen(near);
+	}
+	return is_file(folder, near);
+}
+
+/* Like open_any; if the file is not found, the error says which --path would help. */
+static int search_open(void *user, const char *name, struct asset *out, struct error *e)
+{
+	const struct asset_folders *f = user;
+	const char *rest;
+	int rc = open_any(f, name, out, e);
+	if (rc != -ENOENT || asset_name_up(name, &rest) > 0)
+		return rc;
+	char path[PATH_MAX];
+	const char *there = find_elsewhere(f->folder[0], name, path);
+	char near[NAME_MAX_BYTES];
+	for (size_t i = 0; i < f->count && !there && is_below(name); i++)
+		if (find_near(f->folder[i], name, near))
+			return error_set(e, ENOENT,
+					 "%.256s: no such file in the scene's folder%s; did you mean `%.256s`?", name,
+					 f->count > 1 ? " or those of --path" : "", near);
+	return error_set(e, ENOENT, "%.256s: no such file in the scene's folder%s%s%.400s%s", name,
+			 f->count > 1 ? " or those of --path" : "", there ? "; --path " : "", there ? there : "",
+			 there		? " finds it"
+			 : f->count > 1 ? ""
+					: "; --path FOLDER searches there, too");
+}
+
+static int folder_open(void *user, const char *name, struct asset *out, struct error *e)
+{
+	struct asset_folders f = {.count = 1, .folder = {user}};
+	return open_any(&f, name, out, e);
+}
+
+static void folder_close(void *user, struct asset *a)
+{
+	(void)user;
+	mem_free(a->handle);
+	*a = (struct asset){0};
+}
+
+struct asset_folders asset_folders_of(const char *own, const char *const *others, size_t count)
+{
+	struct asset_folders f = {.count = 1, .folder = {own}};
+	for (size_t i = 0; i < count && f.count < ASSET_FOLDERS_MAX; i++)
+		f.folder[f.count++] = others[i];
+	return f;
+}
+
+struct asset_source asset_search(const struct asset_folders *folders)
+{
+	return (struct asset_source){.user = (void *)(uintptr_t)folders, .open = search_open, .close = folder_close};
+}
+
+struct asset_source asset_folder(const char *folder)
+{
+	return (struct asset_source){.user = (void *)(uintptr_t)folder, .open = folder_open, .close = folder_close};
+}

@@ -1,0 +1,94 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Opens the file, checks the range against its size, and decodes base64 (RFC 4648, section 4; the padding may lack).
+ * Fails where the file is not there, the range leads out of it, or a letter is none of the 64.
+ */
+#include "worker/render/asset/asset_range.h"
+
+#include "common/base/mem.h"
+
+#include <string.h>
+
+static const char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+
+static int digit_of_letter(unsigned char c)
+{
+	const char *at = c ? strchr(letters, c) : NULL;
+	return at ? (int)(at - letters) : -1;
+}
+
+void asset_range_encode(const unsigned char *bytes, size_t n, char *text)
+{
+	for (size_t i = 0; i < n; i += 3) {
+		uint32_t bits = (uint32_t)bytes[i] << 16 | (uint32_t)(i + 1 < n ? bytes[i + 1] : 0) << 8 |
+				(i + 2 < n ? bytes[i + 2] : 0);
+		for (int k = 0; k < 4; k++)
+			*text++ = i + (size_t)k > n ? '=' : letters[bits >> (18 - 6 * k) & 63];
+	}
+	*text = 0;
+}
+
+/* The number of bytes; -1: it is no base64. `out` has room for three quarters of n. */
+static int64_t decode(const unsigned char *text, size_t n, unsigned char *out)
+{
+	size_t count = 0;
+	while (n > 0 && text[n - 1] == '=')
+		n--;
+	if (n % 4 == 1)
+		return -1;
+	uint32_t bits = 0;
+	for (size_t i = 0; i < n; i++) {
+		int x = digit_of_letter(text[i]);
+		if (x < 0)
+			return -1;
+		bits = bits << 6 | (uint32_t)x;
+		if (i % 4 > 0)
+			out[count++] = (unsigned char)(bits >> (6 - 2 * (i % 4)));
+	}
+	return (int64_t)count;
+}
+
+int asset_range_decode(struct asset_range *p, const char *name, struct error *e)
+{
+	p->decoded = mem_alloc(p->size / 4 * 3 + 3, 1);
+	if (!p->decoded)
+		return error_set(e, ENOMEM, "%s: out of memory", name);
+	int64_t size = decode(p->bytes, p->size, p->decoded);
+	if (size < 0) {
+		mem_free(p->decoded);
+		return error_set(e, EINVAL, "%s: the embedded data is not base64", name);
+	}
+	p->bytes = p->decoded;
+	p->size = (size_t)size;
+	return 0;
+}
+
+int asset_range_open(struct asset_range *p, const struct asset_source *assets, const char *name, uint64_t first,
+		     uint64_t count, bool base64, struct error *e)
+{
+	int rc = assets->open(assets->user, name, &p->file, e);
+	if (rc)
+		return rc;
+	uint64_t size = p->file.size;
+	p->opened = true;
+	p->decoded = NULL;
+	if (count == UINT64_MAX)
+		count = first < size ? size - first : 0;
+	p->bytes = p->file.bytes + first;
+	p->size = (size_t)count;
+	if (first > size || count > size - first)
+		rc = error_set(e, EINVAL, "%s has %llu bytes, and not %llu from byte %llu on", name,
+			       (unsigned long long)size, (unsigned long long)count, (unsigned long long)first);
+	else if (base64)
+		rc = asset_range_decode(p, name, e);
+	if (rc)
+		assets->close(assets->user, &p->file);
+	return rc;
+}
+
+void asset_range_close(struct asset_range *p, const struct asset_source *assets)
+{
+	mem_free(p->decoded);
+	if (p->opened)
+		assets->close(assets->user, &p->file);
+}

@@ -1,0 +1,425 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The container (GLB header and chunks, or plain JSON), and the scene's nodes: each mesh of a node becomes shapes under
+ * the product of the matrices above it, each light an emitter, each camera a sensor. JSON is parsed by jansson; the
+ * starts of entries are searched for separately, so that messages have line numbers.
+ *
+ * What glTF cannot express keeps its default: the film's size follows the first camera's aspect, a file without cameras
+ * gets one that sees everything, one without lights a constant environment, both with a note.
+ *
+ * Failures: a container that contradicts itself, invalid JSON, another version. Indices of missing entries, nodes that
+ * are their own ancestors, unknown required extensions are listed, and what depends on them is left out. What is known
+ * but not supported becomes a property that no table of parameters has: there it is refused, or left out.
+ */
+#include "worker/render/gltf/gltf.h"
+
+#include "common/base/text.h"
+#include "worker/render/gltf/gltf_animation.h"
+#include "worker/render/gltf/gltf_light.h"
+#include "worker/render/gltf/gltf_mesh.h"
+#include "worker/render/gltf/gltf_node.h"
+#include "worker/render/gltf/gltf_numbers.h"
+#include "worker/render/gltf/gltf_tree.h"
+#include "common/base/bytes.h"
+#include "common/base/spelling.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { INSTANCES_MAX = 1 << 17, GLB_HEADER = 12, GLB_CHUNK = 8 };
+#define GLB_MAGIC 0x46546c67u  /* "glTF" */
+#define GLB_JSON 0x4e4f534au   /* "JSON" */
+#define GLB_BINARY 0x004e4942u /* "BIN" */
+
+bool gltf_is(const char *name)
+{
+	size_t n = strlen(name);
+	return (n > 5 && strcmp(name + n - 5, ".gltf") == 0) || (n > 4 && strcmp(name + n - 4, ".glb") == 0);
+}
+
+/* ---- lines */
+
+/* The array with that name, and room for the lines of its entries; GLTF_ARRAYS: none. */
+static enum gltf_array lines_of(struct gltf *g, const char *key, size_t n)
+{
+	for (int i = 0; i < GLTF_ARRAYS; i++) {
+		const char *name = gltf_array_name((enum gltf_array)i);
+		if (strlen(name) != n || memcmp(name, key, n) != 0)
+			continue;
+		size_t count = json_array_size(json_object_get(g->root, name));
+		if (!g->lines[i] && count)
+			g->lines[i] = arena_alloc(g->arena, count, sizeof *g->lines[i]);
+		g->line_room[i] = g->lines[i] ? count : 0;
+		return (enum gltf_array)i;
+	}
+	return GLTF_ARRAYS;
+}
+
+/* Finds where the entries of the top-level arrays begin, in JSON that is known to be well formed and to have no
+ * duplicate keys. */
+static void find_lines(struct gltf *g, const char *text, size_t size)
+{
+	int depth = 0, line = 1;
+	enum gltf_array array = GLTF_ARRAYS;
+	for (size_t i = 0; i < size; i++) {
+		char c = text[i];
+		if (c == '"') {
+			size_t begin = ++i;
+			for (; i < size && text[i] != '"'; i++)
+				i += text[i] == '\\';
+			if (depth == 1)
+				array = lines_of(g, text + begin, i - begin);
+		} else if (c == '{' || c == '[') {
+			if (depth == 2 && array < GLTF_ARRAYS && g->line_count[array] < g->line_room[array])
+				g->lines[array][g->line_count[array]++] = line;
+			depth++;
+		} else if (c == '}' || c == ']') {
+			depth--;
+		} else if (c == '\n') {
+			line++;
+		}
+	}
+}
+
+/* ---- the container */
+
+/* The JSON and the binary chunk of a .glb; a .gltf is all JSON. */
+static int find_json(struct gltf *g, const char **text, size_t *size)
+{
+	const unsigned char *p = g->bytes;
+	*text = (const char *)p;
+	*size = g->size;
+	if (g->size < GLB_HEADER || get32(p) != GLB_MAGIC)
+		return 0;
+	if (get32(p + 4) != 2)
+		return gltf_fail(g, NULL, EINVAL, "a GLB file of version %u; 2 is supported", get32(p + 4));
+	if (get32(p + 8) > g->size)
+		return gltf_fail(g, NULL, EINVAL, "its header says %u bytes, but it has %zu", get32(p + 8), g->size);
+	size_t end = get32(p + 8), at = GLB_HEADER;
+	*size = 0;
+	for (int i = 0; at + GLB_CHUNK <= end; i++) {
+		size_t length = get32(p + at);
+		uint32_t type = get32(p + at + 4);
+		at += GLB_CHUNK;
+		if (length > end - at)
+			return gltf_fail(g, NULL, EINVAL, "a chunk exceeds the file");
+		if (i == 0 && type == GLB_JSON) {
+			*text = (const char *)p + at;
+			*size = length;
+			while (*size && !(*text)[*size - 1]) /* some fill it up with zeros instead of blanks */
+				--*size;
+		} else if (i == 1 && type == GLB_BINARY) {
+			g->binary_first = at;
+			g->binary_count = length;
+		}
+		at += length;
+	}
+	return *size ? 0 : gltf_fail(g, NULL, EINVAL, "a GLB file begins with JSON");
+}
+
+/* A note with the extensions that the file uses and the reader does not know: their effect is missing. */
+static void note_unknown(struct gltf *g)
+{
+	const json_t *used = json_object_get(g->root, "extensionsUsed");
+	char text[512] = "";
+	struct text t = {text, sizeof text};
+	for (size_t i = 0; i < json_array_size(used); i++) {
+		const char *name = json_string_value(json_array_get(used, i));
+		if (name && !gltf_knows(name))
+			text_put(&t, "%s%.64s",
+				 *text ? ", " : "these extensions are not supported and ignored: ", name);
+	}
+	if (*text)
+		gltf_note(g, text);
+}
+
+/* The exporter's `generator` ends in its version. Since 3.4 lamps are in lumens unless the user wants otherwise; since
+ * 4.0 Blender's diffuse surfaces are the format's. */
+static void note_writer(struct gltf *g, const char *generator)
+{
+	static const char blender[] = "Khronos glTF Blender I/O v";
+	unsigned major = 0, minor = 0;
+	g->lamp_scale = 1;
+	g->is_blenders = generator && strncmp(generator, blender, strlen(blender)) == 0;
+	if (!g->is_blenders || sscanf(generator + strlen(blender), "%4u.%4u", &major, &minor) != 2)
+		return;
+	g->is_burleys = major < 4;
+	if (major > 3 || (major == 3 && minor >= 4))
+		g->lamp_scale = 1.0 / 683;
+}
+
+/* All of them, so that one run says what to export otherwise. */
+static void check_required(struct gltf *g)
+{
+	const json_t *required = json_object_get(g->root, "extensionsRequired");
+	char unknown[384] = "";
+	size_t count = 0;
+	for (size_t i = 0; i < json_array_size(required); i++) {
+		char name[65];
+		const char *text = json_string_value(json_array_get(required, i));
+		snprintf(name, sizeof name, "%s", text ? text : "(no text)");
+		if (text && gltf_knows(text))
+			continue;
+		spelling_list(unknown, sizeof unknown, name);
+		count++;
+	}
+	if (count)
+		gltf_fail(g, NULL, ENOTSUP, "it requires the extension%s %s, which %s not supported",
+			  count == 1 ? "" : "s", unknown, count == 1 ? "is" : "are");
+}
+
+static void check_file(struct gltf *g)
+{
+	const json_t *asset = gltf_object(g, NULL, g->root, "asset");
+	const json_t *number = asset ? json_object_get(asset, "version") : NULL; /* as files of 1.0 may have it */
+	if (json_is_number(number) && json_number_value(number) < 2) {
+		gltf_fail(g, NULL, EINVAL, "glTF of version %.3g; 2.0 is supported", json_number_value(number));
+		return;
+	}
+	const char *version = asset ? gltf_text(g, NULL, asset, "version", "") : "";
+	if (strncmp(version, "2.", 2) != 0)
+		gltf_fail(g, NULL, EINVAL, "glTF of version \"%.16s\"; 2.0 is supported", version);
+	if (g->failed)
+		return;
+	note_writer(g, json_string_value(json_object_get(asset, "generator")));
+	check_required(g);
+	gltf_go_on(g);
+	note_unknown(g);
+}
+
+/* ---- nodes */
+
+struct walk {
+	struct gltf *g;
+	bool *above; /* by node: it is an ancestor of the current one */
+	size_t nodes, visited;
+};
+
+static bool is_hidden(struct gltf *g, const struct gltf_at *node)
+{
+	return json_is_false(json_object_get(gltf_extension(g, node, node->json, "KHR_node_visibility"), "visible"));
+}
+
+/* Whether a scale of 0 in two or three directions leaves a line or a point of its mesh: animations hide things so. Not
+ * of a skinned mesh, which is where its joints are. */
+static bool is_scaled_away(const struct gltf_at *node, const mat4 *to_world)
+{
+	int flat = 0;
+	for (int k = 0; k < 3; k++)
+		flat += to_world->m[0][k] == 0 && to_world->m[1][k] == 0 && to_world->m[2][k] == 0;
+	return flat > 1 && !json_object_get(node->json, "skin");
+}
+
+/* hidden: it and all below, except for cameras. */
+static void visit_lists(struct gltf *g, const struct gltf_at *node, const mat4 *to_world, bool hidden)
+{
+	struct gltf_at what;
+	if (gltf_follow(g, node, node->json, "camera", GLTF_CAMERAS, &what) > 0)
+		gltf_camera(g, &what, to_world);
+	gltf_go_on(g);
+	if (hidden)
+		return;
+	const json_t *instances = gltf_extension(g, node, node->json, "EXT_mesh_gpu_instancing");
+	bool mesh = gltf_follow(g, node, node->json, "mesh", GLTF_MESHES, &what) > 0 && !is_scaled_away(node, to_world);
+	if (mesh && instances)
+		gltf_mesh_instances(g, &what, node, instances, to_world);
+	else if (mesh)
+		gltf_mesh(g, &what, node, to_world);
+	gltf_go_on(g);
+	const json_t *light = gltf_extension(g, node, node->json, "KHR_lights_punctual");
+	if (light && gltf_follow(g, node, light, "light", GLTF_LIGHTS, &what) > 0)
+		gltf_light(g, &what, to_world);
+	gltf_go_on(g);
+}
+
+static void visit(struct walk *w, uint64_t index, const mat4 *above, int depth, bool hidden)
+{
+	struct gltf *g = w->g;
+	struct gltf_at node;
+	if (g->failed || !gltf_entry(g, GLTF_NODES, index, &node))
+		return;
+	if (w->above[index] || depth > GLTF_NODES_DEEP) {
+		gltf_fail(g, &node, ELOOP, w->above[index] ? "it is its own ancestor" : "nodes are more than %d deep",
+			  GLTF_NODES_DEEP);
+		return;
+	}
+	if (++w->visited > INSTANCES_MAX) {
+		gltf_fail(g, &node, E2BIG, "more than %d nodes", INSTANCES_MAX);
+		return;
+	}
+	mat4 own = gltf_node_matrix(g, &node), to_world = mat4_mul(*above, own);
+	hidden |= is_hidden(g, &node);
+	visit_lists(g, &node, &to_world, hidden);
+	const json_t *children = json_object_get(node.json, "children");
+	w->above[index] = true;
+	for (size_t i = 0; i < json_array_size(children) && !g->failed; i++) {
+		const json_t *child = json_array_get(children, i);
+		if (!json_is_integer(child) || json_integer_value(child) < 0)
+			gltf_fail(g, &node, EINVAL, "its children are not indices");
+		else
+			visit(w, (uint64_t)json_integer_value(child), &to_world, depth + 1, hidden);
+		gltf_go_on(g);
+	}
+	w->above[index] = false;
+}
+
+/* A file without scenes is a library of meshes, which most viewers show with all of its nodes. */
+static void visit_all(struct gltf *g, struct walk *w, const mat4 *world)
+{
+	gltf_note(g, "it has no scenes: all of its nodes are shown");
+	for (size_t i = 0; i < w->nodes && !g->failed; i++) {
+		if (gltf_node_is_root(g, i))
+			visit(w, i, world, 0, false);
+		gltf_go_on(g);
+	}
+}
+
+static void read_scene(struct gltf *g)
+{
+	struct gltf_at scene;
+	struct walk w = {.g = g, .nodes = json_array_size(json_object_get(g->root, "nodes"))};
+	mat4 world = mat4_identity();
+	bool none = !json_object_get(g->root, "scene") && json_array_size(json_object_get(g->root, "scenes")) == 0;
+	if (!none && !gltf_entry(g, GLTF_SCENES, gltf_whole(g, NULL, g->root, "scene", 0), &scene))
+		return;
+	w.above = arena_alloc(g->arena, w.nodes ? w.nodes : 1, sizeof *w.above);
+	if (!w.above) {
+		gltf_fail(g, NULL, ENOMEM, "out of memory");
+		return;
+	}
+	memset(w.above, 0, w.nodes * sizeof *w.above);
+	if (none) {
+		visit_all(g, &w, &world);
+		return;
+	}
+	const json_t *roots = json_object_get(scene.json, "nodes");
+	for (size_t i = 0; i < json_array_size(roots) && !g->failed; i++) {
+		const json_t *root = json_array_get(roots, i);
+		if (!json_is_integer(root) || json_integer_value(root) < 0)
+			gltf_fail(g, &scene, EINVAL, "its nodes are not indices");
+		else
+			visit(&w, (uint64_t)json_integer_value(root), &world, 0, false);
+		gltf_go_on(g);
+	}
+}
+
+/* An upper bound of the number of values: each begins with, or comes after, one of these. */
+static bool is_moderate(const char *text, size_t size)
+{
+	size_t values = 0;
+	bool quoted = false;
+	for (size_t i = 0; i < size; i++) {
+		if (text[i] == '"')
+			quoted = !quoted;
+		else if (quoted)
+			i += text[i] == '\\';
+		else
+			values += text[i] == ',' || text[i] == '[' || text[i] == '{';
+	}
+	return values <= GLTF_VALUES_MAX;
+}
+
+static int read_json(struct gltf *g)
+{
+	const char *text;
+	size_t size;
+	json_error_t where;
+	int rc = find_json(g, &text, &size);
+	if (rc)
+		return rc;
+	static const char bom[] = "\xef\xbb\xbf"; /* forbidden, and ignored by most readers */
+	if (size >= sizeof bom - 1 && memcmp(text, bom, sizeof bom - 1) == 0) {
+		text += sizeof bom - 1;
+		size -= sizeof bom - 1;
+	}
+	if (size > GLTF_JSON_MAX)
+		return gltf_fail(g, NULL, EFBIG, "more than %d MB of JSON", GLTF_JSON_MAX >> 20);
+	if (!is_moderate(text, size))
+		return gltf_fail(g, NULL, E2BIG, "more than %d values in its JSON", GLTF_VALUES_MAX);
+	g->root = json_loadb(text, size, JSON_REJECT_DUPLICATES, &where);
+	if (!g->root) {
+		rc = json_error_code(&where) == json_error_out_of_memory ? ENOMEM : EINVAL;
+		g->failed = error_set(g->error, rc, "%s:%d: %.160s", g->file, where.line, where.text);
+		return g->failed;
+	}
+	if (!json_is_object(g->root))
+		return gltf_fail(g, NULL, EINVAL, "it is not a JSON object");
+	find_lines(g, text, size);
+	const json_t *lights = gltf_extension(g, NULL, g->root, "KHR_lights_punctual");
+	g->lights = json_object_get(lights, "lights");
+	return g->failed;
+}
+
+static void *allocate(struct gltf *g, enum gltf_array array, size_t size)
+{
+	return arena_alloc(g->arena, json_array_size(json_object_get(g->root, gltf_array_name(array))) + 1, size);
+}
+
+/* Nodes that are not in the scene count, too: what follows is right without them, and sooner without asking. */
+static void count_uses(struct gltf *g)
+{
+	const json_t *nodes = json_object_get(g->root, "nodes");
+	size_t meshes = json_array_size(json_object_get(g->root, "meshes"));
+	for (size_t i = 0; i < json_array_size(nodes); i++) {
+		const json_t *mesh = json_object_get(json_array_get(nodes, i), "mesh");
+		if (json_is_integer(mesh) && json_integer_value(mesh) >= 0 && (size_t)json_integer_value(mesh) < meshes)
+			g->mesh_uses[json_integer_value(mesh)]++;
+	}
+}
+
+static int read_file(struct gltf *g)
+{
+	if (read_json(g))
+		return g->failed;
+	g->buffers = allocate(g, GLTF_BUFFERS, sizeof *g->buffers);
+	g->images = allocate(g, GLTF_IMAGES, sizeof *g->images);
+	g->material_made = allocate(g, GLTF_MATERIALS, sizeof *g->material_made);
+	g->mesh_uses = allocate(g, GLTF_MESHES, sizeof *g->mesh_uses);
+	g->mesh_made = allocate(g, GLTF_MESHES, sizeof *g->mesh_made);
+	if (!g->buffers || !g->images || !g->material_made || !g->mesh_uses || !g->mesh_made)
+		return gltf_fail(g, NULL, ENOMEM, "out of memory");
+	count_uses(g);
+	g->scene = gltf_element(g, NULL, NULL, "scene");
+	gltf_attribute(g, g->scene, "version", "3.0.0");
+	g->tree->root = g->scene;
+	g->tree->dialect_3 = true;
+	check_file(g);
+	if (g->failed)
+		return g->failed;
+	gltf_animation_begin(g);
+	gltf_go_on(g);
+	read_scene(g);
+	gltf_go_on(g);
+	if (!g->has_camera)
+		gltf_default_camera(g);
+	if (!g->has_light)
+		gltf_default_light(g);
+	return g->failed;
+}
+
+int gltf_read(struct xml_tree *t, const struct asset_source *assets, const char *name, struct arena *arena,
+	      struct error *e)
+{
+	*t = (struct xml_tree){0};
+	struct gltf g = {.tree = t,
+			 .assets = assets,
+			 .arena = arena,
+			 .error = e,
+			 .low = {INFINITY, INFINITY, INFINITY},
+			 .high = {-INFINITY, -INFINITY, -INFINITY}};
+	struct asset file;
+	g.file = arena_strdup(arena, name);
+	if (!g.file)
+		return error_set(e, ENOMEM, "out of memory");
+	int rc = assets->open(assets->user, name, &file, e);
+	if (rc)
+		return rc == -ENOENT ? error_set(e, ENOENT, "%s: %s", name, strerror(ENOENT)) : rc;
+	g.bytes = file.bytes;
+	g.size = file.size;
+	rc = read_file(&g);
+	gltf_numbers_close(&g);
+	json_decref(g.root);
+	assets->close(assets->user, &file);
+	return rc;
+}

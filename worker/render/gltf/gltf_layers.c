@@ -1,0 +1,198 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The extensions of materials as properties of `principled`. Transmission refracts, as in importers of modelling tools:
+ * thin walls are not distinguished from solids. The clear coat is the parameter `coat`, since the original model's ends
+ * at a quarter of the format's. Anisotropic roughness is exact as long as the two roughnesses differ by less than a
+ * factor of ten.
+ *
+ * Details that `principled` does not have are left out with a note: normals of a coat, what a sheen or a reflection
+ * varies by. So are extensions that are not known, as the format wants it of those that a file does not require. So is
+ * the dispersion of anything but clear glass; where the file requires it, it becomes a property that the table does not
+ * know: refused with its name, or left out with --lenient.
+ */
+#include "worker/render/gltf/gltf_layers.h"
+#include "worker/render/gltf/gltf_texture.h"
+
+#include <stdio.h>
+#include <string.h>
+
+/* Members that are left out. what: of which layer, and why that matters little. */
+static void note_members(struct gltf *g, const json_t *extension, const char *const *members, const char *note)
+{
+	for (; *members; members++)
+		if (json_object_get(extension, *members)) {
+			gltf_note(g, note);
+			return;
+		}
+}
+
+/* Only this many entries are checked for each material; one after those may be reported twice. */
+enum { LISTED_MOST = 64 };
+
+static bool is_listed(const struct gltf *g, const char *list, const char *extension)
+{
+	const json_t *used = json_object_get(g->root, list);
+	for (size_t i = 0; i < json_array_size(used) && i < LISTED_MOST; i++) {
+		const char *name = json_string_value(json_array_get(used, i));
+		if (name && strcmp(name, extension) == 0)
+			return true;
+	}
+	return false;
+}
+
+/* The reflectance at normal incidence in the format is min(r^2 c, 1) f for an index of reflectance r^2, a colour c and
+ * a factor f. Here the largest component of c decides the index, and the rest is `specular_color`. Where light enters,
+ * the index is left alone. */
+static void put_index(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
+{
+	const json_t *ior = gltf_extension(g, at, at->json, "KHR_materials_ior"),
+		     *specular = gltf_extension(g, at, at->json, "KHR_materials_specular"),
+		     *transmission = gltf_extension(g, at, at->json, "KHR_materials_transmission");
+	double eta = ior ? gltf_number(g, at, ior, "ior", 1.5) : 1.5, factor = 1, rgb[3] = {1, 1, 1};
+	if (specular) {
+		factor = gltf_number(g, at, specular, "specularFactor", 1);
+		gltf_numbers(g, at, specular, "specularColorFactor", rgb, 3);
+		note_members(g, specular, (const char *const[]){"specularTexture", NULL},
+			     "the specular strength of non-metals is the same everywhere: specularTexture is left out");
+	}
+	double most = fmax(fmax(rgb[0], fmax(rgb[1], rgb[2])), 0);
+	const json_t *texture = specular ? gltf_object(g, at, specular, "specularColorTexture") : NULL;
+	bool coloured = most > 0 && (texture || rgb[0] != rgb[1] || rgb[1] != rgb[2]);
+	if (transmission && gltf_number(g, at, transmission, "transmissionFactor", 0) > 0 &&
+	    (factor * most != 1 || coloured)) {
+		gltf_note(g, "KHR_materials_specular is ignored for materials that transmit light");
+		factor = most = 1;
+		coloured = false;
+	}
+	/* An index of 0 means total reflection in the format. */
+	double root = eta > 0 ? fabs((eta - 1) / (eta + 1)) : 1,
+	       scaled = fmin(root * sqrt(most), 1) * sqrt(fmin(fmax(factor, 0), 1));
+	gltf_put_number(g, el, at, "eta", fmin((1 + scaled) / fmax(1 - scaled, 0.1), 10));
+	if (!coloured)
+		return;
+	for (int k = 0; k < 3; k++)
+		rgb[k] = fmax(rgb[k], 0) / most;
+	gltf_put_colour(g, el, at, "specular_color", rgb, texture);
+}
+
+static void put_coat(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
+{
+	const json_t *coat = gltf_extension(g, at, at->json, "KHR_materials_clearcoat");
+	double factor = coat ? gltf_number(g, at, coat, "clearcoatFactor", 0) : 0;
+	if (!(factor > 0))
+		return;
+	double roughness = gltf_number(g, at, coat, "clearcoatRoughnessFactor", 0);
+	gltf_put_share(g, el, at, "coat", factor, gltf_object(g, at, coat, "clearcoatTexture"), "r");
+	gltf_put_share(g, el, at, "coat_roughness", roughness,
+		       roughness > 0 ? gltf_object(g, at, coat, "clearcoatRoughnessTexture") : NULL, "g");
+	note_members(g, coat, (const char *const[]){"clearcoatNormalTexture", NULL},
+		     "clear coats use the normals of the surface: their own normal maps are left out");
+}
+
+/* The format's sheen is of cloth (Estevez and Kulla 2017), Burley's of its edges. */
+static void put_sheen(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
+{
+	const json_t *sheen = gltf_extension(g, at, at->json, "KHR_materials_sheen");
+	double rgb[3] = {0, 0, 0};
+	if (sheen)
+		gltf_numbers(g, at, sheen, "sheenColorFactor", rgb, 3);
+	double most = fmax(rgb[0], fmax(rgb[1], rgb[2])), least = fmin(rgb[0], fmin(rgb[1], rgb[2]));
+	if (!(most > 0))
+		return;
+	gltf_note(g,
+		  "sheen is that of `principled`, which differs from the format's: no roughness, no textures, and its "
+		  "colour is white or the surface's");
+	gltf_put_number(g, el, at, "sheen", fmin(most, 1));
+	gltf_put_number(g, el, at, "sheen_tint", fmin(1 - least / most, 1));
+}
+
+/* The format widens the roughness along the tangent to a_t = a + (1 - a) s^2, and leaves a across; `principled` divides
+ * and multiplies a by sqrt(1 - 0.9 x). With r for their ratio: x = (1 - 1 / r) / 0.9, and a becomes sqrt(a_t a). */
+static void put_anisotropy(struct gltf *g, struct xml_element *el, const struct gltf_at *at, double *roughness,
+			   bool textured)
+{
+	const json_t *o = gltf_extension(g, at, at->json, "KHR_materials_anisotropy");
+	double s = o ? gltf_number(g, at, o, "anisotropyStrength", 0) : 0,
+	       turn = o ? gltf_number(g, at, o, "anisotropyRotation", 0) : 0, a = *roughness * *roughness;
+	if (s == 0)
+		return;
+	double wide = a + (1 - a) * s * s, ratio = a > 0 ? wide / a : INFINITY;
+	if (textured || turn != 0 || json_object_get(o, "anisotropyTexture") || !(ratio < 10)) {
+		gltf_note(g, "anisotropy with a texture, a rotation, or of a smooth surface is left out");
+		return;
+	}
+	gltf_put_number(g, el, at, "anisotropic", (1 - 1 / ratio) / 0.9);
+	*roughness = sqrt(sqrt(wide * a));
+}
+
+/* Such surfaces show their colour whatever the light, which no material does. A file that requires it does not want
+ * them lit. */
+static void put_unlit(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
+{
+	const char *name = "KHR_materials_unlit";
+	if (!gltf_extension(g, at, at->json, name))
+		return;
+	if (is_listed(g, "extensionsRequired", name))
+		gltf_put_text(g, el, at, name, ELEMENT_UNSUPPORTED);
+	else
+		gltf_note(g, "surfaces of KHR_materials_unlit are lit like others");
+}
+
+static void note_iridescence(struct gltf *g, const struct gltf_at *at)
+{
+	const json_t *o = gltf_extension(g, at, at->json, "KHR_materials_iridescence");
+	if (o && gltf_number(g, at, o, "iridescenceFactor", 0) > 0)
+		gltf_note(g, "the colours of thin films (KHR_materials_iridescence) are left out");
+}
+
+/* Dispersion of materials other than clear glass is left out: `principled` has one index of refraction. */
+static void put_dispersion(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
+{
+	if (is_listed(g, "extensionsRequired", "KHR_materials_dispersion"))
+		gltf_put_text(g, el, at, "dispersion", ELEMENT_UNSUPPORTED);
+	else
+		gltf_note(g, "only clear glass without textures disperses light: KHR_materials_dispersion of other "
+			     "materials is left out");
+}
+
+static void put_transmission(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
+{
+	const json_t *t = gltf_extension(g, at, at->json, "KHR_materials_transmission"),
+		     *dispersion = gltf_extension(g, at, at->json, "KHR_materials_dispersion");
+	double factor = t ? gltf_number(g, at, t, "transmissionFactor", 0) : 0;
+	if (factor > 0) {
+		gltf_put_share(g, el, at, "spec_trans", factor, gltf_object(g, at, t, "transmissionTexture"), "r");
+		if (dispersion && gltf_number(g, at, dispersion, "dispersion", 0) > 0)
+			put_dispersion(g, el, at);
+	}
+}
+
+void gltf_note_foreign(struct gltf *g, const struct gltf_at *at)
+{
+	json_t *all = json_object_get(at->json, "extensions");
+	for (void *i = json_object_iter(all); i; i = json_object_iter_next(all, i)) {
+		const char *name = json_object_iter_key(i);
+		char text[160];
+		if (gltf_knows(name) || is_listed(g, "extensionsUsed", name))
+			continue;
+		snprintf(
+			text, sizeof text,
+			"the extension %.64s of a material is not supported and ignored; it is not listed in `extensionsUsed`",
+			name);
+		gltf_note(g, text);
+	}
+}
+
+void gltf_put_layers(struct gltf *g, struct xml_element *el, const struct gltf_at *at, double roughness,
+		     const json_t *texture)
+{
+	put_anisotropy(g, el, at, &roughness, roughness > 0 && texture);
+	gltf_put_share(g, el, at, "roughness", roughness, roughness > 0 ? texture : NULL, "g");
+	put_sheen(g, el, at);
+	note_iridescence(g, at);
+	put_unlit(g, el, at);
+	put_index(g, el, at);
+	put_coat(g, el, at);
+	put_transmission(g, el, at);
+	gltf_note_foreign(g, at);
+}

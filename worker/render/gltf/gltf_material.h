@@ -1,0 +1,17 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Materials. Private to gltf*.c. */
+#ifndef WORKER_RENDER_GLTF_GLTF_MATERIAL_H
+#define WORKER_RENDER_GLTF_GLTF_MATERIAL_H
+
+#include "worker/render/gltf/gltf_tree.h"
+
+/* Attributes of a primitive's vertices: they multiply the material's base colour, and its alpha. */
+enum gltf_colours { GLTF_NO_COLOURS, GLTF_COLOURS, GLTF_COLOURS_AND_ALPHA };
+
+/* The references of a shape with this material. */
+void gltf_material(struct gltf *g, struct xml_element *shape, const struct gltf_at *material,
+		   enum gltf_colours colours);
+bool gltf_material_shines(struct gltf *g, const struct gltf_at *material, double rgb[3]); /* rgb: its radiance */
+void gltf_default_material(struct gltf *g, struct xml_element *shape, enum gltf_colours colours);
+
+#endif

@@ -1,0 +1,164 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Decompression by libmeshoptimizer, except for what Debian's does not know. What the extension forbids is refused
+ * first, because the library asserts it, and no memory is taken for more than the compressed bytes can stand for.
+ * Failures: modes and filters that are unknown, bytes that are no such stream or one of a later version, more than
+ * UNPACKED_MAX in one file.
+ */
+#include "worker/render/gltf/gltf_meshopt.h"
+
+#include "common/base/bytes.h"
+#include "common/base/liveness.h"
+#include "common/base/mem.h"
+#include "worker/render/math/fptrap.h"
+#include "worker/render/gltf/gltf_meshopt_v1.h"
+
+#include <meshoptimizer.h>
+#include <string.h>
+
+enum { ATTRIBUTES, TRIANGLES, INDICES, MODES };
+enum { NONE, OCTAHEDRAL, QUATERNION, EXPONENTIAL, COLOR, FILTERS };
+enum { STRIDE_MAX = 256 };
+#define UNPACKED_MAX (UINT64_C(512) << 20)
+
+static const char *const mode_names[MODES] = {"ATTRIBUTES", "TRIANGLES", "INDICES"};
+static const char *const filter_names[FILTERS] = {"NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR"};
+
+/* Bytes that one compressed byte stands for at most: a quarter of a byte says that a byte of each of 256 elements is as
+ * before; a triangle, or an index, takes at least one. */
+static const unsigned expands[MODES] = {1024, 12, 4};
+
+struct packed {
+	int mode, filter;
+	uint64_t count, stride;
+};
+
+const json_t *gltf_meshopt(struct gltf *g, const struct gltf_at *view)
+{
+	const json_t *o = gltf_extension(g, view, view->json, "EXT_meshopt_compression");
+	return o ? o : gltf_extension(g, view, view->json, "KHR_meshopt_compression");
+}
+
+/* The index of the member's text in a list. */
+static int choice(struct gltf *g, const struct gltf_at *view, const json_t *o, const char *key, const char *fallback,
+		  const char *const *names, int count)
+{
+	const char *text = gltf_text(g, view, o, key, fallback);
+	for (int i = 0; i < count; i++)
+		if (strcmp(names[i], text) == 0)
+			return i;
+	gltf_fail(g, view, ENOTSUP, "compressed by meshopt's %s \"%.32s\", which is not supported; compress without it",
+		  key, text);
+	return 0;
+}
+
+static bool is_valid(const struct packed *p)
+{
+	if (p->mode != ATTRIBUTES)
+		return p->filter == NONE && (p->stride == 2 || p->stride == 4) &&
+		       (p->mode != TRIANGLES || p->count % 3 == 0);
+	if (p->stride == 0 || p->stride > STRIDE_MAX || p->stride % 4)
+		return false;
+	if (p->filter == OCTAHEDRAL || p->filter == COLOR)
+		return p->stride <= 8;
+	return p->filter != QUATERNION || p->stride == 8;
+}
+
+static int decode(const struct packed *p, const unsigned char *bytes, uint64_t size, unsigned char *out)
+{
+	switch (p->mode) {
+	case TRIANGLES:
+		return meshopt_decodeIndexBuffer(out, p->count, p->stride, bytes, size);
+	case INDICES:
+		return meshopt_decodeIndexSequence(out, p->count, p->stride, bytes, size);
+	default:
+		if (size > 0 && bytes[0] == GLTF_MESHOPT_V1)
+			return !gltf_meshopt_v1(bytes, size, p->count, p->stride, out);
+		return meshopt_decodeVertexBuffer(out, p->count, p->stride, bytes, size);
+	}
+}
+
+/* Luma, two chrominances with a sign, and alpha, in as many bits as alpha has with a bit of 1 above; they become shares
+ * of all the bits of a component. Appendix B of KHR_meshopt_compression; Debian's library does not have it. */
+static void undo_color(const struct packed *p, unsigned char *out)
+{
+	int width = (int)p->stride / 4, sign = 1 << (8 * width - 1), most = 2 * sign - 1;
+	for (uint64_t i = 0; i < 4 * p->count; i += 4) {
+		int x[4], own = 1;
+		for (unsigned k = 0; k < 4; k++)
+			x[k] = (int)get_bytes(out + (i + k) * (unsigned)width, width);
+		while (own < x[3])
+			own = 2 * own + 1;
+		int co = (x[1] ^ sign) - sign, cg = (x[2] ^ sign) - sign, a = x[3] & own / 2;
+		const int rgba[4] = {x[0] + co - cg, x[0] + cg, x[0] - co - cg, 2 * a + (a & 1)};
+		for (unsigned k = 0; k < 4; k++) {
+			long share = lround((double)rgba[k] * most / own);
+			uint64_t bits = (uint64_t)(share < 0 ? 0 : share > most ? most : share);
+			put_bytes(out + (i + k) * (unsigned)width, bits, width);
+		}
+	}
+}
+
+/* Vectors of nothing become NaN within the library. */
+static void undo_filter(const struct packed *p, unsigned char *out)
+{
+	unsigned trap = fptrap_leave();
+	if (p->filter == OCTAHEDRAL)
+		meshopt_decodeFilterOct(out, p->count, p->stride);
+	else if (p->filter == QUATERNION)
+		meshopt_decodeFilterQuat(out, p->count, p->stride);
+	else if (p->filter == EXPONENTIAL)
+		meshopt_decodeFilterExp(out, p->count, p->stride);
+	fptrap_return(trap);
+	if (p->filter == COLOR)
+		undo_color(p, out);
+}
+
+/* The first byte has the coding in its upper half, and the coding's version in the other. */
+static void refuse(struct gltf *g, const struct gltf_at *view, const struct packed *p, const unsigned char *bytes,
+		   uint64_t size)
+{
+	static const unsigned codings[MODES] = {0xa, 0xe, 0xd};
+	if (size > 0 && bytes[0] >> 4 == codings[p->mode] && (bytes[0] & 15u) > 1)
+		gltf_fail(g, view, ENOTSUP,
+			  "compressed by version %u of meshopt's %s, which is not supported; compress with "
+			  "EXT_meshopt_compression",
+			  bytes[0] & 15u, mode_names[p->mode]);
+	else
+		gltf_fail(g, view, EINVAL, "its compressed bytes are damaged");
+}
+
+unsigned char *gltf_meshopt_decode(struct gltf *g, const struct gltf_at *view, const json_t *packed,
+				   const unsigned char *bytes, uint64_t size, uint64_t *count)
+{
+	struct packed p = {choice(g, view, packed, "mode", "", mode_names, MODES),
+			   choice(g, view, packed, "filter", "NONE", filter_names, FILTERS),
+			   gltf_whole(g, view, packed, "count", 0), gltf_whole(g, view, packed, "byteStride", 0)};
+	if (!is_valid(&p))
+		gltf_fail(g, view, EINVAL, "a byteStride, filter or count that meshopt's %s cannot have",
+			  mode_names[p.mode]);
+	if (g->failed)
+		return NULL;
+	*count = p.count * p.stride; /* at most 2^53 times STRIDE_MAX */
+	if (*count != gltf_whole(g, view, view->json, "byteLength", 0))
+		gltf_fail(g, view, EINVAL, "its byteLength is not count times byteStride of what is compressed");
+	else if (*count / expands[p.mode] > size)
+		gltf_fail(g, view, EINVAL, "%llu compressed bytes cannot stand for %llu", (unsigned long long)size,
+			  (unsigned long long)*count);
+	else if (*count > UNPACKED_MAX - g->unpacked_bytes)
+		gltf_fail(g, view, E2BIG, "more than %llu MB are compressed", (unsigned long long)UNPACKED_MAX >> 20);
+	unsigned char *out = g->failed ? NULL : mem_alloc(*count + 1, 1);
+	if (!out) {
+		gltf_fail(g, view, ENOMEM, "out of memory");
+		return NULL;
+	}
+	g->unpacked_bytes += *count;
+	if (decode(&p, bytes, size, out)) {
+		refuse(g, view, &p, bytes, size);
+		mem_free(out);
+		return NULL;
+	}
+	undo_filter(&p, out);
+	tick();
+	return out;
+}

@@ -1,0 +1,31 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Textures of materials. Private to gltf*.c. */
+#ifndef WORKER_RENDER_GLTF_GLTF_TEXTURE_H
+#define WORKER_RENDER_GLTF_GLTF_TEXTURE_H
+
+#include "worker/render/gltf/gltf_tree.h"
+
+/* How an image is read: which numbers of a pixel, and whether they are colours. */
+struct gltf_channel {
+	const char *name; /* "r", "g", "b", "a"; NULL: all three */
+	bool colour;
+	double factor[3]; /* factor of colours; otherwise the first is used */
+	double cutoff;	  /* factor of alpha; negative: none */
+};
+
+/* The sets of texture coordinates that a material's textures use, up to two; the first is the normal map's if there is
+ * one. Without any, set[0] is 0. */
+struct gltf_sets {
+	unsigned set[2], count;
+};
+struct gltf_sets gltf_texture_sets(struct gltf *g, const struct gltf_at *material);
+/* The texture that `info` of the material names, as the property `name` of el. */
+void gltf_put_texture(struct gltf *g, struct xml_element *el, const struct gltf_at *material, const char *name,
+		      const json_t *info, const struct gltf_channel *c);
+/* A colour, or a number from 0 to 1 of one channel, times the texture (NULL: none). */
+void gltf_put_colour(struct gltf *g, struct xml_element *el, const struct gltf_at *material, const char *name,
+		     const double rgb[3], const json_t *texture);
+void gltf_put_share(struct gltf *g, struct xml_element *el, const struct gltf_at *material, const char *name, double x,
+		    const json_t *texture, const char *channel);
+
+#endif

@@ -1,0 +1,293 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Members of JSON objects, and elements made from them, for the reader of glTF. After a failure nothing is added to the
+ * tree until gltf_go_on has noted it. Failures: members of another type or out of range, and out of memory; each names
+ * its place in the file.
+ */
+#include "worker/render/gltf/gltf_tree.h"
+
+#include "common/base/text.h"
+#include "worker/render/xml/element_make.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+static const char *const array_names[GLTF_ARRAYS] = {
+	[GLTF_ACCESSORS] = "accessors", [GLTF_BUFFERS] = "buffers", [GLTF_BUFFER_VIEWS] = "bufferViews",
+	[GLTF_CAMERAS] = "cameras",	[GLTF_IMAGES] = "images",   [GLTF_LIGHTS] = "lights",
+	[GLTF_MATERIALS] = "materials", [GLTF_MESHES] = "meshes",   [GLTF_NODES] = "nodes",
+	[GLTF_SAMPLERS] = "samplers",	[GLTF_SCENES] = "scenes",   [GLTF_SKINS] = "skins",
+	[GLTF_TEXTURES] = "textures",
+};
+
+const char *gltf_array_name(enum gltf_array array)
+{
+	return array_names[array];
+}
+
+static int gltf_line(const struct gltf *g, enum gltf_array array, size_t index)
+{
+	return index < g->line_count[array] ? g->lines[array][index] : 1;
+}
+
+int gltf_fail(struct gltf *g, const struct gltf_at *at, int errno_value, const char *format, ...)
+{
+	char text[512];
+	if (g->failed)
+		return g->failed;
+	va_list ap;
+	va_start(ap, format);
+	vsnprintf(text, sizeof text, format, ap);
+	va_end(ap);
+	if (at)
+		g->failed = error_set(g->error, errno_value, "%s:%d: %s[%zu]: %s", g->file,
+				      gltf_line(g, at->array, at->index), array_names[at->array], at->index, text);
+	else
+		g->failed = error_set(g->error, errno_value, "%s: %s", g->file, text);
+	return g->failed;
+}
+
+void gltf_go_on(struct gltf *g)
+{
+	struct xml_tree *t = g->tree;
+	bool limit = g->failed == -ENOMEM || g->failed == -E2BIG || g->failed == -EFBIG;
+	/* A mesh of several nodes says the same of each. */
+	bool noted = g->failed && text_is_among(g->error->text, t->missing, t->missing_count);
+	if (g->failed && !limit && (noted || t->missing_count < XML_MISSING_MAX)) {
+		const char *text = noted ? NULL : arena_strdup(g->arena, g->error->text);
+		if (text)
+			t->missing[t->missing_count++] = text;
+		g->failed = text || noted ? 0 : -ENOMEM;
+		t->holes = true;
+	}
+}
+
+static void no_memory(struct gltf *g)
+{
+	gltf_fail(g, NULL, ENOMEM, "out of memory, or the scene files take more than %d MB of it",
+		  XML_MEMORY_MAX >> 20);
+}
+
+bool gltf_entry(struct gltf *g, enum gltf_array array, uint64_t index, struct gltf_at *out)
+{
+	const json_t *list = array == GLTF_LIGHTS ? g->lights : json_object_get(g->root, array_names[array]);
+	*out = (struct gltf_at){array, (size_t)index, json_array_get(list, (size_t)index)};
+	if (json_is_object(out->json))
+		return true;
+	gltf_fail(g, NULL, EINVAL, "there is no %s[%llu]", array_names[array], (unsigned long long)index);
+	return false;
+}
+
+int gltf_follow(struct gltf *g, const struct gltf_at *from, const json_t *object, const char *key,
+		enum gltf_array array, struct gltf_at *out)
+{
+	uint64_t index = gltf_whole(g, from, object, key, UINT64_MAX);
+	if (g->failed)
+		return g->failed;
+	if (index == UINT64_MAX)
+		return 0;
+	return gltf_entry(g, array, index, out) ? 1 : g->failed;
+}
+
+/* ---- members */
+
+double gltf_number(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key, double fallback)
+{
+	const json_t *x = json_object_get(o, key);
+	if (!x)
+		return fallback;
+	if (json_is_number(x))
+		return json_number_value(x);
+	gltf_fail(g, at, EINVAL, "\"%s\" is not a number", key);
+	return fallback;
+}
+
+uint64_t gltf_whole(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key, uint64_t fallback)
+{
+	const json_t *x = json_object_get(o, key);
+	double value = x ? json_number_value(x) : 0;
+	if (!x)
+		return fallback;
+	if (json_is_number(x) && value >= 0 && value <= GLTF_WHOLE_MAX && value == floor(value))
+		return (uint64_t)value;
+	gltf_fail(g, at, EINVAL, "\"%s\" is not a whole number from 0 to %.0f", key, GLTF_WHOLE_MAX);
+	return fallback;
+}
+
+const char *gltf_text(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key, const char *fallback)
+{
+	const json_t *x = json_object_get(o, key);
+	if (!x)
+		return fallback;
+	if (json_is_string(x))
+		return json_string_value(x);
+	gltf_fail(g, at, EINVAL, "\"%s\" is not a string", key);
+	return fallback;
+}
+
+void gltf_numbers(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key, double *x, size_t count)
+{
+	const json_t *list = json_object_get(o, key);
+	if (!list)
+		return;
+	bool good = json_is_array(list) && json_array_size(list) == count;
+	for (size_t i = 0; i < count && good; i++) {
+		const json_t *one = json_array_get(list, i);
+		good = json_is_number(one);
+		x[i] = json_number_value(one);
+	}
+	if (!good)
+		gltf_fail(g, at, EINVAL, "\"%s\" is not an array of %zu numbers", key, count);
+}
+
+const json_t *gltf_object(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key)
+{
+	const json_t *x = json_object_get(o, key);
+	if (x && !json_is_object(x))
+		gltf_fail(g, at, EINVAL, "\"%s\" is not an object", key);
+	return json_is_object(x) ? x : NULL;
+}
+
+const json_t *gltf_extension(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *name)
+{
+	const json_t *all = gltf_object(g, at, o, "extensions");
+	return all ? gltf_object(g, at, all, name) : NULL;
+}
+
+/* ---- elements */
+
+__attribute__((format(printf, 2, 0))) static char *print(struct gltf *g, const char *format, va_list ap)
+{
+	va_list again;
+	va_copy(again, ap);
+	int n = vsnprintf(NULL, 0, format, ap);
+	char *text = n >= 0 ? arena_alloc(g->arena, (size_t)n + 1, 1) : NULL;
+	if (text)
+		vsnprintf(text, (size_t)n + 1, format, again);
+	else
+		no_memory(g);
+	va_end(again);
+	return text;
+}
+
+struct xml_element *gltf_element(struct gltf *g, struct xml_element *parent, const struct gltf_at *at, const char *name)
+{
+	if (g->failed || (!parent && g->scene))
+		return NULL;
+	if (g->tree->element_count >= XML_ELEMENTS_MAX) {
+		gltf_fail(g, at, E2BIG, "this file becomes more than %d elements", XML_ELEMENTS_MAX);
+		return NULL;
+	}
+	struct xml_element *el =
+		element_make(parent, name, g->file, at ? gltf_line(g, at->array, at->index) : 1, g->arena);
+	if (!el) {
+		no_memory(g);
+		return NULL;
+	}
+	g->tree->element_count++;
+	return el;
+}
+
+void gltf_attribute(struct gltf *g, struct xml_element *el, const char *name, const char *format, ...)
+{
+	if (!el || g->failed)
+		return;
+	va_list ap;
+	va_start(ap, format);
+	char *value = print(g, format, ap);
+	va_end(ap);
+	if (value)
+		element_put(el, name, value);
+}
+
+struct xml_element *gltf_plugin(struct gltf *g, struct xml_element *parent, const struct gltf_at *at, const char *cls,
+				const char *type, const char *name)
+{
+	struct xml_element *el = gltf_element(g, parent, at, cls);
+	gltf_attribute(g, el, "type", "%s", type);
+	if (name)
+		gltf_attribute(g, el, "name", "%s", name);
+	return el;
+}
+
+static struct xml_element *put_element(struct gltf *g, struct xml_element *el, const struct gltf_at *at,
+				       const char *element, const char *name)
+{
+	struct xml_element *p = el ? gltf_element(g, el, at, element) : NULL;
+	gltf_attribute(g, p, "name", "%s", name);
+	return p;
+}
+
+void gltf_put_number(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, double x)
+{
+	gltf_attribute(g, put_element(g, el, at, "float", name), "value", "%.17g", x);
+}
+
+void gltf_put_whole(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, uint64_t x)
+{
+	gltf_attribute(g, put_element(g, el, at, "integer", name), "value", "%llu", (unsigned long long)x);
+}
+
+void gltf_put_bool(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, bool x)
+{
+	gltf_attribute(g, put_element(g, el, at, "boolean", name), "value", "%s", x ? "true" : "false");
+}
+
+void gltf_put_text(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, const char *text)
+{
+	gltf_attribute(g, put_element(g, el, at, "string", name), "value", "%s", text);
+}
+
+void gltf_put_rgb(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name,
+		  const double rgb[3])
+{
+	gltf_attribute(g, put_element(g, el, at, "rgb", name), "value", "%.17g %.17g %.17g", rgb[0], rgb[1], rgb[2]);
+}
+
+void gltf_put_matrix(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, const mat4 *m)
+{
+	char text[16 * 26];
+	struct text t = {text, sizeof text};
+	for (int i = 0; i < 16; i++)
+		text_put(&t, "%s%.17g", i ? " " : "", m->m[i / 4][i % 4]);
+	struct xml_element *transform = put_element(g, el, at, "transform", name),
+			   *matrix = transform ? gltf_element(g, transform, at, "matrix") : NULL;
+	gltf_attribute(g, matrix, "value", "%s", text);
+}
+
+void gltf_note(struct gltf *g, const char *text)
+{
+	for (uint32_t i = 0; i < g->tree->note_count; i++)
+		if (strcmp(g->tree->notes[i], text) == 0)
+			return;
+	if (g->failed || g->tree->note_count >= XML_NOTES_MAX)
+		return;
+	const char *copy = arena_strdup(g->arena, text);
+	if (copy)
+		g->tree->notes[g->tree->note_count++] = copy;
+	else
+		gltf_fail(g, NULL, ENOMEM, "out of memory");
+}
+
+bool gltf_knows(const char *extension)
+{
+	static const char *const known[] = {
+		"EXT_mesh_gpu_instancing", "EXT_meshopt_compression", "EXT_texture_avif", "EXT_texture_webp",
+		"KHR_draco_mesh_compression", "KHR_lights_punctual", "KHR_materials_anisotropy",
+		"KHR_materials_clearcoat", "KHR_materials_diffuse_transmission", "KHR_materials_dispersion",
+		"KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_iridescence",
+		"KHR_materials_pbrSpecularGlossiness", "KHR_materials_sheen", "KHR_materials_specular",
+		"KHR_materials_transmission", "KHR_materials_unlit", "KHR_materials_volume", "KHR_mesh_quantization",
+		"KHR_meshopt_compression", "KHR_node_visibility", "KHR_texture_basisu", "KHR_texture_transform",
+		"MSFT_texture_dds",
+		/* They change no light: order of triangles, other looks, who made it. */
+		"FB_ngon_encoding", "KHR_materials_variants", "KHR_xmp", "KHR_xmp_json_ld"};
+	return text_is_among(extension, known, sizeof known / sizeof *known);
+}
+
+void gltf_grow_box(struct gltf *g, vec3 p)
+{
+	g->low = (vec3){fmin(g->low.x, p.x), fmin(g->low.y, p.y), fmin(g->low.z, p.z)};
+	g->high = (vec3){fmax(g->high.x, p.x), fmax(g->high.y, p.y), fmax(g->high.z, p.z)};
+}

@@ -1,0 +1,148 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* A glTF file's JSON tree, and the elements made from it. Private to gltf*.c. */
+#ifndef WORKER_RENDER_GLTF_GLTF_TREE_H
+#define WORKER_RENDER_GLTF_GLTF_TREE_H
+
+#include "worker/render/math/mat4.h"
+#include "worker/render/xml/xml.h"
+
+#include <jansson.h>
+
+enum {
+	GLTF_JSON_MAX = 128 << 20,     /* bytes of the JSON, including embedded data */
+	GLTF_VALUES_MAX = 1 << 22,     /* values in it, at most 250 bytes of memory each */
+	GLTF_EMBEDDED_MAX = 4096,      /* buffers and images embedded in the JSON */
+	GLTF_PRIMITIVES_MAX = 1 << 18, /* of all meshes, counted once per node that has them */
+};
+
+#define GLTF_WHOLE_MAX 9007199254740992.0 /* a double represents all integers up to here */
+
+/* Top-level arrays whose entries are named in messages. */
+enum gltf_array {
+	GLTF_ACCESSORS,
+	GLTF_BUFFERS,
+	GLTF_BUFFER_VIEWS,
+	GLTF_CAMERAS,
+	GLTF_IMAGES,
+	GLTF_LIGHTS,
+	GLTF_MATERIALS,
+	GLTF_MESHES,
+	GLTF_NODES,
+	GLTF_SAMPLERS,
+	GLTF_SCENES,
+	GLTF_SKINS,
+	GLTF_TEXTURES,
+	GLTF_ARRAYS
+};
+
+/* Types of an accessor's components. */
+enum gltf_component {
+	GLTF_BYTE = 5120,
+	GLTF_UNSIGNED_BYTE,
+	GLTF_SHORT,
+	GLTF_UNSIGNED_SHORT,
+	GLTF_UNSIGNED_INT = 5125,
+	GLTF_FLOAT
+};
+
+/* An entry of one of them. */
+struct gltf_at {
+	enum gltf_array array;
+	size_t index;
+	const json_t *json; /* an object */
+};
+
+/* A compressed view's numbers. */
+struct gltf_unpacked {
+	unsigned char *bytes; /* mem_alloc'd; NULL: not wanted so far */
+	uint64_t count;
+};
+
+/* Where the bytes of a buffer, a view or an image are. */
+struct gltf_range {
+	const char *file;
+	uint64_t first, count;
+	bool base64;   /* first and count refer to the text; a view's offset to the decoded bytes */
+	uint64_t size; /* decoded */
+	unsigned skip; /* of the decoded bytes, at the beginning */
+};
+
+struct gltf {
+	struct xml_tree *tree;
+	const struct asset_source *assets;
+	struct arena *arena;
+	struct error *error;
+	int failed; /* an error's negative errno: nothing more is added to the tree (gltf_go_on) */
+	const char *file;
+	const unsigned char *bytes; /* of the file */
+	size_t size;
+	uint64_t binary_first, binary_count; /* the binary chunk of a .glb */
+	json_t *root;
+	const json_t *lights;	 /* NULL: none */
+	int *lines[GLTF_ARRAYS]; /* of each entry */
+	size_t line_count[GLTF_ARRAYS], line_room[GLTF_ARRAYS];
+	struct gltf_range *buffers, *images; /* embedded data that has been located, by entry */
+	unsigned embedded, primitives;
+	unsigned char *material_made;	   /* bits 1 << enum gltf_colours */
+	struct gltf_open *plain, *decoded; /* open buffers: the last that is a file; a list of those in base64 */
+	struct gltf_unpacked *unpacked;	   /* of each view; NULL: no compressed one was wanted so far */
+	uint64_t unpacked_bytes;	   /* of them all */
+	size_t *parents;		   /* of each node (gltf_node.h); NULL: not needed so far */
+	uint64_t embedded_bytes;	   /* of vertices that are computed */
+	uint64_t read;			   /* bytes of files with buffers, so far */
+	double *mesh_uses;		   /* number of nodes that have each mesh */
+	bool *mesh_made;		   /* it is a shapegroup already */
+	struct xml_element *scene;
+	bool has_camera, has_light;
+	bool is_blenders;  /* its exporter wrote the file */
+	bool is_burleys;   /* its writer's diffuse surfaces are not Lambert's, as the format's are, but Burley's */
+	double lamp_scale; /* of the intensities of KHR_lights_punctual */
+	vec3 low, high;	   /* over all vertices */
+};
+
+const char *gltf_array_name(enum gltf_array array);
+/* The entry with that index; false: missing, which is an error. */
+bool gltf_entry(struct gltf *g, enum gltf_array array, uint64_t index, struct gltf_at *out);
+/* The entry whose index is the value of `key`. 1: found, 0: no such key, negative: an error. */
+int gltf_follow(struct gltf *g, const struct gltf_at *from, const json_t *object, const char *key,
+		enum gltf_array array, struct gltf_at *out);
+/* Sets g->failed, with "file:line: array[index]: ". */
+__attribute__((format(printf, 4, 5))) int gltf_fail(struct gltf *g, const struct gltf_at *at, int errno_value,
+						    const char *format, ...);
+
+/* After something that is complete by itself, a node or a primitive: a failure is put into the list of what is missing,
+ * and reading goes on. Exceeded limits still end it. */
+void gltf_go_on(struct gltf *g);
+
+/* Members of an object, with defaults for missing ones; another type is an error. */
+double gltf_number(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key, double fallback);
+uint64_t gltf_whole(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key, uint64_t fallback);
+const char *gltf_text(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key, const char *fallback);
+/* `count` numbers into x, which keeps its values if there are none. */
+void gltf_numbers(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key, double *x, size_t count);
+const json_t *gltf_object(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key); /* or NULL */
+const json_t *gltf_extension(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *name);
+
+/* Elements, with the line of an entry. With NULL as parent nothing is made, and NULL is returned. */
+struct xml_element *gltf_element(struct gltf *g, struct xml_element *parent, const struct gltf_at *at,
+				 const char *name);
+__attribute__((format(printf, 4, 5))) void gltf_attribute(struct gltf *g, struct xml_element *el, const char *name,
+							  const char *format, ...);
+/* <cls type="..." name="..."> (name NULL: without) */
+struct xml_element *gltf_plugin(struct gltf *g, struct xml_element *parent, const struct gltf_at *at, const char *cls,
+				const char *type, const char *name);
+void gltf_put_number(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, double x);
+void gltf_put_whole(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, uint64_t x);
+void gltf_put_bool(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, bool x);
+void gltf_put_text(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name,
+		   const char *text);
+void gltf_put_rgb(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name,
+		  const double rgb[3]);
+void gltf_put_matrix(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, const mat4 *m);
+void gltf_grow_box(struct gltf *g, vec3 p); /* of all vertices, for a camera that sees everything */
+/* A note that the file gets once. */
+void gltf_note(struct gltf *g, const char *text);
+/* Whether the reader knows the extension, supported or not. */
+bool gltf_knows(const char *extension);
+
+#endif

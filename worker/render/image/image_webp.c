@@ -1,0 +1,47 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* WebP, lossy and lossless, by libwebp. A RIFF file that is none, a damaged one and an animation are errors. */
+#include "worker/render/image/image_decode.h"
+
+#include <string.h>
+#include <webp/decode.h>
+
+static void store(const struct image_input *in, const uint8_t *rgba, struct image *out)
+{
+	float value[256];
+	size_t count = (size_t)out->width * out->height;
+	image_table(value, 255, in->raw || in->alpha);
+	for (size_t i = 0; i < count; i++)
+		for (uint32_t k = 0; k < out->channels; k++)
+			out->pixels[i * out->channels + k] = value[rgba[4 * i + (in->alpha ? 3 : k)]];
+}
+
+static int decode(const struct image_input *in, struct image *out)
+{
+	WebPBitstreamFeatures about;
+	if (in->size < 12 || memcmp(in->bytes + 8, "WEBP", 4) != 0)
+		return error_set(in->error, EINVAL, "a RIFF file that is no WebP image");
+	if (WebPGetFeatures(in->bytes, in->size, &about) != VP8_STATUS_OK)
+		return error_set(in->error, EBADMSG, "WebP: damaged, or cut off in its header");
+	if (about.has_animation)
+		return error_set(in->error, ENOTSUP, "WebP: an animation; supported: single images");
+	/* A lossless image of one colour takes next to nothing. */
+	int r = image_allocate(in, out, (uint64_t)about.width, (uint64_t)about.height, in->alpha ? 1 : 3, 0);
+	if (r)
+		return r;
+	int width, height;
+	uint8_t *rgba = WebPDecodeRGBA(in->bytes, in->size, &width, &height);
+	if (!rgba)
+		return error_set(in->error, EBADMSG, "WebP: damaged or cut off");
+	if ((uint32_t)width == out->width && (uint32_t)height == out->height)
+		store(in, rgba, out);
+	else
+		r = error_set(in->error, EBADMSG, "WebP of two sizes");
+	WebPFree(rgba);
+	return r;
+}
+
+const struct image_format image_format_webp = {
+	.begins = {"RIFF"},
+	.decode = decode,
+	.alpha = IMAGE_ALPHA_READ,
+};

@@ -1,0 +1,14 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* The sRGB transfer function (IEC 61966-2-1), decoding only; odd beyond [0,1]. */
+#ifndef WORKER_RENDER_IMAGE_SRGB_H
+#define WORKER_RENDER_IMAGE_SRGB_H
+
+#include <math.h>
+
+static inline double srgb_to_linear(double x)
+{
+	double a = fabs(x);
+	return copysign(a <= 0.04045 ? a / 12.92 : pow((a + 0.055) / 1.055, 2.4), x);
+}
+
+#endif

@@ -1,0 +1,215 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Look-ups in the tables of plug-ins, and two tables of its own: the names that parameters had in 0.5 and 0.6, and
+ * Mitsuba's plug-ins that the tables lack. They are lists of some dozens, searched from the beginning.
+ *
+ * Nothing fails: a name that no table has is NULL or false, and the caller reports it with the nearest name.
+ */
+#include "worker/render/plugin/plugin.h"
+
+#include <string.h>
+#include <strings.h>
+
+static const char *const class_names[PLUGIN_CLASSES] = {
+	[PLUGIN_SHAPE] = "shape",     [PLUGIN_BSDF] = "bsdf",	    [PLUGIN_TEXTURE] = "texture",
+	[PLUGIN_EMITTER] = "emitter", [PLUGIN_SENSOR] = "sensor",   [PLUGIN_FILM] = "film",
+	[PLUGIN_RFILTER] = "rfilter", [PLUGIN_SAMPLER] = "sampler", [PLUGIN_INTEGRATOR] = "integrator",
+	[PLUGIN_MEDIUM] = "medium",   [PLUGIN_PHASE] = "phase",	    [PLUGIN_VOLUME] = "volume",
+};
+
+const char *plugin_class_name(enum plugin_class cls)
+{
+	return class_names[cls];
+}
+
+bool plugin_class_find(const char *element, enum plugin_class *cls)
+{
+	for (int i = 0; i < PLUGIN_CLASSES; i++)
+		if (strcmp(class_names[i], element) == 0) {
+			*cls = (enum plugin_class)i;
+			return true;
+		}
+	*cls = PLUGIN_SENSOR;
+	return strcmp(element, "camera") == 0;
+}
+
+void plugin_offer_classes(struct spelling *s)
+{
+	for (int i = 0; i < PLUGIN_CLASSES; i++)
+		spelling_offer(s, class_names[i]);
+}
+
+static bool is_any(const char *name)
+{
+	return strcmp(name, "*") == 0;
+}
+
+const struct plugin_decl *plugin_find(const struct plugin_decl *decls, enum plugin_class cls, const char *type)
+{
+	const struct plugin_decl *any = NULL;
+	for (const struct plugin_decl *d = decls; d->type; d++) {
+		if (d->cls != cls)
+			continue;
+		if (strcasecmp(d->type, type) ==
+		    0) /* Mitsuba looks for a file of this name, so "Sphere" works on Windows */
+			return d;
+		if (is_any(d->type))
+			any = d;
+	}
+	return any;
+}
+
+const struct param *plugin_param(const struct plugin_decl *d, const char *name)
+{
+	const struct param *any = NULL;
+	for (const struct param *p = d->params; p && p->name; p++) {
+		if (strcmp(p->name, name) == 0)
+			return p;
+		if (is_any(p->name))
+			any = p;
+	}
+	return any;
+}
+
+bool plugin_any_has(const struct plugin_decl *decls, const char *name)
+{
+	for (; decls->type; decls++)
+		for (const struct param *p = decls->params; p && p->name; p++)
+			if (strcmp(p->name, name) == 0)
+				return true;
+	return false;
+}
+
+static const struct {
+	enum plugin_class cls;
+	const char *type, *old, *now;
+} names[] = {
+	{PLUGIN_BSDF, "diffuse", "diffuse_reflectance", "reflectance"},
+	{PLUGIN_BSDF, "roughdiffuse", "diffuse_reflectance", "reflectance"},
+	{PLUGIN_MEDIUM, "heterogeneous", "density", "sigma_t"},
+};
+
+bool plugin_new_name_at(size_t i, struct renamed *out)
+{
+	if (i >= sizeof names / sizeof *names)
+		return false;
+	*out = (struct renamed){.element = class_names[names[i].cls],
+				.type = names[i].type,
+				.old = names[i].old,
+				.now = names[i].now,
+				.parameter = true};
+	return true;
+}
+
+const char *plugin_new_name(const struct plugin_decl *d, const char *name)
+{
+	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+		if (names[i].cls == d->cls && strcmp(names[i].type, d->type) == 0 && strcmp(names[i].old, name) == 0)
+			return names[i].now;
+	return name;
+}
+
+bool plugin_is_guide(const char *element, const char *type)
+{
+	return strcmp(element, class_names[PLUGIN_EMITTER]) == 0 && type && strcasecmp(type, "portal") == 0;
+}
+
+static const struct {
+	enum plugin_class cls;
+	const char *type;
+} mitsubas[] = {
+	{PLUGIN_SHAPE, "deformable"},
+	{PLUGIN_SHAPE, "displace"},
+	{PLUGIN_SHAPE, "ellipsoids"},
+	{PLUGIN_SHAPE, "ellipsoidsmesh"},
+	{PLUGIN_SHAPE, "mergeinstance"},
+	{PLUGIN_SHAPE, "packed"},
+	{PLUGIN_BSDF, "acousticbsdf"},
+	{PLUGIN_BSDF, "dielectric_disp"},
+	{PLUGIN_BSDF, "irawan"},
+	{PLUGIN_BSDF, "neuralbsdf"},
+	{PLUGIN_BSDF, "openpbr"},
+	{PLUGIN_TEXTURE, "color_ramp"},
+	{PLUGIN_TEXTURE, "curvature"},
+	{PLUGIN_TEXTURE, "fieldtexture"},
+	{PLUGIN_TEXTURE, "lut"},
+	{PLUGIN_TEXTURE, "math"},
+	{PLUGIN_TEXTURE, "mesh_attribute"},
+	{PLUGIN_TEXTURE, "mix_rgb"},
+	{PLUGIN_TEXTURE, "uv_set_selector"},
+	{PLUGIN_TEXTURE, "vertexcolors"},
+	{PLUGIN_TEXTURE, "volume"},
+	{PLUGIN_EMITTER, "astroobject"},
+	{PLUGIN_SENSOR, "distant"},
+	{PLUGIN_SENSOR, "fluxmeter"},
+	{PLUGIN_SENSOR, "hdistant"},
+	{PLUGIN_SENSOR, "irradiancemeter"},
+	{PLUGIN_SENSOR, "microphone"},
+	{PLUGIN_SENSOR, "radiancemeter"},
+	{PLUGIN_SAMPLER, "halton"},
+	{PLUGIN_SAMPLER, "hammersley"},
+	{PLUGIN_SAMPLER, "independent"},
+	{PLUGIN_SAMPLER, "ldsampler"},
+	{PLUGIN_SAMPLER, "multijitter"},
+	{PLUGIN_SAMPLER, "orthogonal"},
+	{PLUGIN_SAMPLER, "sobol"},
+	{PLUGIN_SAMPLER, "stratified"},
+	{PLUGIN_FILM, "specfilm"},
+	{PLUGIN_FILM, "tape"},
+	{PLUGIN_MEDIUM, "heterogeneous"},
+	{PLUGIN_MEDIUM, "homogeneous"},
+	{PLUGIN_PHASE, "kkay"},
+	{PLUGIN_PHASE, "microflake"},
+	{PLUGIN_VOLUME, "hgridvolume"},
+	{PLUGIN_VOLUME, "volcache"},
+};
+
+const char *plugin_of_mitsuba(size_t index, enum plugin_class *cls)
+{
+	if (index >= sizeof mitsubas / sizeof *mitsubas)
+		return NULL;
+	*cls = mitsubas[index].cls;
+	return mitsubas[index].type;
+}
+
+bool plugin_is_mitsubas(enum plugin_class cls, const char *type)
+{
+	for (size_t i = 0; i < sizeof mitsubas / sizeof *mitsubas; i++)
+		if (mitsubas[i].cls == cls && strcasecmp(mitsubas[i].type, type) == 0)
+			return true;
+	return false;
+}
+
+void plugin_offer_types(const struct plugin_decl *decls, enum plugin_class cls, struct spelling *s)
+{
+	for (const struct plugin_decl *d = decls; d->type; d++)
+		if (d->cls == cls && !is_any(d->type))
+			spelling_offer(s, d->type);
+}
+
+void plugin_offer_params(const struct plugin_decl *d, struct spelling *s)
+{
+	for (const struct param *p = d->params; p && p->name; p++)
+		if (!is_any(p->name))
+			spelling_offer(s, p->name);
+}
+
+void plugin_list_types(const struct plugin_decl *decls, enum plugin_class cls, char *text, size_t size)
+{
+	text[0] = 0;
+	for (const struct plugin_decl *d = decls; d->type; d++)
+		if (d->cls == cls && !is_any(d->type))
+			spelling_list(text, size, d->type);
+	if (!text[0])
+		spelling_list(text, size, "none");
+}
+
+void plugin_list_params(const struct plugin_decl *d, char *text, size_t size)
+{
+	text[0] = 0;
+	for (const struct param *p = d->params; p && p->name; p++)
+		if (p->status == PARAM_UNDERSTOOD && !is_any(p->name))
+			spelling_list(text, size, p->name);
+	if (!text[0])
+		spelling_list(text, size, "none");
+}

@@ -1,0 +1,9 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Mitsuba 0.6's camelCase in 3.x spelling. Pure; any thread. */
+#ifndef WORKER_RENDER_TEXT_SNAKE_CASE_H
+#define WORKER_RENDER_TEXT_SNAKE_CASE_H
+
+/* toWorld -> to_world, intIOR -> int_ior. out holds 2 * strlen(name) + 1 bytes. */
+void snake_case(const char *name, char *out);
+
+#endif

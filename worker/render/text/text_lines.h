@@ -1,0 +1,24 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* A file of lines that begin with a word, like Wavefront's. Blanks around words are skipped. Pure. */
+#ifndef WORKER_RENDER_TEXT_TEXT_LINES_H
+#define WORKER_RENDER_TEXT_TEXT_LINES_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+struct text_line {
+	int number;
+	const char *word, *rest; /* rest: without the blanks around it */
+	size_t word_length, rest_length;
+};
+
+struct text_lines {
+	const char *p, *end;
+	int number; /* of the last line */
+};
+
+/* The next line; false: none is left. An empty line has an empty word. */
+bool text_lines_next(struct text_lines *t, struct text_line *out);
+bool text_line_is(const struct text_line *l, const char *word);
+
+#endif
