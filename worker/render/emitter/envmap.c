@@ -20,8 +20,10 @@
 #include "worker/render/emitter/envmap.h"
 
 #include "common/base/color.h"
+#include "common/base/mem.h"
 #include "worker/render/math/search.h"
 
+#include <errno.h>
 #include <string.h>
 
 /* The least volume spanned by to_world's columns, scaled so that the longest is 1; below it, few pixels would fill the
@@ -149,13 +151,6 @@ bool envmap_sample_point(const struct emitter *em, const double u[2], struct emi
 	return *pdf_point > 0;
 }
 
-static double luminance(const struct envmap *m, uint32_t row, uint32_t column)
-{
-	double rgb[3];
-	raster_pixel(&m->raster, column, row, rgb);
-	return rec709_luminance(rgb);
-}
-
 /* Solid angle in the world per local one, in the cell's middle. */
 static double cell_stretch(const struct envmap *m, uint32_t row, uint32_t column)
 {
@@ -164,37 +159,70 @@ static double cell_stretch(const struct envmap *m, uint32_t row, uint32_t column
 	       jac_local_from_world(m, to_world(m, (vec3){sin(theta) * sin(phi), cos(theta), -sin(theta) * cos(phi)}));
 }
 
-/* Mean luminance of the cell's corners, times its solid angle in the world per local one. */
-static double cell_weight(const struct envmap *m, uint32_t row, uint32_t column)
+/* The luminances of one row of the image's pixels. */
+struct light_row {
+	uint32_t row; /* UINT32_MAX before any is loaded */
+	double *luminance;
+};
+
+static void load_row(const struct envmap *m, uint32_t row, struct light_row *to)
+{
+	for (uint32_t c = 0; to->row != row && c < m->columns; c++) {
+		double rgb[3];
+		raster_pixel(&m->raster, c, row, rgb);
+		to->luminance[c] = rec709_luminance(rgb);
+	}
+	to->row = row;
+}
+
+/* The weight of each cell of a row: the mean luminance of its corners, times its solid angle in the world per local
+ * one. pixels: the rows of pixels above and below the row of cells; each is loaded once as `row` counts up. */
+static void weigh_cells(const struct envmap *m, uint32_t row, struct light_row pixels[2], double *weight)
 {
 	uint32_t below = row + m->to_poles, above = below == 0 ? 0 : below - 1;
 	below = below < m->raster.image.height ? below : m->raster.image.height - 1;
-	uint32_t next = column + 1 == m->columns ? 0 : column + 1;
-	double mean = 0.25 * (luminance(m, above, column) + luminance(m, above, next) + luminance(m, below, column) +
-			      luminance(m, below, next));
-	return m->at.stretched ? mean * cell_stretch(m, row, column) : mean;
+	if (pixels[1].row == above) {
+		struct light_row last = pixels[0];
+		pixels[0] = pixels[1];
+		pixels[1] = last;
+	}
+	load_row(m, above, &pixels[0]);
+	load_row(m, below, &pixels[1]);
+	const double *a = pixels[0].luminance, *b = pixels[1].luminance;
+	for (uint32_t c = 0; c < m->columns; c++) {
+		uint32_t next = c + 1 == m->columns ? 0 : c + 1;
+		weight[c] = 0.25 * (a[c] + a[next] + b[c] + b[next]);
+		if (m->at.stretched)
+			weight[c] *= cell_stretch(m, row, c);
+	}
 }
 
-/* Returns the integral of the luminance over the sphere. */
-static double build_density(struct envmap *m)
+/* Sets the integral of the luminance over the sphere. -ENOMEM. */
+static int build_density(struct envmap *m, double *integral)
 {
-	double total = 0;
+	size_t columns = m->columns;
+	double *weight = mem_alloc(3 * columns, sizeof *weight), total = 0;
+	if (!weight)
+		return -ENOMEM;
+	struct light_row pixels[2] = {{UINT32_MAX, weight + columns}, {UINT32_MAX, weight + 2 * columns}};
 	for (uint32_t row = 0; row < m->rows; row++) {
 		uint32_t *cells = m->cell_cdf + (size_t)row * (m->columns + 1);
 		double sum = 0, unit = 0x1p31;
+		weigh_cells(m, row, pixels, weight);
 		for (uint32_t c = 0; c < m->columns; c++)
-			sum += cell_weight(m, row, c);
-		for (uint32_t c = 0; c < m->columns; c++) {
-			double w = cell_weight(m, row, c);
-			cells[c + 1] = cells[c] + (w > 0 ? (uint32_t)fmax(1, floor(w / sum * unit)) : 0);
-		}
+			sum += weight[c];
+		for (uint32_t c = 0; c < m->columns; c++)
+			cells[c + 1] =
+				cells[c] + (weight[c] > 0 ? (uint32_t)fmax(1, floor(weight[c] / sum * unit)) : 0);
 		m->row_cdf[row] = total;
 		total += sum * row_height(m, row) * 2 * M_PI / m->columns;
 	}
+	mem_free(weight);
 	m->row_cdf[m->rows] = total;
 	for (uint32_t row = 0; row <= m->rows && total > 0; row++)
 		m->row_cdf[row] /= total;
-	return total;
+	*integral = total;
+	return 0;
 }
 
 /* The axes of to_world, scaled so that their determinant is 1, and the rows of the inverse of that matrix. */
@@ -256,13 +284,14 @@ int envmap_make(struct emitter *em, const struct raster *picture, bool to_poles,
 	m->rows = m->to_poles ? m->raster.image.height - 1 : m->raster.image.height + 1;
 	m->row_cdf = arena_alloc(build->arena, (size_t)m->rows + 1, sizeof *m->row_cdf);
 	m->cell_cdf = arena_alloc(build->arena, (size_t)m->rows * ((size_t)m->columns + 1), sizeof *m->cell_cdf);
-	if (!m->row_cdf || !m->cell_cdf)
+	double integral = 0;
+	if (!m->row_cdf || !m->cell_cdf || build_density(m, &integral))
 		return node_error(n, e, ENOMEM, "out of memory for the density of %u x %u cells", m->columns, m->rows);
 	const struct color white = {.shape = COLOR_SHAPE_D65, .scale = m->scale, .d65 = true};
 	em->infinite = true;
 	em->textured = true;
 	em->shape = raster_is_grey(&m->raster) ? COLOR_SHAPE_D65 : COLOR_SHAPE_OTHER;
-	em->power = build_density(m) * color_mean(&white);
+	em->power = integral * color_mean(&white);
 	em->brightest = raster_max(&m->raster) * color_max(&white);
 	return 0;
 }
