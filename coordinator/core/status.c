@@ -25,6 +25,13 @@
 #include <stdio.h>
 #include <string.h>
 
+const char *peer_state_name(enum peer_state s)
+{
+	static const char *const names[] = {
+		[PEER_ACTIVE] = "active", [PEER_SILENT] = "silent", [PEER_QUARANTINED] = "quarantined"};
+	return names[s];
+}
+
 const char *job_state_name(enum job_state s)
 {
 	static const char *const names[] = {

@@ -79,8 +79,9 @@ bool farm_expects_results(const struct farm *f, uint64_t id, int *priority);
 bool farm_peer(const struct farm *f, uint64_t id, struct peer_status *s);
 bool farm_lease(const struct farm *f, uint64_t peer, uint32_t i, struct lease_status *s); /* i-th lease of a worker */
 
-const char *job_state_name(enum job_state s); /* as in the status: "queued" ... */
-const char *job_end_name(enum job_end e);     /* "mutations" ... */
+const char *job_state_name(enum job_state s);	/* as in the status: "queued" ... */
+const char *peer_state_name(enum peer_state s); /* "active", "silent", "quarantined" */
+const char *job_end_name(enum job_end e);	/* "mutations" ... */
 /* The exit code of a program that waited for the job, the first that applies: 3 failed or cancelled, 5 chains
  * disagree, 4 another bound before the target error, 0 done. */
 int job_exit_code(const struct job_status *s);

@@ -15,6 +15,7 @@
 #include "common/base/program.h"
 #include "common/json/estimate_json.h"
 #include "common/estimate/strategy.h"
+#include "coordinator/ctl/worker_table.h"
 
 #include <jansson.h>
 #include <math.h>
@@ -275,12 +276,14 @@ static void print_workers(const json_t *snapshot)
 	const json_t *worker;
 	json_array_foreach(json_object_get(snapshot, "workers"), i, worker)
 	{
-		if (i == 0)
-			printf("\n%-24s %-11s %6s %7s %6s %8s %s\n", "WORKER", "STATE", "STARTS", "THREADS", "LEASES",
-			       "MERGED", "LAST FAULT");
-		printf("%-24s %-11s %6.0f %7.0f %6.0f %8.0f %s\n", text_of(worker, "name"), text_of(worker, "state"),
-		       number_of(worker, "restarts"), number_of(worker, "threads"), number_of(worker, "leases"),
-		       number_of(worker, "merged"), text_of(worker, "text"));
+		if (i == 0) {
+			putchar('\n');
+			worker_table_head();
+		}
+		worker_table_print(&(struct worker_row){
+			text_of(worker, "name"), text_of(worker, "state"), text_of(worker, "text"),
+			(uint64_t)number_of(worker, "restarts"), (uint64_t)number_of(worker, "threads"),
+			(uint64_t)number_of(worker, "leases"), (uint64_t)number_of(worker, "merged")});
 	}
 	if (i == 0)
 		printf("\nno workers are connected\n");

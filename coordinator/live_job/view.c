@@ -189,9 +189,8 @@ json_t *view_to_json(const struct job_view *v, bool details)
 
 json_t *view_peer_to_json(const struct peer_status *p, double now)
 {
-	static const char *const states[] = {"active", "silent", "quarantined"};
 	return json_pack("{s:I s:s s:s s:s s:i s:i s:i s:f s:f s:I s:I s:I s:I s:I s:I s:s}",		      /* */
-			 "id", (json_int_t)p->id, "name", p->name, "state", states[p->state],		      /* */
+			 "id", (json_int_t)p->id, "name", p->name, "state", peer_state_name(p->state),	      /* */
 			 "fingerprint", p->fingerprint, "threads", (int)p->threads, "want", (int)p->want,     /* */
 			 "leases", (int)p->leases, "connected", now - p->joined, "heard", now - p->last_seen, /* */
 			 "merged", (json_int_t)p->merged, "repeats", (json_int_t)p->repeats,		      /* */
