@@ -15,7 +15,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { FARM_VERSION = 12 };
+enum { FARM_VERSION = 13 };
 
 struct envelope_block;
 

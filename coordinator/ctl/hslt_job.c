@@ -10,6 +10,7 @@
 #include "common/exr/output_files.h"
 #include "common/net/client.h"
 #include "coordinator/ctl/job_options.h"
+#include "coordinator/ctl/worker_table.h"
 
 #include <jansson.h>
 #include <stdio.h>
@@ -86,6 +87,12 @@ static void print_table(const Farm__JobListAnswer *a, const struct job_options *
 			print_row(a->jobs[i], owners);
 }
 
+static void print_list(const json_t *list)
+{
+	json_dumpf(list, stdout, JSON_INDENT(2));
+	putchar('\n');
+}
+
 static void print_json(const Farm__JobListAnswer *a, const struct job_options *o)
 {
 	json_t *list = json_array();
@@ -103,8 +110,7 @@ static void print_json(const Farm__JobListAnswer *a, const struct job_options *o
 						(int)s->exit_code, "note", s->note, "owner", s->owner, "workers",
 						(int)s->workers, "share", s->share, "place", s->place));
 	}
-	json_dumpf(list, stdout, JSON_INDENT(2));
-	putchar('\n');
+	print_list(list);
 	json_decref(list);
 }
 
@@ -115,6 +121,45 @@ static int list(struct client *cl, const struct job_options *o, struct error *e)
 	if (rc)
 		return rc;
 	(o->json ? print_json : print_table)(answer.envelope.message->job_list_answer, o);
+	client_message_fini(&answer);
+	return 0;
+}
+
+/* ---- workers ---- */
+
+static json_t *worker_json(const Farm__WorkerStatus *w)
+{
+	return json_pack("{s:i s:s s:s s:I s:i s:i s:I s:s}", "schema", 1, "name", w->name, "state", w->state,
+			 "restarts", (json_int_t)w->restarts, "threads", (int)w->threads, "leases", (int)w->leases,
+			 "merged", (json_int_t)w->merged, "text", w->text);
+}
+
+static void print_workers(const Farm__WorkerListAnswer *a)
+{
+	worker_table_head();
+	for (size_t i = 0; i < a->n_workers; i++) {
+		const Farm__WorkerStatus *w = a->workers[i];
+		worker_table_print(&(struct worker_row){w->name, w->state, w->text, w->restarts, w->threads, w->leases,
+							w->merged});
+	}
+}
+
+static int workers(struct client *cl, const struct job_options *o, struct error *e)
+{
+	struct client_message answer;
+	int rc = client_call(cl, ENVELOPE(WORKER_LIST, worker_list), FARM__ENVELOPE__BODY_WORKER_LIST_ANSWER, &answer,
+			     e);
+	if (rc)
+		return rc;
+	const Farm__WorkerListAnswer *a = answer.envelope.message->worker_list_answer;
+	json_t *list = json_array();
+	for (size_t i = 0; o->json && i < a->n_workers; i++)
+		json_array_append_new(list, worker_json(a->workers[i]));
+	if (o->json)
+		print_list(list);
+	else
+		print_workers(a);
+	json_decref(list);
 	client_message_fini(&answer);
 	return 0;
 }
@@ -223,6 +268,7 @@ static int run_verb(struct client *cl, const struct job_options *o, struct error
 {
 	static int (*const verbs[])(struct client *, const struct job_options *, struct error *) = {
 		[JOB_LIST] = list,
+		[JOB_WORKERS] = workers,
 		[JOB_CANCEL] = cancel,
 		[JOB_FETCH] = fetch,
 		[JOB_LOG] = print_log,

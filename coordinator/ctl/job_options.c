@@ -33,7 +33,7 @@ static const struct option_row rows[] = {
 	{"preview", 0, NULL,
 	 "fetch: the image so far, while the job runs; room.exr is previewed in room.preview.exr, also with -o room.exr",
 	 OPTION_FLAG(struct job_options, preview)},
-	{"json", 0, NULL, "list: one JSON array", OPTION_FLAG(struct job_options, json)},
+	{"json", 0, NULL, "list, workers: one JSON array", OPTION_FLAG(struct job_options, json)},
 	{"state", 0, "STATE", "(list: only jobs in this state)", OPTION_TEXT(struct job_options, state),
 	 .values = state_at},
 	{"spp", 0, "+N", "extend: additional samples per pixel", OPTION_COUNT(struct job_options, more_spp, 1, 1e15)},
@@ -52,8 +52,14 @@ static const struct option_row rows[] = {
 };
 
 static const char *const verbs[JOB_VERBS] = {
-	[JOB_LIST] = "list", [JOB_CANCEL] = "cancel",	[JOB_FETCH] = "fetch",	     [JOB_LOG] = "log",
-	[JOB_HOLD] = "hold", [JOB_RELEASE] = "release", [JOB_PRIORITY] = "priority", [JOB_EXTEND] = "extend"};
+	[JOB_LIST] = "list",	   [JOB_WORKERS] = "workers",	[JOB_CANCEL] = "cancel",
+	[JOB_FETCH] = "fetch",	   [JOB_LOG] = "log",		[JOB_HOLD] = "hold",
+	[JOB_RELEASE] = "release", [JOB_PRIORITY] = "priority", [JOB_EXTEND] = "extend"};
+
+static bool is_about_a_job(enum job_verb verb)
+{
+	return verb != JOB_LIST && verb != JOB_WORKERS;
+}
 
 static const char *verb_at(size_t i)
 {
@@ -94,7 +100,7 @@ static int take_word(void *target, size_t index, char *word, struct error *e)
 	struct job_options *o = target;
 	if (index == 0)
 		return take_verb(o, word);
-	if (index == 1 && o->verb != JOB_LIST)
+	if (index == 1 && is_about_a_job(o->verb))
 		return take_job(o, word, e);
 	if (index == 2 && o->verb == JOB_PRIORITY)
 		return take_priority(o, word, e);
@@ -104,7 +110,7 @@ static int take_word(void *target, size_t index, char *word, struct error *e)
 static int check(void *target, struct error *e)
 {
 	const struct job_options *o = target;
-	if (o->verb != JOB_LIST && !o->job)
+	if (is_about_a_job(o->verb) && !o->job)
 		return error_set(e, EINVAL, "%s needs a job", verbs[o->verb]);
 	if (o->verb == JOB_PRIORITY && !o->has_priority)
 		return error_set(e, EINVAL, "a priority is missing: -100 to 100");
@@ -116,8 +122,10 @@ static int check(void *target, struct error *e)
 	if (o->verb != JOB_FETCH && (o->output || o->preview))
 		return error_set(e, EINVAL, "%s is only for fetch%s", o->output ? "--output" : "--preview",
 				 o->verb == JOB_LOG ? ": the log goes to stdout" : "");
-	if (o->verb != JOB_LIST && (o->json || o->state))
-		return error_set(e, EINVAL, "%s is only for list", o->json ? "--json" : "--state");
+	if (is_about_a_job(o->verb) && o->json)
+		return error_set(e, EINVAL, "--json is only for list and workers");
+	if (o->verb != JOB_LIST && o->state)
+		return error_set(e, EINVAL, "--state is only for list");
 	return 0;
 }
 
@@ -127,6 +135,7 @@ static const struct program program = {
 	.summary = "Manages the jobs of a coordinator.",
 	.examples = "hslt-job --coordinator 127.0.0.1:7700 list\n"
 		    "hslt-job list --state running\n"
+		    "hslt-job workers\n"
 		    "hslt-job fetch j12 -o room.exr\n"
 		    "hslt-job fetch j12 --preview -o so-far.exr\n"
 		    "hslt-job hold j12             hands out no more of its leases; those already out still count\n"
@@ -137,7 +146,7 @@ static const struct program program = {
 		    "hslt-job cancel j12\n"
 		    "hslt-job log j12",
 	.details =
-		"list: all jobs; cancel: end a job; fetch: download its image; log: print its log; hold: hand out no more of its work; "
+		"list: all jobs; workers: those that are connected; cancel: end a job; fetch: download its image; log: print its log; hold: hand out no more of its work; "
 		"release: end the hold; priority: -100 to 100, higher first; extend: continue it with --spp, --mutations, --time "
 		"or --target-error.",
 	.exits = "0 done, 1 failed, 2 usage, 6 refused, 75 coordinator not reachable",

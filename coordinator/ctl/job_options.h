@@ -6,7 +6,18 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-enum job_verb { JOB_LIST, JOB_CANCEL, JOB_FETCH, JOB_LOG, JOB_HOLD, JOB_RELEASE, JOB_PRIORITY, JOB_EXTEND, JOB_VERBS };
+enum job_verb {
+	JOB_LIST,
+	JOB_WORKERS,
+	JOB_CANCEL,
+	JOB_FETCH,
+	JOB_LOG,
+	JOB_HOLD,
+	JOB_RELEASE,
+	JOB_PRIORITY,
+	JOB_EXTEND,
+	JOB_VERBS
+};
 
 struct job_options {
 	const char *coordinator, *tls, *output;

@@ -25,6 +25,7 @@
 #include "coordinator/peers/control.h"
 #include "coordinator/peers/fetch.h"
 #include "coordinator/peers/upload.h"
+#include "coordinator/peers/worker_list.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -362,6 +363,9 @@ void client_message(struct session *p, struct envelope *env, const unsigned char
 		break;
 	case FARM__ENVELOPE__BODY_JOB_LIST:
 		take_list(p);
+		break;
+	case FARM__ENVELOPE__BODY_WORKER_LIST:
+		worker_list_send(p);
 		break;
 	case FARM__ENVELOPE__BODY_CANCEL:
 		control_cancel(p, m->cancel->job);

@@ -120,6 +120,8 @@ grep -q -- '--output is only for fetch: the log goes to stdout' "$DIR/err.log" |
 code 2 "$BIN/hslt-job" cancel j1 --preview
 code 2 "$BIN/hslt-job" hold j1 --json
 code 2 "$BIN/hslt-job" list -o "$DIR/list.txt"
+code 2 "$BIN/hslt-job" workers j1
+code 2 "$BIN/hslt-job" workers --state running
 
 id=$(submit "$BOX" -o "$DIR/cancelled.exr" --integrator path --spp 1000000)
 [ "$id" = j1 ] || fail "the first job is $id"

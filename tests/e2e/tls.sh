@@ -255,6 +255,22 @@ wait "$waits" || CODE=$?
 same "$DIR/alone2.exr" "$DIR/waited.exr"
 row "a client whose certificate expires while it waits" "let in" "after it was renewed, equal bits"
 kill -9 "$WORKER"
+
+# All clients may see which workers there are; what went wrong there, only operators. This one crashes with its first lease.
+ca operator chief
+start_faulty_worker clumsy crash=1 --tls "$HSLT_CA/swift" --coordinator "127.0.0.1:$(cat "$DIR/port3")"
+"$BIN/hslt-submit" $week "$BOX" -o "$DIR/third.exr" $chains >>"$DIR/id" 2>>"$DIR/submit.log" || fail "the third job: $?"
+chief_reads() {
+	"$BIN/hslt-job" ${week%ann}chief workers >"$DIR/workers" && grep -q '^clumsy  *active  .*SIGSEGV' "$DIR/workers"
+}
+until_true 10 chief_reads || fail "hslt-job workers says to an operator: $(cat "$DIR/workers")"
+ann_reads() {
+	"$BIN/hslt-job" $week workers >"$DIR/workers"
+	! grep -q SIGSEGV "$DIR/workers" || fail "a client reads of faults: $(cat "$DIR/workers")"
+	grep -q '^clumsy  *active  *[0-9]*  *1 ' "$DIR/workers"
+}
+until_true 10 ann_reads || fail "hslt-job workers says to a client: $(cat "$DIR/workers")"
+kill -9 "$WORKER"
 export HSLT_CA="$CA"
 ROWS=$((ROWS - 2))
 

@@ -44,6 +44,11 @@ found="$(value "$id" verified) leases verified, $(value "$id" mismatched) of whi
 is_quarantined liar || fail "the liar is trusted: $(cat "$DIR/shown")"
 says "$DIR/shown" "wrong result: j1"
 says "$DIR/coordinator.log" "event=worker_quarantined"
+"$BIN/hslt-job" workers >"$DIR/workers"
+grep -q '^liar  *quarantined .*wrong result: j1' "$DIR/workers" && grep -q '^honest1  *active ' "$DIR/workers" ||
+	fail "hslt-job workers: $(cat "$DIR/workers")"
+"$BIN/hslt-job" workers --json >"$DIR/workers"
+says "$DIR/workers" '"state": "quarantined"'
 "$BIN/hslt-job" log "$id" >"$DIR/log"
 says "$DIR/log" "worker=\"liar\""
 

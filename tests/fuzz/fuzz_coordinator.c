@@ -180,6 +180,8 @@ static void write_words(void)
 		struct seed s = {0};
 		Farm__JobList list;
 		farm__job_list__init(&list);
+		Farm__WorkerList workers;
+		farm__worker_list__init(&workers);
 		Farm__Watch watch;
 		farm__watch__init(&watch);
 		Farm__Fetch fetch;
@@ -196,6 +198,7 @@ static void write_words(void)
 		control.more_spp = 4;
 		SEED_SAY(&s, CLIENT_ONE, HEARTBEAT, heartbeat, &beat);
 		SEED_SAY(&s, CLIENT_ONE, JOB_LIST, job_list, &list);
+		SEED_SAY(&s, CLIENT_ONE, WORKER_LIST, worker_list, &workers);
 		SEED_SAY(&s, CLIENT_TWO, WATCH, watch, &watch);
 		SEED_SAY(&s, CLIENT_ONE, FETCH, fetch, &fetch);
 		seed_end(&s, "look", job);

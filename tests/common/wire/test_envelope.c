@@ -117,6 +117,8 @@ static void the_macros_make_the_same_messages(void **state)
 	EMPTY(FETCH, fetch)
 	EMPTY(FETCH_CHUNK, fetch_chunk)
 	EMPTY(CONTROL, control)
+	EMPTY(WORKER_LIST, worker_list)
+	EMPTY(WORKER_LIST_ANSWER, worker_list_answer)
 #undef EMPTY
 	char text[] = "so far", output[] = "a.exr";
 	Farm__FetchChunk chunk;
