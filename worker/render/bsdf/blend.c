@@ -4,7 +4,7 @@
 #include "worker/render/bsdf/tilted.h"
 #include "worker/render/bsdf/twosided.h"
 
-/* For each part: its share of the light, and the probability of choosing it. */
+/* The light that each part scatters, and the probability with which a sample chooses that part. */
 struct shares {
 	spectrum f[BLEND_PARTS_MAX];
 	double chance[BLEND_PARTS_MAX];
@@ -48,7 +48,7 @@ static double mix_pdf(const struct blend *m, const struct shares *s, const struc
 	return sum;
 }
 
-/* All parts' specular lobes of one mode have the same direction. */
+/* Sums the specular lobes of all parts: those of one mode have the same direction (blend.h). */
 static spectrum mix_delta(const struct blend *m, const struct shares *s, const struct bsdf_point *p, vec3 wo,
 			  unsigned mode, vec3 *wi, double *chance)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Two BSDFs by a weight: 0 is the first, 1 the second. */
+/* Two BSDFs mixed by a weight: 0 is the first BSDF alone, 1 the second alone. */
 #include "worker/render/bsdf/blend.h"
 
 static int blendbsdf_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)

@@ -42,7 +42,7 @@ double bsdf_eta(const struct bsdf *b, const struct wavelengths *w)
 	return b->dispersive && b->ior ? ior_eta(b->ior, w->nm[0]) : b->eta;
 }
 
-/* The product without cancellation, for plug-ins that do not provide their own. */
+/* Computes the product of bsdf_eval_halfvec from `eval`, with nothing cancelled, for plug-ins without eval_halfvec. */
 static spectrum halfvec_product(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
 	struct bsdf_point radiance = *p;
@@ -64,7 +64,8 @@ spectrum bsdf_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec
 	return b->ops->eval_halfvec ? b->ops->eval_halfvec(b, p, wo, wi) : halfvec_product(b, p, wo, wi);
 }
 
-/* A straight lobe and a bent one go to the same side, and neither answers for the other. */
+/* Straight and refracted transmission leave on the same side of the surface: a query for the one must not be answered
+ * with the other. */
 static bool may_have(const struct bsdf *b, unsigned mode)
 {
 	if (mode & BSDF_STRAIGHT)

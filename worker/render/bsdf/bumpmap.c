@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Another BSDF on a surface whose shading normals are bent by a height (`bumpmap`) or given by an image or one colour
- * (`normalmap`). The BSDF itself is the inner one: the normals are bent by the geometry (worker/render/geom/relief.h),
- * so that half vectors and their derivatives take it into account.
+ * Puts a BSDF on a surface whose shading normals are bent by a height map (`bumpmap`) or given by an image or one
+ * colour (`normalmap`). The BSDF that results is the nested one: the geometry bends the normals
+ * (worker/render/geom/relief.h), so that half vectors and their derivatives take them into account.
  *
- * Refused when it is created: anything but one texture (for `bumpmap`) and one BSDF inside, and such a map in another.
+ * Creation fails unless one texture (for `normalmap`, a texture or a colour) and one BSDF are nested, and if one such
+ * map is nested in another.
  */
 #include "common/base/color.h"
 #include "worker/render/bsdf/create.h"
@@ -14,12 +15,13 @@
 /* ---- shadows of bumps */
 
 /*
- * The shadow that bumps cast on each other. A bent normal brings light to where the surface itself is already turned
- * away, and that light ends abruptly. Taken for microfacets whose slopes are as wide as the normal is bent, bumps lose
- * some of what comes in at grazing angles: by Smith's factor for light alone, G = 2 / (1 + sqrt(1 + a^2 tan^2 l)) with
- * a^2 = min(tan^2 b / 8, 1), l and b the angles of light and bent normal to the normal that the surface has without
- * relief (Conty Estevez, Lecocq, Stein: A Microfacet-Based Shadowing Function to Solve the Bump Terminator Problem.
- * Ray Tracing Gems, ch. 12, 2019). Not reciprocal. Densities stay as they are, since G lies between 0 and 1.
+ * The shadow that bumps cast on each other. A bent normal lights parts of the surface that face away from the light,
+ * and this light ends abruptly at the terminator. The bumps are therefore treated as microfacets whose slopes are as
+ * wide as the normal is bent, and light at grazing angles is reduced by Smith's factor for the direction of light
+ * alone, G = 2 / (1 + sqrt(1 + a^2 tan^2 l)) with a^2 = min(tan^2 b / 8, 1), where l and b are the angles of the light
+ * and of the bent normal to the surface's normal without relief (Conty Estevez, Lecocq, Stein: A Microfacet-Based
+ * Shadowing Function to Solve the Bump Terminator Problem. Ray Tracing Gems, ch. 12, 2019). Not reciprocal. Densities
+ * stay as they are, since G lies between 0 and 1.
  */
 static double square_of_tangent(double cosine)
 {
@@ -27,7 +29,7 @@ static double square_of_tangent(double cosine)
 	return fmax(1 - c2, 0) / c2;
 }
 
-/* Where the surface faces away by 90 degrees G is 0, or 1 if the normal is not bent. */
+/* Returns G. At 90 degrees to the unbent normal G is 0, or 1 if the normal is not bent. */
 static double shadow(const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
 	if (!p->place.frame)
@@ -49,7 +51,7 @@ static double shadowed_pdf(const struct bsdf *b, const struct bsdf_point *p, vec
 	return inner->ops->pdf_solid(inner, p, wo, wi);
 }
 
-/* The value for radiance: wi is towards the light. */
+/* The value is that of radiance, with wi towards the light. */
 static spectrum shadowed_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
 	struct bsdf_point radiance = *p;
@@ -83,7 +85,7 @@ static const struct bsdf_ops shadowed_ops = {
 	.sample = shadowed_sample,
 };
 
-/* Scales f of all lobes of b, whose relief is known, by G. */
+/* Wraps b, whose relief is known, so that f of all its lobes is scaled by G. */
 static int shadow_bumps(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {
 	b->uses_place = true;
@@ -94,10 +96,10 @@ static int shadow_bumps(struct bsdf *b, const struct scene_node *n, const struct
 
 struct bend {
 	struct relief relief;
-	const struct scene_node *node; /* of the texture; NULL: it is one colour */
+	const struct scene_node *node; /* the node of the texture; NULL: one colour */
 	struct texture texture;
-	double scale;	   /* of heights, or of a normal's first two components */
-	struct bend *next; /* of the material */
+	double scale;	   /* factor of heights, or of the first two components of a normal */
+	struct bend *next; /* the next map of the same material */
 };
 
 static double height_of(const double x[3], bool grey)
@@ -116,7 +118,7 @@ static void height_at(const void *data, double u, double v, struct relief_value 
 	out->dv = (vec3){mixed, b->scale * height_of(j.dvv, j.grey), 0};
 }
 
-/* Components from 0 to 1 represent -1 to 1. */
+/* Components of the image from 0 to 1 stand for those of a normal from -1 to 1. */
 static void normal_at(const void *data, double u, double v, struct relief_value *out)
 {
 	const struct bend *b = data;
@@ -136,7 +138,8 @@ static bool same_texture(const struct bend *a, const struct bend *b)
 	return node_same(a->node, b->node);
 }
 
-/* One like it that the material has already, in another of its parts: a surface has one normal. */
+/* Returns a map equal to `like` that another part of the material has already, or NULL. Parts with equal maps have to
+ * share them, since parts with different reliefs get shading frames of their own (tilted.h). */
 static const struct bend *find_bend(const struct bend *like, const struct bend *made)
 {
 	for (const struct bend *b = made; b; b = b->next)
@@ -146,7 +149,7 @@ static const struct bend *find_bend(const struct bend *like, const struct bend *
 	return NULL;
 }
 
-/* That one, or a new one. texture: NULL for the colour that n has. */
+/* Finds or creates the map of n. texture: NULL for the colour that n has. */
 static int bend_of(const struct scene_node *n, const struct scene_node *texture, enum relief_kind kind,
 		   const struct bsdf_build *build, const struct bend **out, struct error *e)
 {
@@ -209,7 +212,7 @@ static int normalmap_create(struct bsdf *b, const struct scene_node *n, const st
 	return create(b, n, build, RELIEF_NORMAL, e);
 }
 
-/* What Mitsuba 3.7 does where the bent normal and the surface disagree. */
+/* Mitsuba 3.7's parameters for places where the bent normal and the surface disagree. */
 #define OF_MITSUBA_3_7                                                \
 	{.name = "flip_invalid_normals", .types = VALUE_BOOL},        \
 	{                                                             \
@@ -227,8 +230,8 @@ const struct bsdf_ops bsdf_ops_bumpmap = {
 	.create = bumpmap_create,
 };
 
-/* scale: as in glTF. handedness (ours, for glTF): y points towards the top of the image everywhere; Mitsuba's y is
- * n x t, which may point to its bottom. */
+/* `scale` is that of glTF. `handedness` is an extension for glTF: y points towards the top of the image everywhere,
+ * whereas Mitsuba's y is n x t, which may point to the bottom. */
 const struct bsdf_ops bsdf_ops_normalmap = {
 	.decl = {PLUGIN_BSDF, "normalmap",
 		 PARAMS({.name = "normalmap", .types = VALUE_RGB | VALUE_NODE, .max = 1},

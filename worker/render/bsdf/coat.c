@@ -1,16 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A clear layer over another opaque BSDF, as in Mitsuba 0.6: `coating` is smooth, `roughcoating` rough. With w' the
- * direction that w is refracted to (n = h), T what the boundary transmits, eta the layer's index over the one outside,
- * and a = exp(-sigma_a thickness (1 / |cos wo'| + 1 / |cos wi'|)),
+ * A clear layer over another opaque BSDF, as in Mitsuba 0.6: `coating` is smooth, `roughcoating` rough. Let w' be the
+ * direction to which w is refracted (with n = h), T the transmittance of the boundary, eta the layer's index over the
+ * one outside, and a the transmittance of the absorbing layer, exp(-sigma_a thickness (1 / |cos wo'| + 1 / |cos wi'|)),
  *
  *   f = boundary's reflection + T(wo) T(wi) a / eta^2 f_inner(wo', wi')
  *
- * Light that the boundary throws back inside is lost (`plastic` follows it). Specular lobes of boundary and inner BSDF
- * leave in the same direction and are one lobe. Where the inner one has two sides, so has the layer.
+ * Light that the boundary reflects back into the layer is lost, unlike in `plastic`. The specular lobes of the boundary
+ * and of the inner BSDF have the same direction and are treated as one lobe. The layer is two-sided if the inner BSDF
+ * is.
  *
- * An inner BSDF that transmits is refused. A sample fails where the inner one fails, or where its direction cannot
- * leave the layer (total reflection).
+ * Creation fails if the inner BSDF transmits light. A sample fails if that of the inner BSDF fails, or if its direction
+ * cannot leave the layer because of total reflection.
  */
 #include "worker/render/bsdf/create.h"
 #include "worker/render/bsdf/fresnel.h"
@@ -26,14 +27,15 @@ struct coat {
 	struct texture absorption; /* sigma_a */
 	double thickness, eta, specular_max;
 	struct rough_boundary boundary;
-	struct rough_boundary *rough; /* that one, or NULL: smooth */
+	struct rough_boundary *rough; /* points to `boundary`; NULL: the layer is smooth */
 };
 
-/* The layer at a point, and a direction through it. */
+/* The layer at a point. */
 struct layer {
 	const struct coat *c;
 	struct boundary_point boundary;
 };
+/* A direction inside the layer, and the share of the light that the boundary transmits to it. */
 struct passage {
 	vec3 inside;
 	double transmitted;
@@ -58,7 +60,7 @@ static double transmitted_at(const struct layer *l, double cosine)
 			   : fresnel_dielectric(fmin(cosine, 1), l->c->eta).transmitted;
 }
 
-/* false: no light gets in from there. */
+/* Returns false if no light enters the layer from w. */
 static bool refract_into(const struct layer *l, vec3 w, struct passage *out)
 {
 	struct fresnel f = fresnel_dielectric(fmin(fabs(w.z), 1), l->c->eta);
@@ -80,7 +82,7 @@ static spectrum absorbed_by(const struct coat *c, const struct bsdf_point *p, ve
 	return s;
 }
 
-/* wo and wi on one side of the surface, one that scatters. */
+/* Returns whether wo and wi are on the same side of the surface, and light is scattered on that side. */
 static bool is_same_side(const struct bsdf *b, vec3 wo, vec3 wi)
 {
 	return wo.z * wi.z > 0 && (wo.z > 0 || b->two_sided);
@@ -105,7 +107,7 @@ static spectrum coat_eval(const struct bsdf *b, const struct bsdf_point *p, vec3
 	return spectrum_add(f, spectrum_scale(o.transmitted * i.transmitted / (c->eta * c->eta), below));
 }
 
-/* The probability of the boundary's own reflection. */
+/* Returns the probability of sampling the boundary's own reflection. */
 static double boundary_chance(const struct layer *l, vec3 wo)
 {
 	double t = transmitted_at(l, fabs(wo.z)), r = (1 - t) * l->c->specular_max;
@@ -157,7 +159,7 @@ static spectrum coat_eval_delta(const struct bsdf *b, const struct bsdf_point *p
 	return f;
 }
 
-/* Out through the boundary; false: total reflection. */
+/* Refracts a direction out of the layer. Returns false at total reflection. */
 static bool refract_out(const struct coat *c, vec3 inside, vec3 *out)
 {
 	double x = c->eta * inside.x, y = c->eta * inside.y, cos2 = 1 - x * x - y * y;
@@ -167,7 +169,8 @@ static bool refract_out(const struct coat *c, vec3 inside, vec3 *out)
 	return out->z != 0;
 }
 
-/* The direction of a lobe that is not specular. false: specular if *delta is set, absorbed otherwise. */
+/* Samples the direction wi of a lobe that is not specular. Returns false if the sample is specular (*delta is set), or
+ * absorbed. */
 static bool sample_lobe(const struct bsdf *b, const struct layer *l, const struct bsdf_point *p, vec3 wo,
 			const double u[3], bool *delta, vec3 *wi)
 {
@@ -279,7 +282,7 @@ static int roughcoating_create(struct bsdf *b, const struct scene_node *n, const
 	if (!code)
 		code = read_layer(c, b, n, build, e);
 	if (!code)
-		code = rough_boundary_read(c->rough, c->eta, b, n, build, e); /* enters its own roughness */
+		code = rough_boundary_read(c->rough, c->eta, b, n, build, e); /* overwrites b->alpha */
 	if (code)
 		return code;
 	b->alpha = fmin(b->alpha, alpha);

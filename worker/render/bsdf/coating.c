@@ -26,13 +26,13 @@ int coating_read(struct coating *c, struct bsdf *b, const struct scene_node *n, 
 	return 0;
 }
 
-/* eta^2 (1 - rho' (1 - E)) = eta^2 (1 - rho') + rho' E eta^2. */
+/* The denominator is written with E eta^2 = escape: eta^2 (1 - rho' (1 - E)) = eta^2 (1 - rho') + rho' E eta^2. */
 spectrum coating_diffuse(const struct coating *c, const struct bsdf_point *p, double escape, double transmitted_o,
 			 double transmitted_i)
 {
 	spectrum rho = texture_eval(&c->diffuse, &p->where, p->w);
 	double common = transmitted_o * transmitted_i / WARP_PI;
-	if (!(common > 0)) /* and possibly no light gets in at all: escape is 0 then */
+	if (!(common > 0)) /* escape is 0, too, if no light at all enters the coating */
 		return spectrum_of(0);
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
 		double again = c->nonlinear ? rho.v[i] : 1;

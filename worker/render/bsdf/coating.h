@@ -1,15 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A clear coating over a diffuse base, what `plastic` and `roughplastic` share: light that the boundary lets in is
- * scattered by the base, reflected again and again between base and boundary, and leaves through the boundary (the
- * model of Mitsuba's plug-ins):
+ * A clear coating over a diffuse base, shared by `plastic` and `roughplastic`; `pplastic` uses only its parameters and
+ * the choice of a lobe. Light that enters through the boundary is scattered by the base, reflected any number of times
+ * between base and boundary, and leaves through the boundary (the model of Mitsuba's plug-ins):
  *
  *   f_diffuse = T(wo) T(wi) / eta^2  rho / (1 - rho' (1 - E)) / pi
  *
- * with T the share that the boundary transmits from outside, E what it lets out of diffuse light from inside, rho the
- * base's reflectance, and rho' = rho where `nonlinear` is on, which shifts colours as light does that meets the base
- * several times, else 1. By reciprocity E is what it lets in of diffuse light from outside, over eta^2: so a white base
- * gives back all light, and nothing is lost to rounding where E is small.
+ * T is the share of light from outside that the boundary transmits, E the share of diffuse light from inside that it
+ * lets out, and rho the reflectance of the base. rho' is 1, or rho if `nonlinear` is set: then colours become more
+ * saturated, as those of light that meets the base several times. By reciprocity, E is the share of diffuse light from
+ * outside that the boundary lets in, over eta^2; with this form a white base loses no light, and a small E loses no
+ * precision.
  */
 #ifndef WORKER_RENDER_BSDF_COATING_H
 #define WORKER_RENDER_BSDF_COATING_H
@@ -22,11 +23,11 @@
 struct coating {
 	struct texture diffuse, specular;
 	double eta;		/* index of the coating over the one outside */
-	double specular_weight; /* share of the specular reflectance, used to choose a lobe */
+	double specular_weight; /* specular reflectance over the sum of both, to choose a lobe */
 	bool nonlinear;
 };
 
-/* Reads the parameters into b. */
+/* Reads the parameters into c, and sets b's modes, colour and texture flags. Returns 0 or a negative error code. */
 int coating_read(struct coating *c, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 		 struct error *e);
 #define COATING_PARAMS                                                                        \
@@ -37,11 +38,11 @@ int coating_read(struct coating *c, struct bsdf *b, const struct scene_node *n, 
 		.name = "nonlinear", .types = VALUE_BOOL                                      \
 	}
 
-/* f_diffuse; escape: E eta^2. */
+/* Returns f_diffuse (1/sr). escape: E eta^2; transmitted_o, transmitted_i: T(wo), T(wi). */
 spectrum coating_diffuse(const struct coating *c, const struct bsdf_point *p, double escape, double transmitted_o,
 			 double transmitted_i);
 
-/* The probability of sampling the specular lobe, given the share `reflected` of wo's light that the boundary
+/* Returns the probability of sampling the specular lobe. reflected: the share of wo's light that the boundary
  * reflects. */
 double coating_specular_chance(const struct coating *c, double reflected);
 

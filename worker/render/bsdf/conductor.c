@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A smooth metal on the side of the normal. */
+/* A smooth metal that reflects on the side of the normal only. */
 #include "worker/render/bsdf/metal.h"
 #include "worker/render/bsdf/microfacet.h"
 

@@ -110,7 +110,8 @@ struct bsdf_probes bsdf_probes_of(const struct bsdf_build *build)
 	return p;
 }
 
-/* Where the distances to all three edges are equal: barycentrics are in proportion to the edges across. */
+/* The point at equal distances from all three edges: its barycentric coordinates are proportional to the lengths of the
+ * opposite edges. */
 static void put_middle(const struct attribute_table *t, struct texture_point *at)
 {
 	vec3 side[3];

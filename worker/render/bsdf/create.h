@@ -5,59 +5,61 @@
 
 #include "worker/render/bsdf/bsdf.h"
 
-/* Wraps b in `ops`, whose data is a BSDF; all properties of b stay. */
+/* Replaces b's operations by `ops` and its data by a copy of the former b; the other properties of b stay. -ENOMEM. */
 int bsdf_wrap(struct bsdf *b, const struct bsdf_ops *ops, const struct scene_node *n, const struct bsdf_build *build,
 	      struct error *e);
 
-/* Reads a reflectance and sets b's colour and texture flags. */
+/* Reads a reflectance into t and sets b's colour and texture flags. `fallback` is the value if the parameter is absent.
+ * Returns 0 or a negative error code. */
 int bsdf_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
 		 const struct bsdf_build *build, struct error *e);
 
-/* Likewise a number from 0 to 1 (texture_build). */
+/* Like bsdf_texture(), for a number from 0 to 1 (texture_build.number). */
 int bsdf_number(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
 		const struct bsdf_build *build, struct error *e);
 
-/* Likewise a quantity that may exceed 1: an index of refraction, an exponent, an absorption. number: it is no spectrum
- * (texture_build). The caller checks its range. */
+/* Like bsdf_texture(), for a quantity that may exceed 1, such as an exponent or an absorption. number: it is no
+ * spectrum (texture_build.number). The caller checks its range. */
 int bsdf_quantity(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
 		  bool number, const struct bsdf_build *build, struct error *e);
 
 /*
- * Points at which textures are evaluated to find their range: a grid over (u,v), and points of the mesh's triangles in
- * turn. An attribute has its extremes at corners, and what depends on the distance to the edges has them there and
- * where all three are equally far, so up to BSDF_PROBES_MAX such points the range is exact; beyond that, points are
- * skipped evenly.
+ * Points at which textures are evaluated to find their range: a grid over (u,v), combined with points of the mesh's
+ * triangles in turn. A mesh attribute has its extremes at the corners of triangles; a texture that depends on the
+ * distance to the edges has them there and at the point equally far from all three. With up to BSDF_PROBES_MAX such
+ * points the range is exact; beyond that, points are skipped evenly.
  */
 enum { BSDF_PROBES_MAX = 3 << 18 };
 struct bsdf_probes {
 	uint32_t count;
-	const struct attribute_table *mesh; /* NULL: there is none */
-	uint64_t points;		    /* of the mesh; 0: no texture depends on it */
+	const struct attribute_table *mesh; /* NULL: no mesh */
+	uint64_t points;		    /* points of the mesh to be probed; 0: no texture depends on the mesh */
 };
 struct bsdf_probes bsdf_probes_of(const struct bsdf_build *build);
 struct bsdf_point bsdf_probe(const struct bsdf_probes *p, uint32_t i);
-/* The smallest and the largest number of a texture there, means over the lanes: only colours that are no images differ
- * in them. */
+/* The smallest and the largest value of a texture at these points. A value is the mean over the lanes, which differ
+ * only for colours that are not images. */
 struct bsdf_range {
 	double least, most;
 };
 struct bsdf_range bsdf_probe_range(const struct texture *t, const struct bsdf_build *build);
 
-/* Ends of `sample` where nothing is refracted. The lobes that are not specular send light to wi; false: the density
- * there is 0. */
+/* Completes `sample` for a lobe that is neither specular nor refracted, in direction wi. Returns false if the density
+ * of wi is 0. */
 bool bsdf_sample_smooth(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi, struct bsdf_sample *out);
-/* The specular lobe `mode` is chosen; false: there is none from wo. */
+/* Completes `sample` for the specular lobe `mode`. Returns false if there is no such lobe for wo. */
 bool bsdf_sample_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode,
 		       struct bsdf_sample *out);
 
-/* Marks b, whose data begins like that of `ops`, as having specular lobes only. */
+/* Makes b a BSDF with specular lobes only, with the operations `ops`; b's data must begin with the data that these
+ * expect. */
 void bsdf_make_smooth(struct bsdf *b, const struct bsdf_ops *ops);
 
-/* Marks b as having a part of this colour. */
+/* Records that b has a part with a colour of this kind. */
 void bsdf_add_shape(struct bsdf *b, enum color_shape shape);
 
-/* 0.6 allows keeping reflectances that add up to more than 1. `sum` is their sum; -ERANGE if it exceeds 1 and the
- * node requests that. For other BSDFs the parameter has no effect (scene.c). */
+/* Mitsuba 0.6 can be told to keep reflectances that add up to more than 1. Returns -ERANGE if `sum`, their sum, exceeds
+ * 1 and the node requests that, otherwise 0. For BSDFs without this parameter it has no effect (scene.c). */
 #define BSDF_ENERGY_PARAM                                                 \
 	{                                                                 \
 		.name = "ensure_energy_conservation", .types = VALUE_BOOL \

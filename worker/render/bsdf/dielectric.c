@@ -6,7 +6,8 @@
 
 #include <float.h>
 
-/* f |wi.z| of one lobe with the Fresnel share f; eta: index beyond over index on wo's side. Chance 0: no such lobe. */
+/* Returns f |wi.z| of one lobe, given the Fresnel terms f at its angle. eta: index beyond over index on wo's side.
+ * *chance is 0 if there is no such lobe. */
 static spectrum lobe(const struct glass *g, const struct bsdf_point *p, vec3 wo, unsigned mode, double eta,
 		     const struct fresnel *f, vec3 *wi, double *chance)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A sheet that scatters light through to its other side, equally in all directions, and reflects none: paper, leaves
- * (in a blend with `diffuse`). */
+/* A sheet that transmits light diffusely to its other side and reflects none, such as paper or leaves (in a blend with
+ * `diffuse`). */
 #include "worker/render/bsdf/create.h"
 #include "worker/render/bsdf/warp.h"
 

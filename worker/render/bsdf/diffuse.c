@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Lambert's reflectance on the side of the normal. */
+/* Lambertian reflection on the side of the normal. */
 #include "worker/render/bsdf/diffuse.h"
 #include "worker/render/bsdf/create.h"
 #include "worker/render/bsdf/warp.h"

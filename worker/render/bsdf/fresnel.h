@@ -8,14 +8,15 @@
 #include <math.h>
 #include <stdbool.h>
 
-/* Shares of light; both keep their precision where they are small. */
+/* The reflected and the transmitted share of light; both keep their precision where they are small. */
 struct fresnel {
 	double reflected, transmitted;
 	double cos_t; /* cosine of the refracted ray, 0 at total reflection */
 };
 
-/* Cosines on both sides, of directions related by Snell's law; eta: index beyond over index here. The differences of
- * amplitudes are written out, so that no digits cancel when eta is close to 1. */
+/* Returns the Fresnel terms for the cosines c here and t beyond, of directions related by Snell's law; eta: index
+ * beyond over index here. The differences of amplitudes are expanded, so that no digits cancel when eta is close to
+ * 1. */
 static inline struct fresnel fresnel_between(double c, double t, double eta)
 {
 	double s = 1 / (c + eta * t), p = 1 / (eta * c + t), e = (eta - 1) * (eta + 1);
@@ -24,19 +25,22 @@ static inline struct fresnel fresnel_between(double c, double t, double eta)
 	return (struct fresnel){min_of(0.5 * (rs * rs + rp * rp), 1), min_of(ts + tp, 1), t};
 }
 
+/* Returns the Fresnel terms for the cosine c; eta: index beyond over index here. */
 static inline struct fresnel fresnel_dielectric(double c, double eta)
 {
-	/* (eta cos_t)^2; each form keeps its precision where it is used, close to eta = 1 and to the normal. */
+	/* (eta cos_t)^2: the first form is precise at grazing angles with eta close to 1, the second close to the
+	 * normal. */
 	double t2 = c * c < 0.5 ? (eta - 1) * (eta + 1) + c * c : eta * eta - (1 - c) * (1 + c);
 	if (!(t2 > 0))
 		return (struct fresnel){1, 0, 0};
 	return fresnel_between(c, sqrt(t2) / eta, eta);
 }
 
-/* The probability of following the reflection or the transmission at a smooth boundary. A lamp that is mirrored by
- * water is seen by the two per cent of light that are reflected, and is so much brighter than what lies below that a
- * path has to follow the reflection more often than light does: with FRESNEL_LEAST, but at most FRESNEL_TIMES as often,
- * lest a boundary between nearly equal indices waste its samples. Transmitted paths become rarer by a tenth at most. */
+/* Returns the probability of following the reflection or the transmission at a smooth boundary. Water reflects two
+ * per cent of the light of a lamp, but the mirrored lamp is much brighter than anything below the surface.
+ * Reflection is therefore followed with a probability of at least FRESNEL_LEAST; but at most with FRESNEL_TIMES its
+ * share of light, since a boundary between nearly equal indices would waste samples. Transmitted paths become rarer
+ * by at most a tenth. */
 #define FRESNEL_LEAST 0.1
 #define FRESNEL_TIMES 8
 static inline double fresnel_chance(const struct fresnel *f, bool reflect)
@@ -47,8 +51,9 @@ static inline double fresnel_chance(const struct fresnel *f, bool reflect)
 	return reflect ? often : 1 - often;
 }
 
-/* Index eta - i k beyond, relative to the index here. eta = 0, k = 1 is a perfect mirror. No branches, so that a loop
- * over wavelengths is vectorised. Nothing overflows: eta and k are at most 1e9. */
+/* Returns the reflectance of a conductor with the index eta - i k, relative to the index here. eta = 0, k = 1 is a
+ * perfect mirror. There are no branches, so that a loop over wavelengths can be vectorised, and nothing overflows: eta
+ * and k are at most 1e9. */
 static inline double fresnel_conductor(double c, double eta, double k)
 {
 	double c2 = c * c, s2 = (1 - c) * (1 + c), ek = 2 * eta * k;
@@ -58,7 +63,7 @@ static inline double fresnel_conductor(double c, double eta, double k)
 	double rs = (s > 0 ? t1 - t2 : 1) / (s > 0 ? s : 1);
 	double rp = rs * ((p > 0 ? t3 - t4 : 1) / (p > 0 ? p : 1));
 	double r = 0.5 * (rs + rp);
-	return r > 0 ? r : 0; /* rounding, where both sides are alike */
+	return r > 0 ? r : 0; /* may be negative by rounding if both indices are equal */
 }
 
 #endif

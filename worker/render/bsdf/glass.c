@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/bsdf/glass.h"
 
-/* Equal laws on both sides, or coefficients of zero, refract all wavelengths alike. */
+/* Compares the indices themselves: equal laws on both sides, or coefficients of zero, refract all wavelengths alike. */
 static bool varies_with_wavelength(const struct ior side[2], double eta)
 {
 	for (double nm = WAVELENGTH_MIN; nm <= WAVELENGTH_MAX; nm++)

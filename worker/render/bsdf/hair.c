@@ -1,33 +1,34 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Hair and fur: a dielectric fibre that absorbs, by Chiang et al. 2016 (hair_lobes.c); parameters, defaults and
- * conventions are those of Mitsuba 3's plug-in. One scattering stands for all that light does inside, and ends where it
- * began. For light from wi to a camera in direction wo,
+ * Hair and fur: an absorbing dielectric fibre after Chiang et al. 2016 (hair_lobes.c), with the parameters, defaults
+ * and conventions of Mitsuba 3's plug-in. One scattering event, at the point where light arrives, stands for everything
+ * that happens inside the fibre. For light from wi to a camera in direction wo,
  *
  *   f |wi.z| = sum_p M_p(theta_wo, theta_wi) A_p(theta_wo, h) N_p(phi_wi - phi_wo)
  *
- * where y, n x dp/du, runs along the fibre, theta is the angle of a direction to the xz plane, phi is the angle in it,
- * and wo passes the axis at h = sin gamma = -wo.x / cos theta radii. So the place on the fibre follows from the normal,
- * whatever the shape is; one that is no fibre scatters as if there were a thin one in each of its points. A_p depends
- * on absorption, in units of one over the fibre's radius. Melanin's coefficients are Rec. 709 colours and are made
- * spectra like those of media: divided by twice the maximum, upsampled as reflectances are, and multiplied again.
+ * where the y axis, n x dp/du, runs along the fibre, theta is the angle between a direction and the xz plane, phi the
+ * azimuth in that plane, and wo passes the axis of the fibre at a distance of h = sin gamma = -wo.x / cos theta radii.
+ * The offset h therefore follows from the normal, whatever the shape is; a shape that is not a fibre scatters as if
+ * there were a thin fibre at each of its points. A_p depends on the absorption, per radius of the fibre. The
+ * coefficients of melanin are Rec. 709 colours and become spectra like those of media: divided by twice their maximum,
+ * upsampled as reflectances, and multiplied again.
  *
- * Lobes go to both sides. What goes into the fibre has to get out: seen from inside, the surface is not there. Curves
- * ignore such rays (bsdf.culls), as Mitsuba's do: on the way from a vertex to a lamp the fibre around it is no
- * obstacle. Only vertices that the camera's side of the path meets from outside scatter, so paths from a light find
- * what is reflected, and those from the camera and connections the rest. Other shapes, and curves that are meshes, have
- * a specular lobe for the back that goes straight on, of which a path counts an edge and through which next event
- * estimation does not look. There a path that comes from a light cannot know whether the surface at which it arrives
- * from outside is the one that the camera sees, or lies behind it: half of them go straight through, to scatter where
- * the light leaves.
+ * Light scatters to both sides of the surface, so light that enters the fibre has to leave it again without another
+ * event: seen from inside, the surface does not exist. Curves ignore rays from inside (bsdf.culls), as Mitsuba's do, so
+ * that the fibre around a vertex does not block the connection to an emitter. A vertex scatters only if the camera's
+ * side of the path meets it from outside; paths from a light therefore find only reflected light, and paths from the
+ * camera and connections find the rest. Other shapes, and curves that are meshes, have a specular lobe on their back
+ * that passes light straight on; it counts as an edge of the path, and next event estimation does not look through it.
+ * On these shapes, a path from a light that arrives from outside cannot know whether the camera sees this surface or
+ * one behind it: half of these paths pass straight through, to scatter where the light leaves.
  *
- * f is not reciprocal: h is the camera's. Importance is radiance the other way round, as everywhere (bsdf.h). Its
- * directions are drawn along the fibre from M, which is symmetric, and around it in proportion to the cosine, half of
- * lobe 0 by N around the mirror image; there the density ignores absorption. That of radiance is the mean of A_p over
- * some wavelengths, always the same ones, and a little of what it is without absorption, so that no lobe that has
- * light at some wavelength is missed.
+ * f is not reciprocal, because h belongs to the direction of the camera. Importance is radiance with the directions
+ * exchanged, as everywhere (bsdf.h). Sampling importance draws theta from M, which is symmetric, and phi in proportion
+ * to the cosine; half of lobe 0 draws phi from N around the mirror direction instead. This density ignores absorption.
+ * Sampling radiance chooses lobe p in proportion to the mean of A_p over a fixed set of wavelengths, plus a small share
+ * of A_p without absorption, so that no lobe with light at some wavelength is missed.
  *
- * Failures: pigments and sigma_a together, equal indices, values out of range.
+ * Creation fails if both pigments and sigma_a are given, if the indices are equal, or if a value is out of range.
  */
 #include "worker/render/bsdf/create.h"
 #include "worker/render/bsdf/hair_lobes.h"
@@ -40,26 +41,28 @@
 #define DEGREE (WARP_PI / 180)
 #define IOR_AMBER 1.55
 
-/* One over a cosine times the narrowest lobe is finite. */
+/* The smallest cosine: its inverse times the density of the narrowest lobe is finite. */
 #define LEAST_COSINE 0x1p-900
 
-/* Weight of the white share in the choice of a lobe. */
+/* Weight of the shares without absorption in the choice of a lobe. */
 #define WHITE 0x1p-6
 
-/* For importance that arrives from outside: the probability of passing straight through, and those of the lobes. */
+/* For importance that arrives from outside: the probability of passing straight through, and those of choosing each
+ * lobe. */
 #define PASSING 0.5
 static const double adjoint_chance[HAIR_LOBES] = {0.3, 0.4, 0.2, 0.1};
 
 struct hair {
 	struct hair_fibre fibre;
-	bool pigments;			     /* sigma_a is theirs */
-	struct color eumelanin, pheomelanin; /* times their concentrations */
+	bool pigments;			     /* absorption is given by the two pigments, not by sigma_a */
+	struct color eumelanin, pheomelanin; /* coefficients times concentrations */
 	struct texture sigma_a;
-	double scale;	 /* of sigma_a */
+	double scale;	 /* factor of sigma_a */
 	spectrum probes; /* absorption at `probed`, unless sigma_a is textured */
 };
 
-/* The wavelengths at which lobes are weighted: a density that used those of the path would couple them. */
+/* The wavelengths at which lobes are weighted. They are fixed: a density that depended on the wavelengths of the path
+ * would couple them. */
 static const struct wavelengths probed = {.nm = {450, 520, 580, 640}};
 
 static spectrum absorption(const struct hair *h, const struct texture_point *where, const struct wavelengths *w)
@@ -76,7 +79,7 @@ static spectrum absorption_for_choice(const struct hair *h, const struct bsdf_po
 	return h->pigments || texture_is_constant(&h->sigma_a) ? h->probes : absorption(h, &p->where, &probed);
 }
 
-/* A direction, by its angles. */
+/* The spherical coordinates of a direction. */
 struct angles {
 	struct hair_angle theta;
 	double phi;
@@ -92,7 +95,7 @@ static vec3 direction_of(struct hair_angle theta, double cos_phi, double sin_phi
 	return vec3_normalize((vec3){theta.cos * cos_phi, theta.sin, theta.cos * sin_phi});
 }
 
-/* A camera's direction, which enters the fibre. */
+/* The direction to the camera, and how its ray enters the fibre. */
 struct seen {
 	struct angles from;
 	double gamma;
@@ -106,7 +109,7 @@ static struct seen seen_from(const struct hair *h, vec3 camera)
 	return s;
 }
 
-/* M_p N_p of each lobe. */
+/* Computes M_p N_p of each lobe. */
 static void find_lobes(const struct hair *h, const struct seen *s, vec3 light, double lobe[HAIR_LOBES])
 {
 	struct angles to = angles_of(light);
@@ -117,7 +120,7 @@ static void find_lobes(const struct hair *h, const struct seen *s, vec3 light, d
 	}
 }
 
-/* f |light.z| for a camera outside. */
+/* Returns f |light.z| for a camera outside the fibre. */
 static spectrum scattered(const struct hair *h, const struct bsdf_point *p, vec3 camera, vec3 light)
 {
 	struct seen s = seen_from(h, camera);
@@ -160,7 +163,7 @@ static void find_chances(const struct hair *h, const struct bsdf_point *p, const
 		chance[k] /= sum;
 }
 
-/* The density of a path from a light, which leaves to a camera. */
+/* Returns the density (solid angle) with which a path from a light continues towards a camera. */
 static double adjoint_pdf(const struct hair *h, bool culled, vec3 light, vec3 camera)
 {
 	struct angles from = angles_of(light), to = angles_of(camera);
@@ -190,7 +193,7 @@ static double hair_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo
 	return sum;
 }
 
-/* Which of these probabilities u falls in; *u is then uniform again. */
+/* Returns the index of the interval of cumulative probability that *u falls in, and rescales *u to be uniform again. */
 static int pick_index(const double *chance, int count, double *u)
 {
 	int k = 0;
@@ -258,7 +261,7 @@ static bool hair_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 				  out);
 }
 
-/* d'Eon 2011, sec. 6.1: per unit of concentration. */
+/* Sets a pigment's coefficients, given per unit of concentration (d'Eon 2011, sec. 6.1). */
 static int set_pigment(struct color *c, const double rgb[3], double concentration)
 {
 	int code = color_from_rgb(rgb, COLOR_UNBOUNDED, c);

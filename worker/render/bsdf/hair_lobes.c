@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Chiang, Bitterli, Tappan, Burley 2016, A Practical and Controllable Hair and Fur Model for Production Path Tracing,
- * which took the form of Marschner et al. 2003, and its M from d'Eon et al. 2011, An Energy-Conserving Hair Reflectance
- * Model. Each function is a density, and what Fresnel's law and absorption leave in the lobes adds up to all, so the
- * model neither gains nor loses light from any direction at any distance from the axis.
+ * The model of Chiang, Bitterli, Tappan and Burley 2016, A Practical and Controllable Hair and Fur Model for Production
+ * Path Tracing, which has the form of Marschner et al. 2003 and the M of d'Eon et al. 2011, An Energy-Conserving Hair
+ * Reflectance Model. M and N are densities, and without absorption the shares of the lobes add up to 1, so the model
+ * neither gains nor loses light, whatever the direction and the distance from the axis.
  *
- * All are written such that no two large numbers cancel: fibres with a roughness of 0.001, light along the axis, and
- * light that only just touches the fibre are as exact as others. Nothing here fails.
+ * No expression subtracts large numbers of similar size, so that results are as exact for a roughness of 0.001, light
+ * along the axis, and light that only just touches the fibre as elsewhere. Nothing here fails.
  */
 #include "worker/render/bsdf/hair_lobes.h"
 
@@ -15,13 +15,13 @@
 
 #include <float.h>
 
-/* Where the asymptotic series takes over: it is exact to about exp(-2 x). */
+/* The argument from which the asymptotic series is used; its error is about exp(-2 x). */
 #define BESSEL_FAR 15
 enum { BESSEL_TERMS = 40 };
 
 /* I0(x) = sum (x^2 / 4)^k / k!^2, and for large x exp(x) / sqrt(2 pi x) sum ((2k - 1)!!)^2 / (k! (8x)^k) (Abramowitz
- * and Stegun 1964, 9.6.12 and 9.7.1). Terms of the first are positive and fall off after k = x / 2; of the second, the
- * sum ends where they are below rounding. */
+ * and Stegun 1964, 9.6.12 and 9.7.1). The terms of the first series are positive and decrease after k = x / 2; the
+ * second series is cut off where its terms are below rounding, or before they grow again. */
 double hair_bessel(double x)
 {
 	double sum = 1, term = 1;
@@ -40,7 +40,8 @@ double hair_bessel(double x)
 	return sum / sqrt(2 * WARP_PI * x);
 }
 
-/* Chiang 2016, eqs. 7 and 8: the variance along and the width around that look like a roughness. */
+/* Chiang 2016, eqs. 7 and 8: variance along the fibre and width around it, chosen so that equal steps of roughness look
+ * alike. */
 static double variance_of(double roughness)
 {
 	double b2 = roughness * roughness, x = 0.726 * roughness + 0.812 * b2 + 3.7 * pow(roughness, 20);
@@ -54,8 +55,8 @@ static double width_of(double roughness)
 
 void hair_fibre_set(struct hair_fibre *f, double eta, double along, double around, double tilt)
 {
-	/* Passing through narrows a lobe, reflection inside widens it (Marschner 2003, table 1, and sec. 4.1 of Chiang
-	 * 2016 for the tilts). */
+	/* Transmission narrows a lobe, reflection inside widens it (Marschner 2003, table 1); the tilts are those of
+	 * Chiang 2016, sec. 4.1. */
 	static const double times[HAIR_LOBES] = {1, 0.25, 4, 4}, turns[HAIR_LOBES] = {-2, 1, 4, 0};
 	double v = variance_of(max_of(along, HAIR_ROUGHNESS_MIN));
 	f->eta = eta;
@@ -71,9 +72,10 @@ void hair_fibre_set(struct hair_fibre *f, double eta, double along, double aroun
 }
 
 /*
- * In the plane across, the fibre acts as one with the index eta' = sqrt(eta^2 - sin^2 theta) / cos theta (Marschner
- * 2003, appendix B): sin gamma_t = h / eta' with h = sin gamma_i, and a passage is 2 cos gamma_t / cos theta_t long.
- * With cos theta sin gamma_i = x and cos theta cos gamma_i = z neither quotient is needed.
+ * In the plane across it, the fibre acts like one with the index eta' = sqrt(eta^2 - sin^2 theta) / cos theta
+ * (Marschner 2003, appendix B): sin gamma_t = h / eta' with h = sin gamma_i, and one passage through it has the length
+ * 2 cos gamma_t / cos theta_t. Since cos theta sin gamma_i = x and cos theta cos gamma_i = z, neither quotient has to
+ * be computed.
  */
 struct hair_entry hair_enter(const struct hair_fibre *f, double x, double z)
 {
@@ -87,7 +89,7 @@ struct hair_entry hair_enter(const struct hair_fibre *f, double x, double z)
 	return e;
 }
 
-/* Chiang 2016, sec. 3.2; the last share is the sum of the geometric series of all longer ways (eq. 6). */
+/* Chiang 2016, sec. 3.2; the last share is the sum of the geometric series of all further reflections (eq. 6). */
 void hair_shares(const struct hair_entry *e, double t, double share[HAIR_LOBES])
 {
 	share[0] = e->reflected;
@@ -101,7 +103,8 @@ void hair_shares(const struct hair_entry *e, double t, double share[HAIR_LOBES])
 	share[HAIR_LOBES - 1] /= (1 - t) + t * e->transmitted; /* 1 - t reflected */
 }
 
-/* Scales turn theta (Chiang 2016, sec. 4.1). Beyond the axis it comes down on the other side. */
+/* Turns theta by the tilt of the scales (Chiang 2016, sec. 4.1). Beyond the axis, the direction comes down on the other
+ * side. */
 static struct hair_angle tilted(const struct hair_fibre *f, int p, struct hair_angle a)
 {
 	const struct hair_angle *t = &f->tilt[p];
@@ -120,8 +123,8 @@ double hair_along(const struct hair_fibre *f, int p, struct hair_angle from, str
 	return exp(-0.5 * (ds * ds + dc * dc) / w->v) * hair_bessel(from.cos * to.cos / w->v) * w->scale;
 }
 
-/* d'Eon 2013, A Fiber Scattering Model with Non-Separable Lobes, sec. 3: a direction around that of the cone, of which
- * theta is kept. */
+/* d'Eon 2013, A Fiber Scattering Model with Non-Separable Lobes, sec. 3: samples a direction around one of the cone,
+ * and keeps only its theta. */
 struct hair_angle hair_along_sample(const struct hair_fibre *f, int p, struct hair_angle from, double u0, double u1)
 {
 	const struct hair_lobe_width *w = &f->along[p];
@@ -134,7 +137,7 @@ struct hair_angle hair_along_sample(const struct hair_fibre *f, int p, struct ha
 	return (struct hair_angle){sine, sqrt((1 - sine) * (1 + sine))};
 }
 
-/* Chiang 2016, eqs. 11 and 12: the logistic distribution, cut off at half a turn to each side. */
+/* Chiang 2016, eqs. 11 and 12: the logistic distribution, truncated to [-pi, pi]. */
 double hair_around(const struct hair_fibre *f, double turn)
 {
 	double x = exp(-fabs(remainder(turn, 2 * WARP_PI)) / f->s), sum = 1 + x;

@@ -1,19 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A thin layer of a medium between two parallel sides that refract nothing: light passes straight through, or is
+ * A thin layer of a medium between two parallel sides that do not refract: light passes straight through, or is
  * scattered once (Hanrahan and Krueger 1993, Reflection from Layered Surfaces due to Subsurface Scattering, sec. 4).
- * Light that would be scattered twice is lost. With t the optical thickness, sigma_t times the layer's, a and c the
- * cosines |wo.z| and |wi.z|, A the share sigma_s / sigma_t and p the phase function, the integrals over the depth of
- * the event are
+ * Light scattered more than once is lost. With the optical thickness t (sigma_t times the thickness), the cosines a =
+ * |wo.z| and c = |wi.z|, the albedo A = sigma_s / sigma_t and the phase function p, integration over the depth of the
+ * scattering event gives
  *
  *   reflected    f = A p(wo, wi) (1 - exp(-t / a - t / c)) / (a + c)
  *   transmitted  f = A p(wo, wi) (exp(-t / a) - exp(-t / c)) / (a - c)
  *   straight     exp(-t / a), a specular lobe
  *
- * Both are the same with wo and wi exchanged. Coefficients are those of a medium of 0.6: sigma_s and sigma_a, or
- * sigma_t and albedo, or by the name of a measured material, skin1 where the file says nothing.
+ * Both values of f are the same with wo and wi exchanged. The coefficients are given as for a medium of Mitsuba 0.6:
+ * sigma_s and sigma_a, or sigma_t and albedo, or the name of a measured material, which is skin1 by default.
  *
- * Failures: coefficients in two ways, a name of no material, microflakes, whose extinction depends on the direction.
+ * Creation fails if coefficients are given in two ways, if no material has the given name, or if the phase function is
+ * that of microflakes, whose extinction depends on the direction.
  */
 #include "worker/render/bsdf/create.h"
 #include "worker/render/math/measured_media.h"
@@ -22,7 +23,7 @@
 #include <math.h>
 #include <string.h>
 
-/* Lower bound of cosines, so that quotients stay finite. */
+/* Lower bound of cosines, so that quotients by them stay finite. */
 #define COSINE_MIN 0x1p-1000
 
 struct layer {
@@ -32,7 +33,7 @@ struct layer {
 	struct phase phase;
 };
 
-/* The optical thickness at a point, and the share of what is taken out of the ray that is scattered. */
+/* Returns the optical thickness at a point. *scattered: the share of the extinction that is scattered, not absorbed. */
 static spectrum depth_at(const struct layer *l, const struct bsdf_point *p, spectrum *scattered)
 {
 	spectrum first = texture_eval(&l->first, &p->where, p->w), second = texture_eval(&l->second, &p->where, p->w);
@@ -45,14 +46,13 @@ static spectrum depth_at(const struct layer *l, const struct bsdf_point *p, spec
 	return depth;
 }
 
-/* exp(-t / cosine) */
 static double transmittance(double t, double cosine)
 {
 	return exp(-t / cosine);
 }
 
-/* (exp(-t / a) - exp(-t / c)) / (a - c): with d = t / min - t / max, what passes at the larger cosine times
- * (1 - exp(-d)) / (max - min), which is t / (a c) where both are equal. */
+/* (exp(-t / a) - exp(-t / c)) / (a - c): computed, with d = t / min - t / max, as the transmittance at the larger
+ * cosine times (1 - exp(-d)) / (max - min); the last factor is t / (a c) where both cosines are equal. */
 static double transmitted(double t, double a, double c)
 {
 	double most = fmax(a, c), least = fmin(a, c), d = t * ((most - least) / most / least);
@@ -83,8 +83,8 @@ static spectrum hk_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 	return f;
 }
 
-/* Light that goes straight through, as a share of all that the layer lets out, were it scattered into no other layer.
- */
+/* Returns the probability of sampling the straight lobe: the light that passes straight through over the sum of that
+ * and the scattered light, as if no scattered light were absorbed on its way out. */
 static double straight_chance(spectrum depth, spectrum scattered, double cosine)
 {
 	double straight = 0, other = 0;
@@ -131,7 +131,7 @@ static bool hk_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo,
 	return bsdf_sample_smooth(b, p, wo, phase_sample(&l->phase, p->where.p, wo, u, &unused), out);
 }
 
-/* A coefficient of the file, or else the measured one. */
+/* Reads a coefficient, which is the measured one unless the scene gives it. */
 static int read_coefficient(struct texture *t, struct bsdf *b, const struct scene_node *n, const char *name,
 			    const double measured[3], const struct bsdf_build *build, struct error *e)
 {

@@ -9,7 +9,7 @@
 #include <string.h>
 #include <strings.h>
 
-/* Mitsuba's values; of sf11 and sapphire, which it does not know, those of the laws below at 587.6 nm. */
+/* Mitsuba's values. Mitsuba does not have sf11 and sapphire: their indices follow from the laws below at 587.6 nm. */
 static const struct {
 	const char *name;
 	double n;
@@ -25,8 +25,8 @@ static const struct {
 	{"sapphire (o)", 1.76817},
 };
 
-/* Schott (N-BK7, N-SF11), Malitson 1965 (fused quartz), Peter 1923 (diamond), Daimon and Masumura 2007 at 20 C (water),
- * Malitson and Dodge 1972 (sapphire, ordinary ray). */
+/* Coefficients of Sellmeier's law. Sources: Schott (N-BK7, N-SF11), Malitson 1965 (fused quartz), Peter 1923 (diamond),
+ * Daimon and Masumura 2007 at 20 C (water), Malitson and Dodge 1972 (sapphire, ordinary ray). */
 static const struct {
 	const char *name;
 	int terms;
@@ -43,7 +43,7 @@ static const struct {
 	{"sapphire (o)", 3, {1.4313493, 0.65054713, 5.3414021}, {0.005279926102, 0.01423826471, 325.0178341}},
 };
 
-/* Gases refract so little that a constant suffices even with dispersion. */
+/* Indices below this one are those of gases, which refract so little that a constant suffices even with dispersion. */
 #define NEARLY_VACUUM 1.001
 
 static int refuse_name(const struct scene_node *n, const char *property, const char *material, struct error *e)
@@ -108,8 +108,8 @@ static const struct names side_names[] = {
 	[IOR_EXT] = {"ext_ior", "ext_cauchy_b", "ext_sellmeier"},
 };
 
-/* "B1,..,Bm,C1,..,Cm". Without negative numbers, and with no C among the squares of wavelengths, n decreases from
- * the shortest to the longest wavelength, so checking both ends is enough. */
+/* Parses "B1,..,Bm,C1,..,Cm". If no number is negative and no C lies between the squares of the shortest and the
+ * longest wavelength, n decreases with the wavelength; the caller then only has to check both ends. */
 static int parse_sellmeier(struct ior *out, const struct scene_node *n, const char *name, const char *text,
 			   struct error *e)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A BSDF without some of its lobes, whose light is then absorbed. */
+/* Removes some lobes from a BSDF; the light that they would scatter is absorbed. */
 #ifndef WORKER_RENDER_BSDF_LOBE_FILTER_H
 #define WORKER_RENDER_BSDF_LOBE_FILTER_H
 
@@ -7,7 +7,7 @@
 
 enum { BSDF_WITHOUT_TRANSMISSION = 1, BSDF_WITHOUT_DELTA = 2, BSDF_WITHOUT_SMOOTH = 4 };
 
-/* Removes the lobes from b; allocates in the arena. */
+/* Removes the lobes given by the bits above from b; allocates in the arena. -ENOMEM. */
 int bsdf_filter_lobes(struct bsdf *b, unsigned lobes, struct arena *arena, struct error *e);
 
 #endif

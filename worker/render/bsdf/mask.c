@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A BSDF with holes: it scatters the share `opacity` of the light, the rest passes straight through. The latter is a
- * specular lobe, so a path counts one more edge for it. Connections look through (path/transparent.h).
+ * A BSDF with holes: it scatters the share `opacity` of the light, and lets the rest pass straight through. The latter
+ * is a specular lobe and counts as an edge of the path. Connections look through it (path/transparent.h).
  */
 #include "worker/render/bsdf/blend.h"
 #include "worker/render/bsdf/twosided.h"
@@ -19,7 +19,7 @@ static int mask_create(struct bsdf *b, const struct scene_node *n, const struct 
 	if (!code)
 		code = bsdf_mirror_back(&m->part[0], build, e);
 	if (!code)
-		code = bsdf_create_as(&m->part[1], &bsdf_ops_null, n, build, e); /* no `transmittance` */
+		code = bsdf_create_as(&m->part[1], &bsdf_ops_null, n, build, e); /* n has no `transmittance` */
 	if (!code)
 		code = blend_join(b, &m->part[0], inner->type, n, e);
 	if (!code)

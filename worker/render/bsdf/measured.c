@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Materials as they were measured, on the side of the normal: Dupuy and Jakob 2018, An Adaptive Parameterization for
- * Efficient Material Acquisition and Rendering. Half vectors h lie in a square, x = sqrt(2 theta / pi), y = phi / 2 pi
- * + 1/2. A warp takes numbers u to the h that are visible from the camera, and the file has what is left of the
- * reflected light by u (its equations 5 to 7):
+ * Measured materials that reflect on the side of the normal (Dupuy and Jakob 2018, An Adaptive Parameterization for
+ * Efficient Material Acquisition and Rendering). Half vectors h are points of a square, x = sqrt(2 theta / pi), y = phi
+ * / 2 pi + 1/2. A warp maps uniform numbers u to the half vectors visible from the camera. The file tabulates the
+ * remaining factor S of the reflected light as a function of u (equations 5 to 7 of the paper):
  *
  *   f(wo, wi) wi.z = S(u) D(h) / (4 sigma(wo)),   wo towards the camera
  *
- * Samples are two warps, the first by the mean of S over wavelengths. Between measurements the numbers are linear.
- * Measured light is not exactly reciprocal: paths from a light use f with the roles of the directions exchanged, and
- * sample as if they came from the camera.
+ * Sampling chains two warps: the first draws u in proportion to the mean of S over wavelengths, the second maps u to h.
+ * Values are interpolated linearly between measurements. Measured light is not exactly reciprocal: paths from a light
+ * use f with the directions exchanged, and sample as if they came from the camera.
  *
  * Failures: see measured_read.h.
  */
@@ -19,12 +19,13 @@
 #include "worker/render/bsdf/warp.h"
 #include "worker/render/math/search.h"
 
-/* Directions nearer to the horizon carry no light: f is bounded by what the formats of numbers hold. */
+/* Directions with a smaller cosine carry no light, so that f stays within the range of doubles. */
 #define LEAST_COSINE 0x1p-500
-/* The square root of a double's precision: unit vectors do not tell smaller angles to the normal apart. */
+/* The square root of a double's precision: unit vectors do not distinguish smaller angles to the normal. */
 #define LEAST_X 0x1p-26
 
-/* Signs of x and y that turn w to where the azimuths of the file are. Mitsuba's. */
+/* Signs by which x and y are multiplied to turn w into the range of azimuths that the file covers, by Mitsuba's
+ * rules. */
 struct turn {
 	double x, y;
 };
@@ -76,7 +77,7 @@ static struct view view_from(const struct measured *m, vec3 camera)
 	return v;
 }
 
-/* Where h is in the square, and the solid angle of directions to the light per area there. */
+/* Finds the point of h in the square; returns the solid angle of directions to the light per area of the square. */
 static double half_place(const struct view *v, vec3 h, double cosine, double place[2])
 {
 	struct angles a = angles_of(turn_vector(v->turn, h));
@@ -95,7 +96,7 @@ static double plane_at(const struct measured_plane *p, const double place[2])
 	return a + y.part * (b - a);
 }
 
-/* The nodes around u, and the share of each. */
+/* The nodes around u in all slices of the mix, and the weight of each. */
 struct nodes {
 	int count;
 	size_t at[16];
@@ -136,7 +137,7 @@ static double at_wavelength(const struct measured *m, const struct nodes *n, dou
 	return (1 - part) * nodes_sum(n, m->spectrum, m->count, i) + part * nodes_sum(n, m->spectrum, m->count, i + 1);
 }
 
-/* The file's colours may be outside of the gamut, and light is never negative. */
+/* Returns S(u). Colours of the file may be outside the gamut, but light is never negative. */
 static spectrum color_at(const struct view *v, const double u[2], const struct wavelengths *w)
 {
 	const struct measured *m = v->m;
@@ -159,7 +160,7 @@ static spectrum color_at(const struct view *v, const double u[2], const struct w
 	return spectrum_scale(scale, color_eval_rgb_reflectance(rgb, w));
 }
 
-/* f light.z for light that goes to the camera. */
+/* Returns f light.z for light that travels from `light` to `camera`. */
 static spectrum reflected(const struct measured *m, const struct wavelengths *w, vec3 camera, vec3 light)
 {
 	vec3 h;

@@ -1,18 +1,22 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Materials of the KAIST database, whose Mueller matrices were measured (Baek et al. 2020, Image-Based Acquisition and
- * Modeling of Polarimetric Reflectance), for unpolarized light: the element that says how much of it is reflected.
+ * Materials of the KAIST database of measured Mueller matrices (Baek et al. 2020, Image-Based Acquisition and Modeling
+ * of Polarimetric Reflectance), for unpolarised light: only the first element is used, the reflectance of unpolarised
+ * light.
  *
- * The table has the angles of Rusinkiewicz 1998: theta_h, of the half vector h to the normal; theta_d, of the direction
- * to the light to h; and phi_d, its azimuth about h, from the way down along the meridian. Between
- * measurements the numbers are linear in all three and in the wavelength, beyond them the last ones hold, negative ones
- * count as 0, and where any of them is not finite, or beyond 1e30, nothing could be measured, and there is no light, as
- * in Mitsuba. Samples are a tenth of the cosine and visible GGX normals of roughness `alpha_sample`.
+ * The table is indexed by the angles of Rusinkiewicz 1998: theta_h between the half vector h and the normal; theta_d
+ * between the direction to the light and h; and phi_d, the azimuth of that direction about h, counted from the tangent
+ * that points down along the meridian. Values are interpolated linearly in all three angles and in the wavelength,
+ * clamped to the first and last measurement, and negative ones count as 0. A value that is not finite or beyond 1e30
+ * marks a configuration that could not be measured; wherever the interpolation involves one, no light is reflected, as
+ * in Mitsuba. One sample in ten is drawn in proportion to the cosine, the others from the visible normals of a GGX
+ * distribution with roughness `alpha_sample`.
  *
- * Measured light is not reciprocal: paths from a light use f with the roles of the directions exchanged.
+ * Measured light is not reciprocal: paths from a light use f with the directions exchanged.
  *
- * Failures: an array that is missing, of another type or of sizes that disagree with others; axes
- * that do not ascend. Arrays are within the file, which bounds what is allocated: a sixteenth of it.
+ * Creation fails if an array is missing, has the wrong type or a size that disagrees with that of others, or if an axis
+ * is not ascending. Arrays lie within the file, which bounds allocations: the table takes a sixteenth of the array of
+ * matrices.
  */
 #include "worker/render/bsdf/create.h"
 #include "worker/render/bsdf/microfacet.h"
@@ -26,11 +30,12 @@
 
 #define LEAST_COSINE 0x1p-500 /* as for `measured` */
 #define ALL_WAVELENGTHS (-1)
-#define COSINE_SHARE 0.1 /* of samples */
+#define COSINE_SHARE 0.1 /* share of samples drawn in proportion to the cosine */
 
 enum { AXES = 4, MUELLER = 16, TICK_INTERVAL = 1 << 16 };
 
-/* What was not measured: it outweighs all numbers around it, and what is negative counts as 0. */
+/* A value that was not measured: it outweighs all values around it, so that their interpolation is negative and counts
+ * as 0. */
 static const float nothing = -FLT_MAX;
 
 struct axis {
@@ -39,16 +44,16 @@ struct axis {
 };
 
 struct polarized {
-	struct axis axis[AXES];	  /* phi_d, theta_d, theta_h; wavelengths in nm, whose numbers are neighbours */
+	struct axis axis[AXES];	  /* phi_d, theta_d, theta_h, and wavelengths in nm, which vary fastest */
 	const float *value;	  /* f */
-	const double (*rgb)[3];	  /* what each wavelength adds to linear Rec. 709 under D65 */
+	const double (*rgb)[3];	  /* weight of each wavelength in linear Rec. 709 under D65 */
 	double nm;		  /* the only wavelength, or ALL_WAVELENGTHS */
-	struct microfacet facets; /* for samples */
+	struct microfacet facets; /* only for sampling */
 };
 
 /* ---- the table ---- */
 
-/* Between two numbers of an axis. */
+/* A position between the values i and next of an axis; part: share of the way from the one to the other. */
 struct cell {
 	uint32_t i, next;
 	double part;
@@ -65,7 +70,7 @@ static struct cell cell_of(const struct axis *a, double x)
 	return (struct cell){i, i + 1, (x - a->at[i]) / (a->at[i + 1] - a->at[i])};
 }
 
-/* The numbers around a pair of directions, by their first wavelength, and the share of each. */
+/* The values around a pair of directions, each at its first wavelength, and the weight of each. */
 struct nodes {
 	int count;
 	const float *value[8];
@@ -74,7 +79,7 @@ struct nodes {
 
 static struct nodes nodes_at(const struct polarized *m, vec3 light, vec3 h)
 {
-	/* b and t: across h, and from it down the meridian. */
+	/* Tangents at h: b across the meridian, t down along it. */
 	double across = hypot(h.x, h.y);
 	vec3 b = across > 0 ? (vec3){-h.y / across, h.x / across, 0} : (vec3){0, 1, 0}, t = vec3_cross(b, h);
 	double x = vec3_dot(t, light), y = vec3_dot(b, light);
@@ -108,7 +113,7 @@ static double at_wavelength(const struct polarized *m, const struct nodes *n, do
 	return max_of(sum, 0);
 }
 
-/* f for light that goes to the camera. */
+/* Returns f for light that travels from `light` to `camera`. */
 static spectrum reflected(const struct polarized *m, const struct wavelengths *w, vec3 camera, vec3 light)
 {
 	vec3 h;

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The arrays of a file: phi_i and theta_i, in radians; ndf and sigma (azimuth, polar angle); vndf and luminance (phi_i,
- * theta_i, y, x); spectra (phi_i, theta_i, wavelength, y, x) with wavelengths in nm, or rgb with 3 in their place;
- * jacobian, a byte. All others are 32-bit floats. Spectra are transposed, so that what a path asks for is together, and
- * what is invisible is left out.
+ * Reads the arrays of a file: phi_i and theta_i, in radians; ndf and sigma (azimuth, polar angle); vndf and luminance
+ * (phi_i, theta_i, y, x); spectra (phi_i, theta_i, wavelength, y, x) with wavelengths in nm, or rgb with 3 channels
+ * instead of wavelengths; jacobian, a byte. All arrays but jacobian are 32-bit floats. Spectra are transposed so that
+ * the wavelengths of a node are adjacent in memory, without those that do not matter to visible light.
  *
- * Failures: an array that is missing, of another type or of sizes that disagree with others; numbers beyond 1e30 or
- * not finite, densities that are negative or nowhere positive, angles or wavelengths that do not ascend. Arrays are
- * within the file, which bounds what is allocated.
+ * Fails if an array is missing, has the wrong type or a size that disagrees with that of others; if a number is not
+ * finite or beyond 1e30; if a density is negative or nowhere positive; or if angles or wavelengths are not ascending.
+ * Arrays lie within the file, which bounds allocations.
  */
 #include "worker/render/bsdf/measured_read.h"
 
@@ -33,7 +33,8 @@ static int read_plane(const struct tensor_input *in, const char *name, struct me
 	return rc;
 }
 
-/* The sizes of an array for each slice, whose last two are those of a grid. */
+/* Checks the sizes of an array that has one grid for each slice: the first two are those of the axes, the last two
+ * those of the grid. */
 static int check_slices(const struct tensor_input *in, const struct measured *m, const char *name,
 			const struct tensor *t)
 {
@@ -66,7 +67,7 @@ static int read_warp(const struct tensor_input *in, const struct measured *m, co
 
 /* ---- colours ---- */
 
-/* Keeps those of `all` wavelengths that matter to visible light. */
+/* Keeps those of `all` wavelengths that matter to visible light; *first: index of the first one kept. */
 static void keep_visible(struct measured *m, const double *nm, uint32_t all, uint32_t *first)
 {
 	uint32_t end = all;
@@ -153,7 +154,7 @@ static int read_colors(const struct tensor_input *in, struct measured *m)
 
 /* ---- the whole ---- */
 
-/* Mitsuba's rules: up to two azimuths are an isotropic material. */
+/* Follows Mitsuba's rules: a material with up to two azimuths is isotropic. */
 static int find_symmetry(const struct tensor_input *in, struct measured *m)
 {
 	uint32_t count = m->axes.count[0];
@@ -203,8 +204,8 @@ int measured_read(struct measured *m, const struct scene_node *n, const struct b
 	return rc;
 }
 
-/* 1 / sqrt(pi D) at the maximum of D, scaled such that the integral of D cos(theta) over the hemisphere is 1. Of a
- * square of half vectors, x is the root of theta's share of a right angle. */
+/* Returns 1 / sqrt(pi D) at the maximum of D, with D scaled such that the integral of D cos(theta) over the hemisphere
+ * is 1. The coordinate x of the square of half vectors is sqrt(2 theta / pi). */
 double measured_alpha(const struct measured *m)
 {
 	const struct measured_plane *p = &m->normals;

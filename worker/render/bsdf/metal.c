@@ -16,15 +16,15 @@ static const struct {
 #include "conductors.inc"
 };
 
-/* Mitsuba's name of a second source for a metal that it has in two; of Na, Ni and V it has this one alone. Here each
- * is in the table once. */
+/* Mitsuba has two sources for some metals and calls the second NAME_palik; for Na, Ni and V it has only that one. The
+ * table here has one entry per metal, which either name selects. */
 static bool is_named(const char *name, const char *metal)
 {
 	size_t n = strlen(metal);
 	return strncmp(name, metal, n) == 0 && (name[n] == 0 || strcmp(name + n, "_palik") == 0);
 }
 
-/* The symbol of a metal that is called by its name; NULL: not one of these. */
+/* Returns the chemical symbol of a metal given by its English name, for hints; NULL if the name is not known. */
 static const char *symbol(const char *name)
 {
 	static const struct {
@@ -72,7 +72,7 @@ static int set_named_metal(struct metal *m, const char *name, const struct scene
 		for (size_t c = 0; c < 3; c++)
 			for (size_t r = 0; r < METAL_ROWS; r++)
 				room[c * METAL_ROWS + r] = metals[i].row[r][c];
-		/* Where colours are rgb, Mitsuba converts n and k as if they were light, without D65. */
+		/* If colours are RGB, n and k are converted as if they were light, without D65, as in Mitsuba. */
 		m->eta.color = color_of_table(METAL_ROWS, room, room + METAL_ROWS, false, false);
 		m->k.color = color_of_table(METAL_ROWS, room, room + 2 * METAL_ROWS, false, false);
 		return 0;
@@ -87,7 +87,7 @@ static int read_if_given(struct texture *t, const struct scene_node *n, const ch
 	return node_find(n, name) ? texture_from_node(t, n, name, 0, COLOR_UNBOUNDED, &inner, e) : 0;
 }
 
-/* What is left to divide by. */
+/* Divides t by the index outside now if t is constant. Returns the divisor that remains to be applied at each point. */
 static double set_outside(struct texture *t, double outside)
 {
 	if (!texture_is_constant(t))

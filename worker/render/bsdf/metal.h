@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The complex index of a conductor, relative to the outside: shared by conductor and roughconductor. */
+/* The complex index of a conductor, relative to the outside, shared by `conductor` and `roughconductor`. */
 #ifndef WORKER_RENDER_BSDF_METAL_H
 #define WORKER_RENDER_BSDF_METAL_H
 
@@ -8,14 +8,15 @@
 
 struct metal {
 	struct texture eta, k;
-	bool varies;		 /* eta or k is an image or a pattern; these are not yet divided by the index outside */
-	double eta_over, k_over; /* that index for what varies, otherwise 1 */
-	struct texture reflectance; /* factor */
-	bool perfect;		    /* reflects everything: the Fresnel factor is 1 */
+	bool varies;		    /* eta or k is textured; a textured one is not yet divided by the index outside */
+	double eta_over, k_over;    /* divisors of eta and k: the index outside for a textured one, otherwise 1 */
+	struct texture reflectance; /* factor of the Fresnel term */
+	bool perfect;		    /* reflects all light: the Fresnel factor is 1 */
 };
 
-/* Reads material, eta, k, ext_eta, specular_reflectance. Without any of the first three, the material is Cu in the
- * 0.5/0.6 dialect and none (a perfect mirror) in 3.x. Sets b's colour and texture flags. */
+/* Reads material, eta, k, ext_eta and specular_reflectance. The default material is Cu in the 0.5/0.6 dialect and none
+ * (a perfect mirror) in 3.x; eta and k override it. Sets b's colour and texture flags. Returns 0 or a negative error
+ * code. */
 int metal_read(struct metal *m, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 	       struct error *e);
 #define METAL_PARAMS                                                                                                  \
@@ -25,7 +26,7 @@ int metal_read(struct metal *m, struct bsdf *b, const struct scene_node *n, cons
 		.name = "specular_reflectance", .types = VALUE_TEXTURE, .max = 1                                      \
 	}
 
-/* Reflectance for the cosine to the (micro)surface normal. */
+/* Returns the reflectance for the cosine of the direction to the normal of the surface or microfacet. */
 spectrum metal_fresnel(const struct metal *m, const struct bsdf_point *p, double cosine);
 
 #endif

@@ -7,7 +7,8 @@
 #include <float.h>
 #include <string.h>
 
-/* The length of v's tangential part, stretched along v by the ratio: times alpha it is the sine that enters masking. */
+/* Returns the length of v's tangential part, with its component along the v axis stretched by the ratio. Times alpha,
+ * this length takes the place of the sine in Smith's masking function. */
 static double stretched_sine(const struct microfacet *m, vec3 v)
 {
 	return sqrt(v.x * v.x + m->ratio * m->ratio * (v.y * v.y));
@@ -17,7 +18,7 @@ double microfacet_d(const struct microfacet *m, vec3 h)
 {
 	if (!(h.z > 0))
 		return 0;
-	/* alpha_u alpha_v, and the sum of squared slopes over their roughness, times it. */
+	/* a2 = alpha_u alpha_v; s2 / c2 is a2 times the sum of the squared slopes, each over its squared roughness. */
 	double a2 = m->alpha * m->alpha * m->ratio, c2 = h.z * h.z, s2 = h.x * h.x * m->ratio + h.y * h.y / m->ratio;
 	if (m->ggx) {
 		double d = a2 * c2 + s2;
@@ -39,7 +40,8 @@ double microfacet_g1_over_cos(const struct microfacet *m, vec3 v)
 	return 2 / (c * (1 + erf(a)) + s * exp(-a * a) * (1 / sqrt(WARP_PI)));
 }
 
-/* Giles 2010, Approximating the erfinv function, made exact by one step of Newton. |x| < 1. */
+/* The inverse of erf for |x| < 1: Giles 2010, Approximating the erfinv function, followed by one Newton step to full
+ * precision. */
 static double erf_inverse(double x)
 {
 	double w = -log((1 - x) * (1 + x)), p;
@@ -70,7 +72,7 @@ static double erf_inverse(double x)
 	return p - (erf(p) - x) * (0.5 * sqrt(WARP_PI)) * exp(p * p);
 }
 
-/* A slope x with density (c - s x) exp(-x^2) below c/s: Newton inside a bracket. */
+/* Samples a slope x below c/s with density proportional to (c - s x) exp(-x^2), by Newton's method inside a bracket. */
 static double visible_slope(double c, double s, double u)
 {
 	const double half_root = 0.5 * sqrt(WARP_PI);
@@ -113,7 +115,7 @@ static vec3 ggx_visible(const struct microfacet *m, vec3 v, double u0, double u1
 	double z = (1 - u1) * (1 + stretched.z) - stretched.z, r = sqrt(fmax(0, (1 - z) * (1 + z)));
 	double phi = 2 * WARP_PI * u0;
 	vec3 h = {m->alpha * (r * cos(phi) + stretched.x), along_v * (r * sin(phi) + stretched.y), z + stretched.z};
-	/* The rim of the cap rounds to z = 0 and r = 0 at once only for v in the plane: then any normal on it is
+	/* h.z rounds to 0 only on the rim of the cap for v in the surface's plane, where any normal on the rim is
 	 * valid. */
 	return h.z > 0 ? vec3_normalize(h) : (vec3){0, 0, 1};
 }

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Any number of BSDFs by fixed weights; what these leave of 1 is absorbed, and they are scaled if they exceed it. */
+/* Any number of BSDFs with fixed weights. If the weights add up to less than 1, the rest of the light is absorbed; if
+ * to more, they are scaled to add up to 1. */
 #include "worker/render/bsdf/blend.h"
 #include "worker/render/text/number.h"
 
-/* As many weights as parts. */
+/* Reads one weight for each part. */
 static int read_weights(struct blend *m, const struct scene_node *n, struct error *e)
 {
 	const char *text = node_string(n, "weights", "");

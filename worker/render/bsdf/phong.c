@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Phong's lobe, made reciprocal and normalised (Lafortune and Willems 1994), over a diffuse base. As in Mitsuba 0.6, if
- * the two reflectances can add up to more than 1, both are scaled by 0.99 over their sum.
+ * Phong's lobe in its reciprocal, normalised form (Lafortune and Willems 1994), over a diffuse base. If the two
+ * reflectances can add up to more than 1, both are scaled by 0.99 over their sum, as in Mitsuba 0.6.
  */
 #include "worker/render/bsdf/create.h"
 #include "worker/render/bsdf/warp.h"
@@ -11,12 +11,12 @@
 
 struct phong {
 	struct texture diffuse, specular;
-	struct texture exponent; /* a number, EXPONENT_MAX at most */
-	double scale;		 /* of both reflectances */
-	double specular_chance;	 /* of sampling the specular lobe */
+	struct texture exponent; /* no spectrum; at most EXPONENT_MAX */
+	double scale;		 /* factor of both reflectances */
+	double specular_chance;	 /* probability of sampling the specular lobe */
 };
 
-/* The lobe without its normalisation: zero behind the plane across the mirror direction. */
+/* Returns the lobe without its normalisation; zero at more than 90 degrees from the mirror direction. */
 static double lobe_of(double exponent, vec3 wo, vec3 wi)
 {
 	double c = wo.z * wi.z - wo.x * wi.x - wo.y * wi.y;
@@ -49,7 +49,7 @@ static double phong_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 	return ph->specular_chance * lobe + (1 - ph->specular_chance) * wi.z / WARP_PI;
 }
 
-/* Around the mirror direction of wo. */
+/* Samples a direction around the mirror direction of wo. */
 static vec3 sample_lobe(double exponent, vec3 wo, double u0, double u1)
 {
 	double l = log1p(-u0) / (exponent + 1), c = exp(l), s = sqrt(-expm1(2 * l)), phi = 2 * WARP_PI * u1;
@@ -68,7 +68,8 @@ static bool phong_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 
 	return bsdf_sample_smooth(b, p, wo, wi, out);
 }
 
-/* An exponent's largest value, the one of the sharpest lobe, or the error. */
+/* Reads the exponent. *most: its largest value, which is that of the sharpest lobe. Returns 0 or a negative error
+ * code. */
 static int read_exponent(struct phong *ph, struct bsdf *b, double *most, const struct scene_node *n,
 			 const struct bsdf_build *build, struct error *e)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A diffuse base under a smooth clear coating, on the side of the normal: coating.h. */
+/* A diffuse base under a smooth clear coating (coating.h), which reflects on the side of the normal. */
 #include "worker/render/bsdf/coating.h"
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/microfacet.h"
@@ -8,8 +8,8 @@
 #include <float.h>
 
 struct plastic {
-	struct coating coating; /* first: most functions need no more */
-	double escape;		/* coating_diffuse */
+	struct coating coating; /* first: most functions take b->data as a coating */
+	double escape;		/* parameter of coating_diffuse */
 };
 
 static struct fresnel fresnel_at(const struct coating *c, vec3 w)
@@ -58,7 +58,7 @@ static bool plastic_sample(const struct bsdf *b, const struct bsdf_point *p, vec
 	return bsdf_sample_smooth(b, p, wo, warp_cosine_hemisphere(u[0], u[1]), out);
 }
 
-/* The share of diffuse light that the boundary lets in: the integral of T over the squared sine, up to total
+/* Returns the share of diffuse light that the boundary lets in: the integral of T over the squared sine, up to total
  * reflection, by the midpoint rule. */
 static double let_in(double eta)
 {

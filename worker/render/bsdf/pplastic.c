@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Mitsuba 3's polarized plastic (Baek et al. 2018) for unpolarised light, the only kind here: a rough dielectric
- * boundary, and a diffuse lobe that enters and leaves through a smooth one, with Fresnel's F and T:
+ * Mitsuba 3's polarized plastic (Baek et al. 2018) for unpolarised light, the only kind that is modelled: a rough
+ * dielectric boundary, and a diffuse lobe whose light enters and leaves through a smooth one. With Fresnel's
+ * reflectance F and transmittance T,
  *
  *   f = specular F(wo.h) D G1 G1 / (4 cos cos) + diffuse T(wo) T(wi) / pi
  *
- * On the side of the normal. Light that the boundary reflects back inside is lost, unlike in `roughplastic`.
+ * Only the side of the normal reflects. Light that the boundary reflects back inside is lost, unlike in `roughplastic`.
  */
 #include "worker/render/bsdf/coating.h"
 #include "worker/render/bsdf/fresnel.h"

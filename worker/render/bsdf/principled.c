@@ -1,27 +1,26 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The "principled" BSDF of artists' tools: Burley 2012, Physically Based Shading at Disney, and 2015, Extending the
- * Disney BRDF to a BSDF; parameters and defaults are those of Mitsuba 3's plug-in. With m = metallic, t = spec_trans, c
- * = base_color, and a rough GGX boundary of index eta,
+ * Disney's "principled" BSDF (Burley 2012, Physically Based Shading at Disney, and 2015, Extending the Disney BRDF to a
+ * BSDF), with the parameters and defaults of Mitsuba 3's plug-in. With m = metallic, t = spec_trans, c = base_color,
+ * and a rough GGX boundary of index eta,
  *
  *   f = D G1 G1 F / 4 + (1 - m) (1 - t) diffuse + (1 - m) sheen + clearcoat / 4 + (1 - m) t sqrt(c) refracted
  *
- * where F mixes Fresnel's factor of the boundary (what is not metal) with Schlick's of colour c (metal). Below the
- * surface there is only the boundary, (1 - m) t of it. Tints divide c by its luminance; a given `specular_color` (ours,
- * for glTF) takes the place of a tint of 1. As in the originals the lobes
- * are added, not layered: at grazing angles, and with sheen above all, more may come back than arrives, up to 1.5
- * times.
+ * where F interpolates by m between Fresnel's factor of the boundary and Schlick's of colour c (metal). Below the
+ * surface only the boundary scatters light, with the factor (1 - m) t. A tint is c over its luminance;
+ * `specular_color`, if given (an extension for glTF), replaces it with a share of 1. As in the papers, lobes are added,
+ * not layered: at grazing angles, above all with sheen, the surface may reflect up to 1.5 times the light that arrives.
  *
- * With `lambertian` (ours; for glTF, Appendix B.3.5 of its specification) the diffuse lobe is Lambert's, and loses what
- * the boundary reflects at the half vector: c / pi (1 - F).
+ * With `lambertian` (an extension for glTF, Appendix B.3.5 of its specification) the diffuse lobe is Lambertian,
+ * without the light that the boundary reflects at the half vector: c / pi (1 - F).
  *
- * `coat` (ours; for glTF) is a layer: a share k of the surface has it, with GGX facets of its own and Schlick's factor
- * S of an index of 1.5. What lies below loses what the coat reflects, in both directions:
+ * `coat` (an extension for glTF) is a layer on a share k of the surface, with GGX facets of its own and Schlick's
+ * factor S of an index of 1.5. The lobes below it lose the light that the coat reflects, in both directions:
  *
  *   f (1 - k S(wo)) (1 - k S(wi)) + k S D G1 G1 / 4
  *
- * Both `eta` and `specular` are refused. A sample fails where the facet's direction is on the wrong side or the lobe
- * has no density there.
+ * Creation fails if both `eta` and `specular` are given. A sample fails if the facet's direction is on the wrong side,
+ * or if the density there is 0.
  */
 #include "worker/render/bsdf/principled.h"
 
@@ -30,11 +29,12 @@
 #include "worker/render/bsdf/warp.h"
 
 #define PRINCIPLED_ALPHA_MIN 1e-3
-#define CLEARCOAT_REFLECTANCE 0.04 /* of an index of 1.5 */
+#define CLEARCOAT_REFLECTANCE 0.04 /* at normal incidence, of an index of 1.5 */
 
 enum { LOBE_DIFFUSE, LOBE_SPECULAR, LOBE_CLEARCOAT, LOBE_COAT, LOBE_TRANSMIT, LOBES };
 
-/* base_color over its luminance, from eight wavelengths weighted by the eye's sensitivity, or from rgb. */
+/* Returns base_color over its luminance, computed from eight wavelengths weighted by the eye's sensitivity, or from
+ * RGB. */
 static spectrum tint_of(const struct principled *p, const struct bsdf_point *at, spectrum base)
 {
 	static const struct wavelengths seen[2] = {{.nm = {440, 520, 560, 620}}, {.nm = {480, 540, 580, 660}}};
@@ -64,13 +64,14 @@ struct microfacet principled_facets(double anisotropic, double roughness)
 	return m;
 }
 
-/* The value of a number or texture at a point: textures of shares are grey, the mean over the lanes. */
+/* Returns the value of a share at a point, clamped to [0,1]: the mean over the lanes, since textures of shares are
+ * grey. */
 static double principled_share_at(const struct texture *t, const struct bsdf_point *at)
 {
 	return min_of(max_of(spectrum_mean(texture_eval(t, &at->where, at->w)), 0), 1);
 }
 
-/* All but colours. */
+/* Evaluates all parameters but the colours. */
 static void read_numbers(const struct principled *p, const struct bsdf_point *at, struct principled_point *s)
 {
 	s->roughness = principled_share_at(&p->roughness, at);
@@ -130,7 +131,7 @@ spectrum principled_boundary(const struct principled_point *s, double cosine)
 	return f;
 }
 
-/* F of the header comment. */
+/* Returns F of the comment at the top. */
 spectrum principled_fresnel(const struct principled_point *s, spectrum boundary, double cosine)
 {
 	double rest = schlick(cosine);
@@ -140,8 +141,8 @@ spectrum principled_fresnel(const struct principled_point *s, spectrum boundary,
 	return f;
 }
 
-/* Burley 2012, section 5.3, with his approximation of subsurface scattering (flatness), and sheen, section 5.6. The
- * caller excludes wi below the surface. */
+/* Burley 2012, section 5.3, with Burley's approximation of subsurface scattering (flatness), and the sheen of section
+ * 5.6. The caller has made sure that wi is above the surface. */
 spectrum principled_diffuse(const struct principled_point *s, spectrum boundary, vec3 wo, vec3 wi, double cos_d)
 {
 	double fo = schlick(wo.z), fi = schlick(wi.z), retro = 2 * s->roughness * cos_d * cos_d;
@@ -171,7 +172,8 @@ static double clearcoat_d(const struct principled_point *s, double cos_h)
 	return (a2 - 1) / (WARP_PI * log(a2) * (a2 * cos_h * cos_h + (1 - cos_h) * (1 + cos_h)));
 }
 
-/* Without the 1 / (4 cos cos) of facets, as Mitsuba has it: four times as bright as Burley's from straight above. */
+/* Without the factor 1 / (4 cos cos) of microfacets, as in Mitsuba: four times as bright as Burley's seen from straight
+ * above. */
 static double clearcoat_of(const struct principled_point *s, vec3 wo, vec3 wi, vec3 h, double cos_d)
 {
 	struct microfacet shadow;
@@ -181,20 +183,20 @@ static double clearcoat_of(const struct principled_point *s, vec3 wo, vec3 wi, v
 	return 0.25 * s->share[CLEARCOAT] * f * clearcoat_d(s, h.z) * g;
 }
 
-/* What the coat reflects of light at an angle. */
+/* Returns the share of light at an angle that the coat reflects. */
 static double coat_reflects(const struct principled_point *s, double cosine)
 {
 	return s->share[COAT] * (CLEARCOAT_REFLECTANCE + (1 - CLEARCOAT_REFLECTANCE) * schlick(cosine));
 }
 
-/* Probabilities of the lobes for light from wo. */
+/* Computes the probabilities of sampling each lobe for light from wo. */
 static void lobe_chances(const struct principled_point *s, vec3 wo, double chance[LOBES])
 {
 	const struct principled *p = s->p;
 	bool below = wo.z < 0;
 	double clear = 1 - s->metallic, glass = clear * s->share[TRANSMISSION];
 	double reflected = fresnel_dielectric(min_of(fabs(wo.z), 1), below ? 1 / p->eta : p->eta).reflected, sum = 0;
-	/* At total reflection some facets do not reflect. */
+	/* Never 0: where the plane reflects totally, some facets still transmit. */
 	chance[LOBE_TRANSMIT] = glass * max_of(1 - reflected, 0.05);
 	chance[LOBE_SPECULAR] = below ? glass * reflected : clear * reflected + s->metallic * max_of(p->base_max, 0.04);
 	chance[LOBE_DIFFUSE] =
@@ -215,13 +217,15 @@ static vec3 mirror(vec3 v, bool below)
 	return below ? (vec3){v.x, v.y, -v.z} : v;
 }
 
-/* The value and the density of one pair, together because they share most terms. wo.z is not 0. */
+/* The value and the density for a pair of directions, computed together because they share most terms. wo.z is not
+ * 0. */
 struct pair {
 	spectrum f;
 	double pdf;
 };
 
-/* Refracted light: Walter et al. 2007, eq. 21, as in roughdielectric; wo above, eta: index beyond over index here. */
+/* Adds refracted light to the pair: Walter et al. 2007, eq. 21, as in roughdielectric. wo is above; eta: index beyond
+ * over index on wo's side. */
 static void add_refracted(const struct principled_point *s, vec3 wo, vec3 wi, double eta, double chance,
 			  enum transport transport, struct pair *out)
 {
@@ -247,13 +251,14 @@ static void add_refracted(const struct principled_point *s, vec3 wo, vec3 wi, do
 	out->pdf += chance * seen;
 }
 
-/* What the coat's facets reflect, without its Fresnel factor: also the density of sampling it. */
+/* Returns the coat's reflection without its Fresnel factor and G1(wi), which is also the density of sampling it. */
 static double coat_lobe(const struct principled_point *s, vec3 wo, vec3 h)
 {
 	return 0.25 * microfacet_d(&s->coat, h) * microfacet_g1_over_cos(&s->coat, wo);
 }
 
-/* seen: the density of sampling the boundary's facets; cos_d: the cosine to the half vector h. */
+/* Returns the density (solid angle) of reflected directions. seen: that of sampling the boundary's facets; cos_d:
+ * cosine of either direction to the half vector h. */
 static double reflected_pdf(const struct principled_point *s, vec3 wo, vec3 wi, vec3 h, double cos_d, double seen,
 			    bool below, const double chance[LOBES])
 {
@@ -288,7 +293,7 @@ static spectrum reflected_value(const struct principled_point *s, vec3 wo, vec3 
 	return f;
 }
 
-/* Computes `value`, or the density if the probabilities of the lobes are given. */
+/* Computes the value if `value` is set, and the density if the probabilities of the lobes are given. */
 static struct pair pair_of(const struct principled_point *s, vec3 wo, vec3 wi, enum transport transport, bool value,
 			   const double *chance)
 {
@@ -331,7 +336,7 @@ static double principled_pdf(const struct bsdf *b, const struct bsdf_point *at, 
 	return pair_of(&s, wo, wi, at->transport, false, chance).pdf;
 }
 
-/* A half vector of GTR1, exactly: the inverse of its cumulative density. */
+/* Samples a half vector of GTR1 by inverting its cumulative distribution exactly. */
 static vec3 clearcoat_normal(const struct principled_point *s, double u0, double u1)
 {
 	double alpha = clearcoat_alpha(s->share[CLEARCOAT_GLOSS]), a2 = alpha * alpha;
@@ -339,7 +344,8 @@ static vec3 clearcoat_normal(const struct principled_point *s, double u0, double
 	return (vec3){sine * cos(phi), sine * sin(phi), sqrt(cos2)};
 }
 
-/* From above. false: this facet transmits nothing. */
+/* Samples wi of one lobe for wo above the surface. Returns false if wi is on the wrong side, or if the facet transmits
+ * nothing. */
 static bool sample_lobe(const struct principled_point *s, int lobe, vec3 wo, double eta, const double u[3], vec3 *wi)
 {
 	if (lobe == LOBE_DIFFUSE) {
@@ -429,11 +435,10 @@ static int read_index(struct principled *p, const struct scene_node *n, struct e
 	if (node_find(n, "eta") && node_find(n, "specular"))
 		return node_error(n, e, EINVAL, "eta and specular say the same thing; give one");
 	if (p->most[TRANSMISSION] > 0 && specular == 0)
-		specular = 1e-3; /* Mitsuba's, for the same reason as below */
+		specular = 1e-3; /* Mitsuba's minimum, for the same reason as that of eta below */
 	/* Burley 2012, section 5.5: 0.08 times `specular` is reflected at normal incidence. */
 	p->eta = node_find(n, "eta") ? node_float(n, "eta", 1.5) : 2 / (1 - sqrt(0.08 * specular)) - 1;
-	p->eta = fmax(p->eta,
-		      1 + 1e-3); /* Mitsuba's minimum, too: without a difference of indices nothing is refracted */
+	p->eta = fmax(p->eta, 1 + 1e-3); /* Mitsuba's minimum: without a difference of indices nothing is refracted */
 	return 0;
 }
 

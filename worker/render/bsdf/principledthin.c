@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The thin form of `principled`: a sheet without thickness, equal from both sides (Burley 2015, section 5.3; parameters
- * and defaults are those of Mitsuba 3's plug-in). With t = spec_trans, d = diff_trans / 2 and c = base_color,
+ * The thin form of `principled`: a sheet without thickness, the same on both sides (Burley 2015, section 5.3), with the
+ * parameters and defaults of Mitsuba 3's plug-in. With t = spec_trans, d = diff_trans / 2 and c = base_color,
  *
  *   reflected     t D G1 G1 F / 4 + (1 - t) (1 - d) (diffuse + sheen)
  *   transmitted   t c D' G1' G1' (1 - F) / 4 + (1 - t) d c / pi
  *
- * where transmitted light is reflected light mirrored to the other side, by facets D' with the roughness times 0.65 eta
- * - 0.35. Nothing is refracted: both sides have the same index.
+ * where transmitted light is modelled as reflected light mirrored to the other side, with facets D' whose roughness is
+ * multiplied by 0.65 eta - 0.35. Light is not refracted: both sides have the same index.
  *
- * A `diff_trans` outside [0, 2] or an `eta` outside [1, 10] is refused. A sample fails where the facet's direction is
+ * Creation fails if `diff_trans` is outside [0, 2] or `eta` outside [1, 10]. A sample fails if the facet's direction is
  * on the wrong side.
  */
 #include "worker/render/bsdf/principled.h"
@@ -26,9 +26,9 @@ enum { THIN_REFLECT, THIN_TRANSMIT, THIN_DIFFUSE, THIN_THROUGH, THIN_LOBES };
 
 struct thin {
 	struct principled p;
-	struct texture diff_trans; /* a number, `through`, if it has no ops */
-	double through;		   /* d of the header comment */
-	struct texture eta;	   /* a number, p.eta, if it has no ops */
+	struct texture diff_trans; /* without ops: the constant `through` is used instead */
+	double through;		   /* d of the comment at the top */
+	struct texture eta;	   /* without ops: the constant p.eta is used instead */
 };
 
 static double through_at(const struct thin *t, const struct bsdf_point *p)
@@ -46,13 +46,13 @@ static double passing_roughness(double eta, double roughness)
 	return (0.65 * eta - 0.35) * roughness;
 }
 
-/* A point of the surface, and a direction from it, whose side counts as the upper one. */
+/* A point of the surface, and the parameters for a direction from it, whose side counts as the upper one. */
 struct thin_point {
 	const struct thin *t;
 	struct principled_point s;
-	double spec_trans, through; /* t and d of the header comment */
+	double spec_trans, through; /* t and d of the comment at the top */
 	struct microfacet passing;  /* D' */
-	double chance[THIN_LOBES];  /* of sampling */
+	double chance[THIN_LOBES];  /* probability of sampling each lobe */
 };
 
 static void find_chances(struct thin_point *x, double cosine)
@@ -60,7 +60,8 @@ static void find_chances(struct thin_point *x, double cosine)
 	const struct thin *t = x->t;
 	double base = t->p.base_max, diffuse = 1 - x->spec_trans, sum = 0;
 	double reflected = fresnel_dielectric(min_of(cosine, 1), x->s.eta).reflected;
-	/* Facets reflect other shares than the plane they lie in, so neither lobe is ever left out. */
+	/* Facets reflect a different share than the plane of the surface, so neither lobe may have a probability of
+	 * 0. */
 	x->chance[THIN_REFLECT] = x->spec_trans * (0.25 + 0.5 * reflected);
 	x->chance[THIN_TRANSMIT] = x->spec_trans * base * (0.75 - 0.5 * reflected);
 	x->chance[THIN_DIFFUSE] = diffuse * (1 - x->through) * fmax(base, 0.2 * x->s.share[SHEEN]);
@@ -78,7 +79,7 @@ static struct thin_point thin_at(const struct bsdf *b, const struct bsdf_point *
 	x.through = t->diff_trans.ops ? through_at(t, p) : t->through;
 	if (t->eta.ops)
 		x.s.eta = eta_at(t, p);
-	/* Specular transmission is not what principled_diffuse leaves. */
+	/* principled_diffuse must not multiply by 1 - spec_trans: pair_of does. */
 	x.spec_trans = x.s.share[TRANSMISSION];
 	x.s.share[TRANSMISSION] = 0;
 	x.passing = principled_facets(x.s.share[ANISOTROPIC], passing_roughness(x.s.eta, x.s.roughness));
@@ -91,7 +92,7 @@ static vec3 facing_up(vec3 v)
 	return (vec3){v.x, v.y, fabs(v.z)};
 }
 
-/* The value and the density of one pair. */
+/* The value and the density for a pair of directions. */
 struct pair {
 	spectrum f;
 	double pdf;
@@ -162,7 +163,8 @@ static bool thin_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 	return pair.pdf > 0;
 }
 
-/* A texture's numbers end at 1; those of a checkerboard may be up to 2, as the parameter may. */
+/* The values of textures are limited to 1, except those of a checkerboard, which may go up to 2 like the parameter
+ * itself. */
 static int read_through(struct bsdf *b, struct thin *t, const struct scene_node *n, const struct bsdf_build *build,
 			struct error *e)
 {
@@ -179,7 +181,7 @@ static int read_through(struct bsdf *b, struct thin *t, const struct scene_node 
 	return most <= 2 ? 0 : node_error(n, e, ERANGE, "diff_trans=%g is outside [0, 2]", most);
 }
 
-/* p.eta becomes the smallest index, with which transmission is sharpest. */
+/* Reads eta. p.eta becomes the smallest index, at which transmission is sharpest. */
 static int read_index(struct bsdf *b, struct thin *t, const struct scene_node *n, const struct bsdf_build *build,
 		      struct error *e)
 {

@@ -5,7 +5,8 @@
 
 enum { SIDE = 16, STEPS = 1024 };
 
-/* The share of light from v that the boundary reflects to the same side: visible normals, by the midpoint rule. */
+/* Returns the share of light at an angle that the boundary reflects to the same side: the integral over visible
+ * normals, by the midpoint rule. */
 static double reflected_by(const struct microfacet *m, double eta, double cosine)
 {
 	double sum = 0;
@@ -59,7 +60,7 @@ static const struct boundary_table *find_table(const struct boundary_table *like
 	return NULL;
 }
 
-/* One of those that the scene has already, or a new one. NULL: out of memory. */
+/* Returns a table that the scene has already, or a new one. NULL if out of memory. */
 static const struct boundary_table *table_of(const struct rough_map *roughness, double eta,
 					     const struct bsdf_build *build)
 {

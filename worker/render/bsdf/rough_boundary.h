@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The rough boundary of a clear coating seen from outside, shared by `roughplastic` and `roughcoating`: that of
- * roughdielectric (Walter et al. 2007, eq. 20). Its transmittance, one minus what it reflects to the same side, is
- * tabulated over the cosine, and over the roughness if that comes from a texture, when the material is made: 5 ms a
- * roughness. Equal boundaries of a scene share a table. The roughness is isotropic. Private to worker/render/bsdf.
+ * The rough boundary of a clear coating seen from outside, shared by `roughplastic` and `roughcoating`. It reflects
+ * like that of `roughdielectric` (Walter et al. 2007, eq. 20). Its transmittance, one minus the share of light that it
+ * reflects to the same side, is tabulated over the cosine, and over the roughness if that comes from a texture. This
+ * takes 5 ms per roughness when the material is created. Equal boundaries of a scene share a table. The roughness is
+ * isotropic. Private to worker/render/bsdf.
  */
 #ifndef WORKER_RENDER_BSDF_ROUGH_BOUNDARY_H
 #define WORKER_RENDER_BSDF_ROUGH_BOUNDARY_H
@@ -13,17 +14,17 @@
 enum { BOUNDARY_NODES = 48, BOUNDARY_ROWS = 12 };
 
 struct boundary_row {
-	double transmitted[BOUNDARY_NODES]; /* from outside, at cosines (i / (BOUNDARY_NODES - 1))^2 */
-	double escape;			    /* twice the integral of that and the cosine over the cosine */
+	double transmitted[BOUNDARY_NODES]; /* of light from outside, at the cosines (i / (BOUNDARY_NODES - 1))^2 */
+	double escape; /* twice the integral of that transmittance times the cosine, over the cosine */
 };
 
 struct boundary_table {
 	bool ggx;
 	double eta;	    /* index below over index above */
-	double least, step; /* row i is for the smallest roughness times exp(i step) */
+	double least, step; /* row i has the roughness least * exp(i * step) */
 	int rows;
 	struct boundary_row *row;
-	struct boundary_table *next; /* of the scene */
+	struct boundary_table *next; /* the next table of the scene */
 };
 
 struct rough_boundary {
@@ -31,7 +32,7 @@ struct rough_boundary {
 	const struct boundary_table *table;
 };
 
-/* At a point of the surface. */
+/* The boundary at a point of the surface. */
 struct boundary_point {
 	const struct boundary_table *of;
 	struct microfacet facets;
@@ -39,7 +40,8 @@ struct boundary_point {
 	double rest; /* fraction towards the next row */
 };
 
-/* Reads alpha, alpha_u, alpha_v, distribution; sets b's texture flags and roughness. */
+/* Reads alpha, alpha_u, alpha_v and distribution; sets b's texture flags and roughness. -ENOTSUP if the roughness is
+ * anisotropic; -ENOMEM. */
 int rough_boundary_read(struct rough_boundary *r, double eta, struct bsdf *b, const struct scene_node *n,
 			const struct bsdf_build *build, struct error *e);
 #define ROUGH_BOUNDARY_PARAMS                                                                                  \
@@ -51,11 +53,12 @@ int rough_boundary_read(struct rough_boundary *r, double eta, struct bsdf *b, co
 	}
 
 struct boundary_point rough_boundary_at(const struct rough_boundary *r, const struct bsdf_point *p);
+/* Returns the share of light from outside, at this cosine, that the boundary transmits. */
 double boundary_transmitted(const struct boundary_point *at, double cosine);
-/* The share of diffuse light from inside that leaves, times eta^2. */
+/* Returns the share of diffuse light from inside that leaves, times eta^2. */
 double boundary_escape(const struct boundary_point *at);
 
-/* microfacet_reflect of this boundary. */
+/* Calls microfacet_reflect() with the facets and the index of this boundary. */
 double boundary_reflect(const struct boundary_point *at, vec3 wo, vec3 wi, double *pdf);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/bsdf/rough_map.h"
 
-/* The mean over the lanes: only colours that are no images differ in them. */
+/* Returns the mean over the lanes, which differ only for colours that are not images. */
 static double alpha_of(const struct texture *t, const struct bsdf_point *p)
 {
 	return t->ops ? spectrum_mean(texture_eval(t, &p->where, p->w)) : t->color.scale;

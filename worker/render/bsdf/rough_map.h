@@ -8,13 +8,14 @@
 
 struct rough_map {
 	struct microfacet
-		fixed; /* if it varies, for the smallest roughness that bsdf_probe finds; step sizes depend on it */
-	double most;   /* if it varies: the largest alpha_u found */
+		fixed; /* if `varies`, those of the smallest roughness that bsdf_probe finds: step sizes depend on it */
+	double most;   /* if `varies`: the largest alpha_u found */
 	bool varies;
-	struct texture u, v; /* if it varies */
+	struct texture u, v; /* if `varies`: the roughness along u and v */
 };
 
-/* Reads alpha, alpha_u, alpha_v, distribution. Sets b's texture flags and roughness. */
+/* Reads alpha, alpha_u, alpha_v and distribution. Sets b's texture flags and roughness. Returns 0 or a negative error
+ * code. */
 int rough_map_read(struct rough_map *r, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 		   struct error *e);
 #define ROUGH_MAP_NUMBER(name_)                                                                   \

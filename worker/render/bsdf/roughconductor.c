@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A rough metal on the side of the normal: Walter et al. 2007, eq. 20, visible normals sampled. */
+/* A rough metal that reflects on the side of the normal: Walter et al. 2007, eq. 20, sampled by visible normals. */
 #include "worker/render/bsdf/metal.h"
 #include "worker/render/bsdf/rough_map.h"
 
 struct roughconductor {
-	struct metal metal; /* first: if treated as smooth, the data is a conductor's */
+	struct metal metal; /* first: if created as smooth, the data is that of a `conductor` */
 	struct rough_map roughness;
 };
 
 /* The facet between two directions. */
 struct facet {
 	vec3 h;
-	double cosine; /* cosine of both to it */
+	double cosine; /* cosine of either direction to h */
 	double pdf;    /* D G1(wo) / 4 wo.z, the density of wi */
 };
 

@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A rough boundary between two transparent media: Walter et al. 2007, eqs. 19-21, with visible normals sampled, and the
- * mode chosen by the Fresnel factor at the microfacet. Everything is mirrored such that wo is on the side of the
- * normal.
+ * A rough boundary between two transparent media: Walter et al. 2007, eqs. 19-21. Sampling draws a visible normal and
+ * chooses between reflection and transmission by the Fresnel factor at that microfacet. Directions are mirrored such
+ * that wo is on the side of the normal.
  */
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/glass.h"
 #include "worker/render/bsdf/rough_map.h"
 
 struct roughdielectric {
-	struct glass glass; /* first: with equal indices the data is a smooth dielectric's */
+	struct glass glass; /* first: if created as smooth, the data is that of a `dielectric` */
 	struct rough_map roughness;
 };
 
@@ -23,8 +23,8 @@ struct facet {
 	double length;	     /* of wo + wi or wo + eta wi */
 };
 
-/* wo.z > 0. false: no facet connects the two. The Fresnel factors use both cosines: near the critical angle, one
- * alone says little about the other. */
+/* Finds the facet that scatters light between wo, with wo.z > 0, and wi. Returns false if there is none. The Fresnel
+ * factors are computed from both cosines: near the critical angle, neither determines the other precisely. */
 static bool facet_of(const struct microfacet *m, double eta, vec3 wo, vec3 wi, struct facet *f)
 {
 	bool reflect = wi.z > 0;
@@ -39,7 +39,7 @@ static bool facet_of(const struct microfacet *m, double eta, vec3 wo, vec3 wi, s
 	} else {
 		f->cos_o = vec3_dot(wo, f->h);
 		f->cos_i = vec3_dot(wi, f->h);
-		/* Facets must be seen from the same side as the surface. */
+		/* Both directions must see the facet from the same side as the surface. */
 		if (!(f->cos_o > 0 && f->cos_i < 0))
 			return false;
 		f->fresnel = fresnel_between(fmin(f->cos_o, 1), fmin(-f->cos_i, 1), eta);
@@ -48,7 +48,7 @@ static bool facet_of(const struct microfacet *m, double eta, vec3 wo, vec3 wi, s
 	return f->d > 0;
 }
 
-/* Cosine to h times the solid angle of h over that of wi. */
+/* Returns the cosine of wo to h times the solid angle of h over that of wi. */
 static double facet_spread(const struct facet *f, bool reflect)
 {
 	if (reflect)
@@ -62,7 +62,7 @@ static vec3 mirror(vec3 v, bool below)
 	return below ? (vec3){v.x, v.y, -v.z} : v;
 }
 
-/* The factor from Fresnel and from the transport mode. */
+/* Returns the Fresnel factor, with the reflectance or transmittance and the scaling of radiance. */
 static spectrum fresnel_factor(const struct roughdielectric *r, const struct bsdf_point *p, const struct facet *f,
 			       bool reflect, enum transport transport)
 {
@@ -72,7 +72,7 @@ static spectrum fresnel_factor(const struct roughdielectric *r, const struct bsd
 	return spectrum_scale(f->fresnel.transmitted * scale, texture_eval(&r->glass.transmittance, &p->where, p->w));
 }
 
-/* G1(wi) / |wi.z| on either side. */
+/* Returns G1(wi) / |wi.z| for wi on either side. */
 static double g1_over_cos(const struct microfacet *m, vec3 wi)
 {
 	return microfacet_g1_over_cos(m, (vec3){wi.x, wi.y, fabs(wi.z)});
@@ -90,7 +90,7 @@ static double facet_pdf(const struct facet *f, vec3 wi)
 	return f->d * facet_spread(f, wi.z > 0) * (wi.z > 0 ? f->fresnel.reflected : f->fresnel.transmitted);
 }
 
-/* Mirrored such that wo is on the side of the normal. */
+/* Calls facet_of() for directions on any side; mirrors *wi such that wo is on the side of the normal. */
 static bool facet_between(const struct bsdf *b, const struct microfacet *m, const struct bsdf_point *p, vec3 wo,
 			  vec3 *wi, struct facet *f)
 {
@@ -108,7 +108,8 @@ static spectrum roughdielectric_eval(const struct bsdf *b, const struct bsdf_poi
 	return facet_between(b, &m, p, wo, &wi, &f) ? facet_f(r, &m, p, &f, wi) : spectrum_of(0);
 }
 
-/* Without the solid angle of h over that of wi or its inverse, which diverge or vanish as eta approaches 1. */
+/* The solid angle of h over that of wi has been cancelled with its inverse: they diverge or vanish as eta approaches
+ * 1. */
 static spectrum roughdielectric_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
 	const struct roughdielectric *r = b->data;

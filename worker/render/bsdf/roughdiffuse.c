@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A matte surface of grooves, on the side of the normal: Oren and Nayar 1994, eq. 30 and 31, or with use_fast_approx
- * the first two terms (their sec. 4.4). sigma, the standard deviation of slopes, is alpha over the root of two, so that
- * alpha means the same as for Beckmann facets.
+ * A matte surface of V-shaped grooves that reflects on the side of the normal: Oren and Nayar 1994, eqs. 30 and 31, or
+ * only the first two terms with use_fast_approx (their sec. 4.4). sigma, the standard deviation of slopes, is alpha /
+ * sqrt(2), so that alpha means the same as for Beckmann facets.
  */
 #include "worker/render/bsdf/create.h"
 #include "worker/render/bsdf/diffuse.h"
@@ -11,13 +11,13 @@
 #include <float.h>
 
 struct grooves {
-	double a, b, c, d; /* C1, C2, C3 and the factor of light that bounces twice */
+	double a, b, c, d; /* C1, C2, C3, and the factor of light that is reflected twice */
 };
 
 struct roughdiffuse {
 	struct texture reflectance, alpha;
 	bool fast;
-	struct grooves known; /* unless alpha is a texture */
+	struct grooves known; /* valid unless alpha is a texture */
 };
 
 static struct grooves grooves_of(double alpha, bool fast)
@@ -37,13 +37,13 @@ static double cube(double x)
 	return x * x * x;
 }
 
-/* x / y > 0, which exceeds all numbers where both directions graze the surface by less than 1e-308. */
+/* Returns x / y > 0, limited to DBL_MAX: it overflows if y, the cosine of a grazing direction, is nearly 0. */
 static double ratio(double x, double y)
 {
 	return fmin(x / y, DBL_MAX);
 }
 
-/* Factors of the reflectance and of its square, times pi. */
+/* Computes the factors of f = (once rho + twice rho^2) / pi, with the reflectance rho. */
 static void factors(const struct grooves *r, vec3 wo, vec3 wi, double *once, double *twice)
 {
 	double so = sqrt(fmax(1 - wo.z * wo.z, 0)), si = sqrt(fmax(1 - wi.z * wi.z, 0)), s = so * si;

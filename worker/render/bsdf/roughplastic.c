@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A diffuse base under a rough clear coating, on the side of the normal: coating.h, with the boundary of
+ * A diffuse base under a rough clear coating, which reflects on the side of the normal: coating.h with the boundary of
  * rough_boundary.h.
  */
 #include "worker/render/bsdf/coating.h"
@@ -57,7 +57,7 @@ static int roughplastic_create(struct bsdf *b, const struct scene_node *n, const
 {
 	struct roughplastic *r = b->data;
 	int code = coating_read(&r->coating, b, n, build, e);
-	/* A diffuse base gains nothing from an exact mirror above it: the coating stays rough, however smooth it is. */
+	/* least_roughness does not apply: an exact mirror above a diffuse base has no advantage. */
 	if (!code)
 		code = rough_boundary_read(&r->boundary, r->coating.eta, b, n, build, e);
 	if (code)

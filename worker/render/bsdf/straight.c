@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A specular lobe that lets light through without bending it, all that a filter does not absorb: the only lobe of
- * `null`, `polarizer`, `circular` and `retarder`, and the holes of a `mask`. A path counts one more edge for it.
- * Connections look through (path/transparent.h).
+ * A specular lobe that lets light pass without refraction, except for the share that a filter absorbs: the only lobe of
+ * `null`, `polarizer`, `circular` and `retarder`, and the holes of a `mask`. It counts as an edge of the path.
+ * Connections look through it (path/transparent.h).
  *
- * Light is unpolarised here. As in the unpolarised modes of Mitsuba, both polarizers then let half of it through, at
- * any angle to each other, and a retarder all of it.
+ * Light is treated as unpolarised. As in Mitsuba's unpolarised modes, each polarizer therefore transmits half of the
+ * light, whatever the angle between two of them, and a retarder transmits all of it.
  */
 #include "worker/render/bsdf/create.h"
 
@@ -13,10 +13,10 @@
 
 struct filter {
 	struct texture transmittance;
-	double share; /* that it lets through, times the texture */
+	double share; /* share of light that passes, a factor of the texture */
 };
 
-/* 1 / |wo.z| must be finite. */
+/* Returns false if 1 / |wo.z| is not finite. */
 static bool straight_direction(vec3 wo, vec3 *wi)
 {
 	*wi = vec3_neg(wo);

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * "tensor_file" and a 0, the version as two bytes, the number of arrays (32 bits); then for each array the length of
- * its name (16), the name, the number of dimensions (16), the type (8), where it begins in the file (64), and its sizes
- * (64 each). Little-endian.
+ * The format: "tensor_file" and a 0, the version (two bytes), the number of arrays (32 bits); then for each array the
+ * length of its name (16 bits), the name, the number of dimensions (16), the type (8), the offset of the numbers in the
+ * file (64), and the sizes (64 each). Little-endian.
  *
- * Failures: see tensor_find. Nothing in the file is believed before it is compared with what is left of it.
+ * Failures: see tensor_find. Every length and offset is checked against the size of the file before it is used.
  */
 #include "worker/render/bsdf/tensor.h"
 
@@ -21,7 +21,7 @@ static unsigned width_of(unsigned type)
 	return type <= TYPES ? widths[type] : 0;
 }
 
-/* `at`: where its type stands. */
+/* Reads the header of an array; at: offset of its type. */
 static int read_array(const unsigned char *file, size_t size, size_t at, unsigned dimensions, struct tensor *out)
 {
 	*out = (struct tensor){.type = file[at], .dimensions = dimensions, .count = 1};

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Reading the arrays of measured materials from a file of them (tensor.h) for a node of the scene. Functions return 0,
- * or a negative error code with a sentence in in->error that names the file and the array. They allocate from the
- * arena, and never more than the file is long, times a small number. One thread.
+ * Reads the arrays of measured materials from a tensor file (tensor.h) for a node of the scene. Functions return 0, or
+ * a negative error code with a sentence in in->error that names the file and the array. They allocate from the arena,
+ * at most a small multiple of the size of the file. One thread.
  */
 #ifndef WORKER_RENDER_BSDF_TENSOR_INPUT_H
 #define WORKER_RENDER_BSDF_TENSOR_INPUT_H
@@ -20,26 +20,31 @@ struct tensor_input {
 	struct error *error;
 };
 
-/* The sentence "FILE: NAME WHAT". Returns -code. */
+/* Sets the error to the sentence "FILE: NAME WHAT". Returns -code. */
 int tensor_fault(const struct tensor_input *in, int code, const char *name, const char *what);
 
-/* An array of this type and number of dimensions, of sides from 1 to 65,536. -EINVAL, -ENOTSUP. */
+/* Finds an array of the given type and number of dimensions, with sides from 1 to 65,536. Returns 0, -EINVAL or
+ * -ENOTSUP. */
 int tensor_input_find(const struct tensor_input *in, const char *name, enum tensor_type type, unsigned dimensions,
 		      struct tensor *out);
 
-/* Number i of an array of TENSOR_FLOATS or TENSOR_SHORTS. */
+/* Returns number i of an array of TENSOR_FLOATS or TENSOR_SHORTS. */
 double tensor_value(const struct tensor *t, uint64_t i);
-/* The same for floats that may be anything. By its bits: NaNs that signal must not be compared. */
-bool tensor_is_usable(const struct tensor *t, uint64_t i); /* finite, and at most TENSOR_NUMBER_MAX */
+/* Returns whether number i is finite and at most TENSOR_NUMBER_MAX in magnitude. Finite is tested by the bits, since
+ * comparing a signalling NaN would trap. */
+bool tensor_is_usable(const struct tensor *t, uint64_t i);
 
+/* Returns 0 if all numbers of t are usable, otherwise -EINVAL. */
 int tensor_check_finite(const struct tensor_input *in, const struct tensor *t, const char *name);
-/* All numbers, as doubles. NULL in *out if the code is not 0. */
+/* Converts all numbers to doubles in *out, or sets it to NULL and returns -EINVAL or -ENOMEM. */
 int tensor_numbers(const struct tensor_input *in, const struct tensor *t, const char *name, double **out);
-/* Numbers that ascend, from an array of one dimension, or of two if the first side is 1. */
+/* Reads strictly ascending numbers from an array of one dimension, or of two if the first size is 1. Returns 0,
+ * -EINVAL, -ENOTSUP or -ENOMEM. */
 int tensor_axis(const struct tensor_input *in, const char *name, enum tensor_type type, unsigned dimensions,
 		uint32_t *count, const double **at);
 
-/* What each wavelength adds to R, G and B under D65, for values that are linear between them and the same beyond. */
+/* Computes the weight of each wavelength in R, G and B under D65, for spectra that are linear between the wavelengths
+ * and constant beyond. -ENOMEM. */
 int tensor_rgb_weights(const struct tensor_input *in, const double *nm, uint32_t count, double (**out)[3]);
 
 #endif

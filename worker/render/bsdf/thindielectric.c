@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A sheet of glass without thickness: light that enters passes straight through, with all reflections between its two
- * sides (R' = 2 R / (1 + R) where R is the Fresnel share at one side, as in Mitsuba). Transmission is not refracted:
- * eta is 1.
+ * A sheet of glass without thickness: light that enters passes straight through. All reflections between the two sides
+ * are included: the sheet reflects R' = 2 R / (1 + R), with R the Fresnel reflectance of one side, as in Mitsuba.
+ * Transmitted light is not refracted: b->eta is 1.
  */
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/ior.h"
@@ -13,10 +13,10 @@
 
 struct thin {
 	struct texture reflectance, transmittance;
-	double eta; /* of the glass over that of its surroundings */
+	double eta; /* index of the glass over that of its surroundings */
 };
 
-/* 2 R / (1 + R) and (1 - R) / (1 + R); neither loses precision where it is small. */
+/* Returns 2 R / (1 + R) and (1 - R) / (1 + R); neither loses precision if it is small. */
 static struct fresnel fresnel_of_sheet(const struct thin *t, vec3 wo)
 {
 	struct fresnel f = fresnel_dielectric(fmin(fabs(wo.z), 1), t->eta);

@@ -1,23 +1,23 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A BSDF in a shading frame that is turned against the surface's. With wo' and wi' the directions in that frame, light
- * is scattered as by f(wo', wi') |wi'.z|, as if the surface had its normal; so in the surface's frame f is that over
- * |wi.z|. This is not reciprocal. Importance is radiance the other way round: there the cosines are those of wo.
- * Directions that are on different sides in the two frames are black. Densities are per solid angle, which turning
- * keeps. It has no form of its own for half vectors, since its lobe does not lie around those of the surface.
+ * A BSDF in a shading frame that is rotated relative to that of the surface. With wo' and wi' the directions in that
+ * frame, light is scattered by f(wo', wi') |wi'.z|, as if the surface had the frame's normal; in the surface's frame f
+ * is this value over |wi.z|. It is not reciprocal. Importance is radiance with the directions exchanged, so its cosines
+ * are those of wo. f is 0 if a direction is on different sides in the two frames. Densities are per solid angle, which
+ * rotation preserves. There is no eval_halfvec, since the lobe is not centred on half vectors of the surface.
  */
 #include "worker/render/bsdf/tilted.h"
 
 #include "worker/render/bsdf/create.h"
 
-/* What a part sees. */
+/* The point and the frame that a part with its own relief sees. */
 struct view {
 	struct frame frame;
 	struct bsdf_point p;
 	struct relief_place outer;
 };
 
-/* The shading frame of a part within this part, in the coordinates of `frame`. */
+/* Returns the shading frame of a part nested in this part, in the coordinates of `frame`. */
 static struct frame frame_inside(const void *point, const struct relief *r)
 {
 	const struct view *v = point;
@@ -41,7 +41,7 @@ static bool same_side(vec3 a, vec3 b)
 	return a.z * b.z > 0;
 }
 
-/* The factor that converts f from the inner frame to the outer one; 0 where it is black. */
+/* Returns the factor that converts f from the inner frame to the outer one; 0 if f is 0. */
 static double factor(const struct bsdf_point *p, vec3 wo, vec3 wi, vec3 wo_in, vec3 wi_in)
 {
 	if (!same_side(wo, wo_in) || !same_side(wi, wi_in))
@@ -92,7 +92,7 @@ static const struct bsdf_ops tilted_ops = {
 	.sample = tilted_sample,
 };
 
-/* Light that passes straight on does so whatever the normal is. */
+/* Returns whether a part depends on the shading normal: light that passes straight through does not. */
 static bool needs_normal(const struct bsdf *part)
 {
 	return part->has_smooth || (part->has_delta && !(part->only_straight && !(part->modes & BSDF_REFLECT)));

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* One or two opaque BSDFs: the first on the side of the normal, the second (or the first again) on the other. */
+/* One or two opaque BSDFs: the first on the side of the normal, the second (or the first again) on the other side. */
 #include "worker/render/bsdf/twosided.h"
 #include "worker/render/bsdf/create.h"
 #include "worker/render/bsdf/tilted.h"
@@ -15,7 +15,7 @@ static vec3 mirror(vec3 v)
 	return (vec3){v.x, v.y, -v.z};
 }
 
-/* In mirrored coordinates. */
+/* Returns a shading frame in coordinates mirrored at the surface. */
 static struct frame mirrored_frame(const void *front, const struct relief *r)
 {
 	const struct relief_place *place = front;
@@ -23,7 +23,8 @@ static struct frame mirrored_frame(const void *front, const struct relief *r)
 	return (struct frame){mirror(f.s), mirror(f.t), vec3_neg(mirror(f.n))};
 }
 
-/* The point for the BSDF of the back, which sees all from the other side: p, or made in q, which must live as long. */
+/* Returns the point for the BSDF of the back, which sees everything mirrored: p itself, or q if frames have to be
+ * mirrored; q must outlive the result. */
 static const struct bsdf_point *from_back(const struct bsdf *b, const struct bsdf_point *p, struct bsdf_point *q)
 {
 	if (!b->uses_place || !p->place.frame)
@@ -114,7 +115,7 @@ static int twosided_create(struct bsdf *b, const struct scene_node *n, const str
 		int code = bsdf_create(&t->side[i], inner, build, e);
 		if (code)
 			return code;
-		/* For a BSDF that has two sides already, both sides show its front. */
+		/* An opaque BSDF that is already two-sided shows its front on both sides. */
 		if (t->side[i].modes & BSDF_TRANSMIT)
 			return node_error(inner, e, EINVAL,
 					  "\"%s\" transmits light; twosided only accepts opaque BSDFs", inner->type);
@@ -137,7 +138,7 @@ static int twosided_create(struct bsdf *b, const struct scene_node *n, const str
 	}
 	if (!b->has_smooth)
 		b->alpha = 0;
-	/* Nothing is known about the side that light comes from: both count the same. */
+	/* The side from which light arrives is not known: both sides count the same. */
 	int smooth = t->side[0].has_smooth + t->side[1].has_smooth;
 	b->alpha_mean = smooth ? (t->side[0].alpha_mean + t->side[1].alpha_mean) / smooth : 0;
 	return 0;

@@ -5,9 +5,9 @@
 
 #include "worker/render/bsdf/bsdf.h"
 
-/* Makes an opaque BSDF scatter on its back as on its front, unless backs are to be black. Mitsuba leaves them black;
- * some public scenes in its language are written for renderers that do not (the walls of `cornell-box` face outwards).
- */
+/* Makes an opaque BSDF scatter on its back as on its front, unless build->black_backs is set. Backs are black in
+ * Mitsuba, but some public scenes in its format are written for renderers in which they are not (the walls of
+ * `cornell-box` face outwards). -ENOMEM. */
 int bsdf_mirror_back(struct bsdf *b, const struct bsdf_build *build, struct error *e);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* From the unit square to directions around +z. */
+/* Mappings from the unit square to directions around +z. */
 #ifndef WORKER_RENDER_BSDF_WARP_H
 #define WORKER_RENDER_BSDF_WARP_H
 
@@ -7,7 +7,8 @@
 
 #define WARP_PI 3.14159265358979323846
 
-/* Cosine-distributed, by the concentric map of Shirley and Chiu 1997, which preserves neighbourhoods. z may be 0. */
+/* Returns a cosine-distributed direction by the concentric map of Shirley and Chiu 1997, which maps neighbouring points
+ * to neighbouring directions. z may be 0. */
 static inline vec3 warp_cosine_hemisphere(double u0, double u1)
 {
 	double a = 2 * u0 - 1, b = 2 * u1 - 1, r, phi;

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Every density is scaled to an integral of 1 before densities are mixed, so a mixture's integral is 1, and its
- * cumulative distributions are the mixtures of theirs: nothing is stored for parameters between the given ones.
+ * Every density is scaled to an integral of 1 before densities are mixed, so the integral of a mixture is 1, and its
+ * cumulative distributions are mixtures of those of the slices. Nothing has to be stored for parameters between the
+ * given values.
  *
  * Failures: see warp_table_make.
  */
@@ -41,7 +42,7 @@ struct warp_mix warp_mix_at(const struct warp_axes *axes, const double parameter
 	return mix;
 }
 
-/* Scales the slice's values, and sums them up. */
+/* Scales the values of a slice to an integral of 1, and computes their cumulative sums. */
 static int make_slice(uint32_t width, uint32_t height, double *value, double *below_node, double *below_row)
 {
 	double sum = 1, before = 0;
@@ -87,7 +88,7 @@ int warp_table_make(struct warp_table *t, uint32_t slices, uint32_t width, uint3
 	return 0;
 }
 
-/* Numbers of one node or row, mixed. stride: what a slice takes. */
+/* Returns the mixture of the slices' entries i of a table; stride: number of entries per slice. */
 static double mix_slices(const struct warp_mix *mix, const double *table, size_t stride, size_t i)
 {
 	double sum = 0;
@@ -96,7 +97,7 @@ static double mix_slices(const struct warp_mix *mix, const double *table, size_t
 	return sum;
 }
 
-/* A row between two of the grid's, and the mixture. */
+/* A row of the mixture, between two rows of the grid. */
 struct row {
 	const struct warp_table *t;
 	const struct warp_mix *mix;
@@ -110,13 +111,14 @@ static double row_mixed(const struct row *r, const double *table, uint32_t x)
 	return near + r->y.part * (far - near);
 }
 
-/* The integral over x at grid row y. */
+/* Returns the integral over x along row y of the grid. */
 static double row_total(const struct warp_table *t, const struct warp_mix *mix, uint32_t y)
 {
 	return mix_slices(mix, t->below_node, (size_t)t->width * t->height, (size_t)y * t->width + t->width - 1);
 }
 
-/* Where the integral of a density that goes from a to b across a cell of width 1 is `area`. */
+/* Returns the position in a cell of width 1 at which the integral of a density that changes linearly from a to b is
+ * `area`. */
 static double cross(double a, double b, double area)
 {
 	double root = a + sqrt(max_of(a * a + 2 * (b - a) * area, 0));
