@@ -1,24 +1,27 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The pinhole and the lens in the camera's frame: right, down, forward. A camera with a projection of its own
- * (projection.h) leaves directions, film points and density to it. camera_init refuses what is singular, out of range
- * or too far away; nothing else fails.
+ * Implements the pinhole and the lens in the camera's frame: right, down, forward. A camera with its own projection
+ * (projection.h) delegates directions, film points and densities to it.
+ *
+ * camera_init fails if the transform is singular, a parameter is out of range, or the camera is too far away; nothing
+ * else fails.
  */
 #include "worker/render/camera/camera.h"
 
 #include "worker/render/camera/projection.h"
 #include "worker/render/scene/fov.h"
 
-/* Pixels per unit of slope: the same for both axes, so `smaller` and the like only choose which side the angle
- * spans. */
+/* Returns the pixels per unit of slope. They are the same for both axes, so fov_axis only chooses the side of the film
+ * that the field of view spans. */
 static double pixels_per_slope(const struct scene_settings *s)
 {
 	return fov_side(s->fov_axis, s->width, s->height) / (2 * tan(s->fov * (M_PI / 360)));
 }
 
-/* An orthographic camera is a pinhole so far behind the scene that objects twice as far away look smaller by 2^-20
- * only: a thousandth of a pixel in a film of 1,000. A telecentric camera is a lens at that distance; a point of the
- * plane of focus sees it under the same solid angle as the real aperture. */
+/* Moves an orthographic camera, which is a pinhole, so far back that objects at twice the distance look smaller by
+ * 2^-20 only, or a thousandth of a pixel in a film of 1,000. A telecentric camera is a lens at that distance; its
+ * aperture is enlarged so that a point in the plane of focus sees it under the same solid angle as the real
+ * aperture. */
 static void step_back(struct camera *c, double half_width)
 {
 	double distance = 0x1p20 * fmax(1, half_width);
@@ -32,7 +35,7 @@ static void step_back(struct camera *c, double half_width)
 	}
 }
 
-/* A mirrored transform gives a mirrored image, as in Mitsuba: the axes are used unchanged. */
+/* The axes are used as they are: a transform that mirrors gives a mirrored image, as in Mitsuba. */
 static struct frame axes_of(const mat4 *m)
 {
 	return (struct frame){vec3_neg(vec3_normalize(mat4_vector(m, (vec3){1, 0, 0}))),
@@ -100,10 +103,10 @@ void camera_force_aperture(struct camera *c, bool on)
 	if (!on)
 		c->aperture = 0;
 	else if (!(c->focus > 0))
-		c->focus = 1; /* any value: no point is off the centre */
+		c->focus = 1; /* any value will do: every point is at the centre */
 }
 
-/* The unit square onto the unit disk: concentric squares become circles, areas keep their ratios. */
+/* Maps the unit square to the unit disk: concentric squares become circles, and ratios of areas are preserved. */
 static void disk_from_square(const double u[2], double *x, double *y)
 {
 	double a = 2 * u[0] - 1, b = 2 * u[1] - 1;
@@ -123,7 +126,7 @@ static void square_from_disk(double x, double y, double u[2])
 		u[i] = fmin(fmax(0.5 * (a[i] + 1), 0), 1 - 0x1p-53);
 }
 
-/* On the aperture: x_k minus the centre, along the image's axes. */
+/* Computes the offset of x_k from the centre of the aperture, along the axes of the image. */
 static void aperture_offset(const struct camera *c, vec3 x_k, double *x, double *y)
 {
 	vec3 offset = vec3_sub(x_k, c->position);

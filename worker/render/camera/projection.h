@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Cameras that do not throw a plane onto the film: how directions in the camera's frame (right, down, forward) and film
- * points belong together, one to one. A pinhole each. Private to worker/render/camera. Pure; any thread.
+ * Projections of pinhole cameras other than onto a plane: one-to-one maps between directions in the camera's frame
+ * (right, down, forward) and film points. Private to worker/render/camera. Pure; any thread.
  */
 #ifndef WORKER_RENDER_CAMERA_PROJECTION_H
 #define WORKER_RENDER_CAMERA_PROJECTION_H
@@ -11,19 +11,21 @@
 struct camera;
 
 struct camera_projection {
-	bool all_around; /* it looks backwards, too, and has no clipping planes */
-	/* -EINVAL with a sentence; NULL: nothing is to be done. */
+	bool all_around; /* the camera sees all directions, and has no clipping planes */
+	/* Reads parameters into c. Returns 0, or -EINVAL with a sentence. NULL: no parameters. */
 	int (*init)(struct camera *c, const struct scene_settings *s, struct error *e);
-	/* The direction in which a film point looks, not normalised; false: the projection has no such point. */
+	/* Computes the direction that a film point sees, not normalised. Returns false if it sees none. */
 	bool (*direction)(const struct camera *c, double film_x, double film_y, vec3 *l);
-	/* The film point of a unit direction; false: it has none. */
+	/* Computes the film point that sees a unit direction. Returns false if there is none. */
 	bool (*project)(const struct camera *c, vec3 l, double *film_x, double *film_y);
+	/* Returns the pixel area per solid angle at a unit direction. */
 	double (*jac_film_from_solid)(const struct camera *c, vec3 l);
-	/* Unit tangents along which l moves with film_x and film_y, and by how much a pixel; NULL: as on a plane. */
+	/* Computes the unit tangents along which l moves with film_x and film_y, and the rates per pixel. NULL: as on a
+	 * plane. */
 	void (*pixel)(const struct camera *c, vec3 l, vec3 tangent[2], double rate[2]);
 };
 
-/* NULL: onto a plane, without one. */
+/* Returns NULL for the projection onto a plane. */
 const struct camera_projection *camera_projection_of(enum scene_projection p);
 
 #endif

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * `perspective_rdist` of 0.5/0.6: a pinhole whose image is distorted about its axis. What `perspective` shows at the
- * slope r from the axis is at
+ * `perspective_rdist` of 0.5/0.6: a pinhole with radial distortion. A point that `perspective` images at the slope r
+ * from the axis is imaged at the slope
  *
  *     d(r) = r (1 + kc_0 r^2 + kc_1 r^4),
  *
- * in the same direction. There are d(r) d'(r) / r times as many pixels per solid angle. Where d' reaches 0 the image
- * would fold over: it ends there, and a film that goes on is refused.
+ * in the same direction from the axis. The pixels per solid angle are d(r) d'(r) / r times those of `perspective`.
+ * Beyond the slope at which d' is 0 the image would fold over: it ends there, and a film that reaches further is
+ * refused.
  */
 #include "worker/render/camera/camera.h"
 #include "worker/render/camera/projection.h"
@@ -21,13 +22,13 @@ static double derivative(const struct camera *c, double r2)
 	return 1 + r2 * (3 * c->kc[0] + 5 * r2 * c->kc[1]);
 }
 
-/* The least positive r2 at which the derivative is 0. */
+/* Returns the smallest positive r2 at which the derivative is 0; INFINITY if there is none. */
 static double fold_radius(const struct camera *c)
 {
 	double a = 5 * c->kc[1], b = 3 * c->kc[0], root = b * b - 4 * a;
 	if (!(root >= 0))
 		return INFINITY;
-	/* Both roots are 2 / (-b -+ sqrt(root)); no cancellation matters for where an image ends. */
+	/* Both roots are 2 / (-b -+ sqrt(root)); cancellation does not matter for the edge of an image. */
 	double one = 2 / (-b - sqrt(root)), other = 2 / (-b + sqrt(root));
 	double least = fmin(one > 0 ? one : INFINITY, other > 0 ? other : INFINITY);
 	return least;
@@ -54,7 +55,7 @@ static bool direction(const struct camera *c, double film_x, double film_y, vec3
 		*l = (vec3){0, 0, 1};
 		return true;
 	}
-	/* Newton's steps, kept between what is too small and what is too large. */
+	/* Newton's method, kept inside the bracket [low, high]. */
 	double low = 0, high = isfinite(c->fold) ? sqrt(c->fold) : 2 * d, r = fmin(d, high);
 	while (!isfinite(c->fold) && high * radial_factor(c, high * high) < d)
 		high *= 2;

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * `spherical` of 0.5/0.6: everything around a point, by longitude and latitude. With u and v from 0 to 1 over the film,
- * phi = 2 pi u and theta = pi v, it looks along (sin phi sin theta, cos theta, -cos phi sin theta) in Mitsuba's axes
- * (left, up, forward), as `envmap` has it: to_world's +z is in the middle. W H pixels for 2 pi^2 of phi and theta are
- * W H / (2 pi^2 sin theta) pixels per solid angle.
+ * `spherical` of 0.5/0.6: a panorama of all directions, by longitude and latitude. With u and v from 0 to 1 over the
+ * film, phi = 2 pi u and theta = pi v, a film point sees the direction (sin phi sin theta, cos theta, -cos phi sin
+ * theta) in Mitsuba's axes (left, up, forward), as `envmap` has it: to_world's +z is in the middle. W H pixels for 2
+ * pi^2 of phi and theta are W H / (2 pi^2 sin theta) pixels per solid angle.
  *
- * A film point beyond an edge would be a second one for a direction, so there is none: filters reach around
- * (worker/render/film/sums.h).
+ * Film points beyond an edge see no direction, since each direction would have a second film point otherwise. Filters
+ * wrap around at the edges instead (worker/render/film/sums.h).
  */
 #include "worker/render/camera/camera.h"
 #include "worker/render/camera/projection.h"

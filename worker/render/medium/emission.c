@@ -27,7 +27,7 @@ spectrum emission_even(const struct emission *g, const struct wavelengths *w)
 	return spectrum_scale(g->per_length, color_eval(&g->radiance.color, w));
 }
 
-/* In proportion to the mean of the channels. */
+/* Samples t in proportion to the mean of the channels. */
 static bool sample_grid(const struct emission *g, const struct grid_ray *r, double u, const struct wavelengths *w,
 			double *t, spectrum *l)
 {

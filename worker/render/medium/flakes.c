@@ -7,13 +7,13 @@
 #include <math.h>
 #include <string.h>
 
-/* Areas, squared; and what counts as a matrix of zeros. */
+/* The largest number of a matrix, which is a squared area; and the smallest trace of a matrix that is not 0. */
 #define LARGEST 1e12
 #define SMALLEST 1e-30
-/* A matrix may fail to be positive definite by this share of its trace, as matrices stored in bytes do. */
+/* An eigenvalue may be negative by this share of the trace, owing to rounding in matrices stored as bytes. */
 #define ROUNDED 0.01
 
-/* The smallest eigenvalue, in closed form (Smith 1961, Eigenvalues of a Symmetric 3 x 3 Matrix). */
+/* Returns the smallest eigenvalue, in closed form (Smith 1961, Eigenvalues of a Symmetric 3 x 3 Matrix). */
 static double least_eigenvalue(const double s[FLAKES_NUMBERS])
 {
 	double mean = (s[0] + s[1] + s[2]) / 3, x = s[0] - mean, y = s[1] - mean, z = s[2] - mean;
@@ -25,7 +25,8 @@ static double least_eigenvalue(const double s[FLAKES_NUMBERS])
 	return mean + 2 * p * cos(acos(cosine) / 3 + 2 * M_PI / 3);
 }
 
-/* Makes a matrix definite enough. false: it is not nearly. */
+/* Raises the eigenvalues of a matrix to at least FLAKES_LEAST times the trace. Returns false if the matrix is not
+ * positive definite even within rounding. */
 static bool make_definite(double s[FLAKES_NUMBERS])
 {
 	double trace = s[0] + s[1] + s[2];
@@ -49,7 +50,7 @@ static int refuse(const struct scene_node *n, const double s[FLAKES_NUMBERS], st
 			  s[2], s[3], s[4], s[5]);
 }
 
-/* From six channels into two grids of three. */
+/* Splits six channels into two grids of three. */
 static int split(struct flakes *f, const struct scene_node *n, const struct grid_file *file, struct arena *arena,
 		 struct error *e)
 {

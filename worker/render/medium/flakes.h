@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The matrices of SGGX microflakes (phase_sggx.c): symmetric and positive definite, as xx yy zz xy xz yz in the world's
- * axes, the same everywhere or linear between the points of a grid. Immutable after creation; any thread.
+ * The matrices of SGGX microflakes (phase_sggx.c): symmetric and positive definite, stored as xx yy zz xy xz yz in
+ * world axes, constant or linear between the points of a grid. Immutable after creation; any thread.
  */
 #ifndef WORKER_RENDER_MEDIUM_FLAKES_H
 #define WORKER_RENDER_MEDIUM_FLAKES_H
@@ -10,19 +10,22 @@
 
 enum { FLAKES_NUMBERS = 6 };
 
-/* The smallest eigenvalue of a matrix is raised to this share of its trace: flakes are rough by 0.001 at least. */
+/* The smallest eigenvalue of a matrix is raised to this share of its trace, which gives flakes a roughness of at least
+ * 0.001. */
 #define FLAKES_LEAST 1e-6
 
 struct flakes {
-	double even[FLAKES_NUMBERS];
+	double even[FLAKES_NUMBERS]; /* the matrix at all places, unless uneven */
 	bool uneven;
-	struct grid grid[2]; /* if uneven, of three channels each: see struct grid.area */
+	struct grid grid[2]; /* if uneven, two grids of three channels: see struct grid.area */
 };
 
-/* Reads the property `S` of node n. Where the matrix of a grid's point is 0, there are no flakes. -EINVAL, -ERANGE: not
- * six numbers, too large ones, a matrix that is not positive definite; those of the file. */
+/* Reads the property `S` of node n. A matrix of 0 at a point of a grid means that there are no flakes. Returns 0 or a
+ * negative error code: -EINVAL if there are not six numbers or a matrix is not positive definite, -ERANGE if a number
+ * is too large, or the code of reading the file. */
 int flakes_create(struct flakes *f, const struct scene_node *n, const struct volume_build *build, struct error *e);
 
+/* Computes the matrix at a point of the world. */
 void flakes_at(const struct flakes *f, vec3 at, double s[FLAKES_NUMBERS]);
 
 #endif

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Reads a medium in any of the ways of both dialects into two volumes of coefficients, and answers for a place, a
- * wavelength or a part of a ray from these.
+ * Reads a medium, given in any of the ways of both dialects, into two volumes of coefficients, and evaluates these at
+ * points, at wavelengths and along segments of rays.
  *
- * Failures have the node's place: parameters of two ways, a name of no material, a `g` where it means nothing.
+ * Creation fails, with the position of the node, if coefficients are given in two ways, if no material has the given
+ * name, or if `g` has no meaning.
  */
 #include "worker/render/medium/medium.h"
 
@@ -15,7 +16,7 @@
 #define COEFFICIENT VALUE_COLOR, PARAM_UNDERSTOOD, 0, 1e30, NULL
 #define VARIES VALUE_VOLUME, PARAM_UNDERSTOOD, 0
 
-/* Ways of sampling distances are not the scene's choice here. */
+/* The scene does not choose how distances are sampled, so these parameters are ignored. */
 #define SAMPLING_PARAMS                                                                            \
 	{"has_spectral_extinction", IGNORED}, {"sample_emitters", IGNORED}, {"strategy", IGNORED}, \
 		{"sampling_density", IGNORED}, {"sigma_n", IGNORED},                               \
@@ -43,7 +44,7 @@ const struct plugin_decl medium_decls[] = {
 /* Mitsuba 3's defaults. */
 static const double default_sigma_t = 1, default_albedo = 0.75;
 
-/* Where a file of 0.6 lacks one of two coefficients, or of coefficient and share, it is that of skin1. */
+/* In a file of 0.6, a missing one of sigma_a and sigma_s, or of sigma_t and albedo, is that of skin1. */
 static int fill_in(struct medium *m, const struct scene_node *n)
 {
 	char list[2];
@@ -110,7 +111,7 @@ static int read_together(struct medium *m, const struct scene_node *n, const str
 	return rc || uneven || build->dialect_3 ? rc : fill_in(m, n);
 }
 
-/* Light that goes on nearly straight is not followed: sigma_s is less by the mean cosine. */
+/* Reads `g` of 0.6. Scattering by small angles is neglected: sigma_s is multiplied by 1 - g, with the mean cosine g. */
 static int read_forward(struct medium *m, const struct scene_node *n, const struct volume_build *build, struct error *e)
 {
 	if (!node_find(n, "g"))
@@ -171,7 +172,8 @@ bool medium_is_coloured(const struct medium *m)
 	return volume_is_coloured(&m->first) || volume_is_coloured(&m->second);
 }
 
-/* Sigma_s, and sigma_t of what the medium does, for these values of both. 1 / length */
+/* Returns sigma_s, and sets *sigma_t, for the given values of the two volumes, where coefficients that the medium does
+ * not have count as 0; 1 / length. */
 static spectrum coefficients(const struct medium *m, spectrum first, spectrum second, spectrum *sigma_t)
 {
 	spectrum sigma_s;
@@ -184,7 +186,7 @@ static spectrum coefficients(const struct medium *m, spectrum first, spectrum se
 	return sigma_s;
 }
 
-/* Where `second` varies, both is done and sigma_t does not depend on it. */
+/* Returns sigma_t. If `second` varies, the medium absorbs and scatters, and sigma_t does not depend on `second`. */
 static spectrum extinction(const struct medium *m, spectrum first, const struct wavelengths *w)
 {
 	spectrum sigma_t;
@@ -207,7 +209,7 @@ spectrum medium_extinction(const struct medium *m, vec3 p, vec3 d, const struct 
 struct medium_lanes medium_at(const struct medium *m, vec3 d, const struct wavelengths *w)
 {
 	static const vec3 anywhere = {0, 0, 0};
-	bool uneven = m->first.grid && m->first.grid->area; /* then the grid sees to the area */
+	bool uneven = m->first.grid && m->first.grid->area; /* then the grid itself multiplies by the area */
 	spectrum unit = spectrum_scale(uneven ? 1 : phase_area(&m->phase, anywhere, d),
 				       extinction(m, color_eval(&m->first.color, w), w));
 	struct medium_lanes l = {.grid = m->first.grid, .channels = 1, .sigma_t = {unit}};
@@ -219,14 +221,14 @@ struct medium_lanes medium_at(const struct medium *m, vec3 d, const struct wavel
 	return l;
 }
 
-/* The optical depth of channels whose integrals along a ray are `sum`. */
+/* Returns the optical depth, given the integral of each channel along a ray. */
 static spectrum depth_of(const struct medium_lanes *m, const double sum[GRID_CHANNELS_MAX])
 {
 	spectrum depth = spectrum_of(0);
 	for (int k = 0; k < m->channels; k++)
 		for (int i = 0; i < SPECTRUM_LANES; i++)
 			depth.v[i] +=
-				m->sigma_t[k].v[i] > 0 ? m->sigma_t[k].v[i] * sum[k] : 0; /* not 0 times infinity */
+				m->sigma_t[k].v[i] > 0 ? m->sigma_t[k].v[i] * sum[k] : 0; /* avoids 0 times infinity */
 	return depth;
 }
 

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Phase functions: how light is distributed over directions where a medium scatters it. One file per plug-in and one
- * line in phase_list.h. Most depend on one angle only, between the direction in which light travels and the one in
- * which it goes on, and are the same with both exchanged. Those of microflakes depend on both directions, and so does
- * the medium's extinction, which is proportional to the area of the flakes as seen along the ray: that area times the
- * phase function is the same with both exchanged, so that paths from the camera and from the light use them alike. They
- * may differ from place to place. Immutable after creation; any thread; allocates nothing.
+ * Phase functions: the distribution of scattered light over directions. One file per plug-in and one line in
+ * phase_list.h. Most depend only on the angle between the direction of light before and after scattering, and are
+ * symmetric in these. Those of microflakes depend on both directions; there the medium's extinction is proportional to
+ * the area of the flakes seen along the ray, and that area times the phase function is symmetric, so that paths from
+ * the camera and from a light use the same functions. Phase functions may vary in space. Immutable after creation; any
+ * thread; allocates nothing.
  */
 #ifndef WORKER_RENDER_MEDIUM_PHASE_H
 #define WORKER_RENDER_MEDIUM_PHASE_H
@@ -16,15 +16,16 @@ struct phase;
 
 struct phase_ops {
 	struct plugin_decl decl;
-	/* NULL: nothing to read */
+	/* NULL: the plug-in has no parameters */
 	int (*create)(struct phase *p, const struct scene_node *n, const struct volume_build *build, struct error *e);
-	/* Per solid angle, at a place; its integral over the sphere is 1. cosine: of that angle, 1 where light goes
-	 * straight on. */
+	/* Returns the value (1/sr) at the point `at`; its integral over the sphere is 1. cosine: of the angle between
+	 * the directions before and after scattering, 1 if light goes straight on. */
 	double (*eval)(const struct phase *p, vec3 at, double cosine);
-	/* A cosine with exactly this density, times 2 pi, for u in [0,1). */
+	/* Samples a cosine for u in [0,1); its density is exactly 2 pi times that value. */
 	double (*sample)(const struct phase *p, vec3 at, double u);
-	/* Of microflakes, instead of these two, and NULL otherwise. The density of wi, per solid angle, where light
-	 * comes from or goes to wo; a direction with this density; and the area seen along w, the same along -w. */
+	/* For microflakes instead of eval and sample, otherwise NULL. eval_flakes returns the density (1/sr) of wi for
+	 * light that comes from or goes to wo, sample_flakes samples a direction with this density, and area returns
+	 * the area of the flakes seen along w, which is the same along -w. */
 	double (*eval_flakes)(const struct phase *p, vec3 at, vec3 wo, vec3 wi);
 	vec3 (*sample_flakes)(const struct phase *p, vec3 at, vec3 wo, const double u[2]);
 	double (*area)(const struct phase *p, vec3 at, vec3 w);
@@ -32,23 +33,23 @@ struct phase_ops {
 
 struct phase {
 	const struct phase_ops *ops;
-	double g;		     /* hg's mean cosine */
-	double absorbed;	     /* share of what the medium scatters that is absorbed instead; not in eval */
-	const void *data;	     /* of some plug-ins */
-	const struct flakes *flakes; /* of microflakes (flakes.h); NULL */
+	double g;		     /* mean cosine of hg */
+	double absorbed;	     /* share of scattered light that is absorbed instead; eval does not include it */
+	const void *data;	     /* data of the plug-in */
+	const struct flakes *flakes; /* microflakes (flakes.h); otherwise NULL */
 };
 
 extern const struct phase_ops *const phase_registry[]; /* ends with NULL */
 
-/* n: NULL is the isotropic one. */
+/* Creates the phase function of node n, or the isotropic one if n is NULL. Returns 0 or a negative error code. */
 int phase_create(struct phase *p, const struct scene_node *n, const struct volume_build *build, struct error *e);
 
-/* Unit vectors that both point away from `at`, where light is scattered. pdf: of wi, per solid angle, the value of the
- * function. */
+/* Evaluate and sample the phase function at the point `at`. wo and wi are unit vectors that both point away from it.
+ * *pdf: density of wi (solid angle), which is the value of the function. */
 double phase_eval(const struct phase *p, vec3 at, vec3 wo, vec3 wi);
 vec3 phase_sample(const struct phase *p, vec3 at, vec3 wo, const double u[2], double *pdf);
 
-/* What the extinction along w is multiplied by. */
+/* Returns the factor of the extinction along w. */
 static inline double phase_area(const struct phase *p, vec3 at, vec3 w)
 {
 	return p->ops->area ? p->ops->area(p, at, w) : 1;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Two phase functions by a weight, which may differ from place to place: 0 is the first, 1 the second.
+ * Two phase functions mixed by a weight, which may vary in space: 0 is the first alone, 1 the second alone.
  *
- * Failures: not two of them; a weight that depends on the wavelength.
+ * Creation fails unless exactly two phase functions are nested, and if the weight depends on the wavelength.
  */
 #include "worker/render/medium/phase_parts.h"
 

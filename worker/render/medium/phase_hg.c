@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Henyey and Greenstein 1941: p(c) = (1 - g^2) / (4 pi (1 + g^2 - 2 g c)^(3/2)), whose mean cosine is g. Its
- * distribution function is inverted by c = (1 + g^2 - ((1 - g^2) / (1 + g s))^2) / 2g with s = 2u - 1; written out as a
- * quotient of polynomials, g divides the numerator, and nothing cancels where g is small.
+ * distribution function is inverted by c = (1 + g^2 - ((1 - g^2) / (1 + g s))^2) / 2g with s = 2u - 1; written as a
+ * quotient of polynomials, the factor g of the numerator cancels, and no digits are lost if g is small.
  */
 #include "worker/render/medium/phase.h"
 
@@ -30,7 +30,7 @@ static double sample(const struct phase *p, vec3 at, double u)
 }
 
 const struct phase_ops phase_ops_hg = {
-	/* At 0.999 half of the light goes on within 0.1 degrees. */
+	/* At g = 0.999, half of the light is scattered by less than 0.1 degrees. */
 	.decl = PLUGIN(PHASE, "hg", {.name = "g", .types = VALUE_FLOAT | VALUE_INT, .min = -0.999, .max = 0.999}),
 	.create = create,
 	.eval = eval,

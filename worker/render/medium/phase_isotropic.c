@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* All directions alike. */
+/* Scatters equally in all directions. */
 #include "worker/render/medium/phase.h"
 
 #include <math.h>

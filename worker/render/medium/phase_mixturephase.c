@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Any number of phase functions by fixed weights; what these leave of 1 is absorbed, and they are scaled if they exceed
- * it.
+ * Any number of phase functions with fixed weights. If the weights add up to less than 1, the rest of the light is
+ * absorbed; if to more, they are scaled to add up to 1.
  *
- * Failures: not as many weights as phase functions; negative ones; all 0.
+ * Creation fails unless there is one weight for each phase function, and if a weight is negative or all are 0.
  */
 #include "worker/render/medium/phase_parts.h"
 #include "worker/render/text/number.h"
@@ -30,7 +30,7 @@ static int create(struct phase *p, const struct scene_node *n, const struct volu
 		return node_error(n, e, EINVAL, "weights=\"%s\": all are 0", text);
 	for (uint32_t k = 0; k < m->count; k++)
 		m->weight[k] /= sum;
-	p->absorbed = 1 - sum > m->count * DBL_EPSILON ? 1 - sum : 0; /* not for rounding errors */
+	p->absorbed = 1 - sum > m->count * DBL_EPSILON ? 1 - sum : 0; /* not if only rounding errors are missing */
 	return 0;
 }
 

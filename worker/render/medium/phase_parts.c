@@ -30,7 +30,7 @@ int phase_parts_create(struct phase *p, struct phase_parts **parts, const struct
 	return 0;
 }
 
-/* The weights of the parts at a place: the fixed ones, or `room`, which is filled in. */
+/* Returns the weights of the parts at a point: the fixed ones, or those of the grid, stored in `room`. */
 static const double *weights_at(const struct phase_parts *m, vec3 at, double room[2])
 {
 	double value[GRID_CHANNELS_MAX];
@@ -52,14 +52,14 @@ double phase_parts_eval(const struct phase *p, vec3 at, double cosine)
 	return sum;
 }
 
-/* u chooses the part; rescaled to [0,1), it is then the random number of that part. */
+/* u chooses the part; rescaled to [0,1), it then serves as the random number of that part. */
 double phase_parts_sample(const struct phase *p, vec3 at, double u)
 {
 	const struct phase_parts *m = p->data;
 	double room[2];
 	const double *weight = weights_at(m, at, room);
 	uint32_t k = 0, last = m->count - 1;
-	while (last > 0 && !(weight[last] > 0)) /* rounding may leave u without a part: never one of weight 0 */
+	while (last > 0 && !(weight[last] > 0)) /* rounding may leave u beyond all weights above 0 */
 		last--;
 	while (k < last && u >= weight[k])
 		u -= weight[k++];

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Rayleigh's: p(c) = 3 (1 + c^2) / 16 pi. Its distribution function (c^3 + 3 c + 4) / 8 = u is a cubic equation with
- * one real root, c = 2 sinh(asinh(4u - 2) / 3).
+ * Rayleigh's phase function, p(c) = 3 (1 + c^2) / 16 pi. Its distribution function (c^3 + 3 c + 4) / 8 = u is a cubic
+ * equation with one real root, c = 2 sinh(asinh(4u - 2) / 3).
  */
 #include "worker/render/medium/phase.h"
 

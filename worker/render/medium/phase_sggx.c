@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Microflakes that reflect like mirrors, of the SGGX distribution (Heitz, Dupuy, Crassin and Dachsbacher 2015, The SGGX
- * Microflake Distribution). With the matrix S = L L^T, the flakes' area seen along w is sigma(w) = sqrt(w . S w), their
- * distribution D(m) = 1 / (pi det L |L^-1 m|^4), and the phase function p(wo, wi) = D(h) / (4 sigma(wo)), h half way
- * between both. Sigma(wo) p(wo, wi) = sigma(wi) p(wi, wo).
+ * Microflakes that reflect like mirrors, with the SGGX distribution (Heitz, Dupuy, Crassin and Dachsbacher 2015, The
+ * SGGX Microflake Distribution). With the matrix S = L L^T, the area of the flakes seen along w is sigma(w) = sqrt(w .
+ * S w), the distribution of their normals D(m) = 1 / (pi det L |L^-1 m|^4), and the phase function p(wo, wi) = D(h) /
+ * (4 sigma(wo)), with the half vector h of wo and wi. Symmetry: sigma(wo) p(wo, wi) = sigma(wi) p(wi, wo).
  *
- * The flakes are those of a sphere, whose normals n L takes to L n, with areas in proportion to |L n|: their area seen
- * along w is the integral of max(0, w . L n) / pi, which is |L^T w|. So those that are visible from w are drawn as n
- * with the density cos / pi around L^T w.
+ * The normals of the flakes are those of a sphere, n, transformed to L n, with areas in proportion to |L n|. The area
+ * seen along w is therefore the integral of max(0, w . L n) / pi, which is |L^T w|, and flakes visible from w are
+ * sampled by drawing n with density cos / pi around L^T w.
  *
- * Failures: those of flakes.h; a scene of 0.6. Where there are no flakes, densities are 0.
+ * Creation fails in a scene of 0.6, or as described in flakes.h. Where there are no flakes, densities are 0.
  */
 #include "worker/render/math/frame.h"
 #include "worker/render/medium/flakes.h"
@@ -28,12 +28,12 @@ static int create(struct phase *p, const struct scene_node *n, const struct volu
 	return flakes_create(f, n, build, e);
 }
 
-/* L, by Cholesky's method. */
+/* The lower triangular matrix L, from the Cholesky decomposition of S. */
 struct root {
 	double xx, yx, yy, zx, zy, zz;
 };
 
-/* false: there are no flakes at this place. */
+/* Computes L at a point. Returns false if there are no flakes. */
 static bool root_at(const struct phase *p, vec3 at, struct root *l)
 {
 	double s[FLAKES_NUMBERS];
@@ -68,7 +68,7 @@ static double eval(const struct phase *p, vec3 at, vec3 wo, vec3 wi)
 	double length = vec3_length(h);
 	if (!root_at(p, at, &l))
 		return 0;
-	/* Light that goes straight on may have met any flake that is parallel to the ray. */
+	/* If light goes straight on, any flake parallel to the ray may have scattered it: choose one of these. */
 	h = length > 0 ? vec3_scale(1 / length, h) : frame_around(wo).s;
 	return distribution(&l, h) / (4 * vec3_length(times_transposed(&l, wo)));
 }

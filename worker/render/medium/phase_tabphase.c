@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A table of values at cosines with equal distances from -1 to 1, linear in between and scaled to an integral of 1. Its
- * distribution function is the sum of the intervals before and, in one of values a and b and width h,
- * h (a t + (b - a) t^2 / 2), a quadratic equation for t in [0,1], solved without cancellation.
+ * A table of values at equidistant cosines from -1 to 1, linear in between and scaled to an integral of 1. The
+ * cumulative distribution is the sum over the intervals before plus, in an interval of width h between the values a and
+ * b, h (a t + (b - a) t^2 / 2): a quadratic equation for t in [0,1], which is solved without cancellation.
  *
- * Failures: fewer than two values, or more than TABLE_MOST; negative ones; all 0.
+ * Creation fails if there are fewer than two or more than TABLE_MOST values, if one is negative or too large, or if all
+ * are 0.
  */
 #include "worker/render/math/search.h"
 #include "worker/render/medium/phase.h"
@@ -18,12 +19,12 @@ enum { TABLE_MOST = 1 << 16 };
 
 struct table {
 	uint32_t intervals;
-	double width;	 /* of each, as a cosine */
-	double *density; /* per cosine, at the ends of intervals */
-	double *before;	 /* the distribution function there */
+	double width;	 /* of an interval, as a difference of cosines */
+	double *density; /* per unit of cosine, at the ends of the intervals */
+	double *before;	 /* the cumulative distribution at the ends of the intervals */
 };
 
-/* value[i]: of `count` numbers, some of them above 0. */
+/* Makes the table from `count` values, at least one of which is above 0. */
 static void make_table(struct table *t, const double *value, uint32_t count)
 {
 	double most = 0, sum = 0;
@@ -59,7 +60,7 @@ static int read_values(const struct scene_node *n, double *value, uint32_t *coun
 
 static int create(struct phase *p, const struct scene_node *n, const struct volume_build *build, struct error *e)
 {
-	size_t length = strlen(node_string(n, "values", "")), most = length / 2 + 1; /* a digit and what separates */
+	size_t length = strlen(node_string(n, "values", "")), most = length / 2 + 1; /* a digit, a separator */
 	most = most < TABLE_MOST ? most : TABLE_MOST;
 	struct table *t = arena_alloc(build->arena, 1, sizeof *t);
 	double *room = arena_alloc(build->arena, most, 3 * sizeof *room);

@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A ray visits cells in order: in each it goes to the nearest of the three planes that it leaves the cell through
- * (Amanatides and Woo 1987). Where it crosses a plane is computed from the plane's number, so that errors do not add
- * up. Bricks of cells without anything are crossed at once. Gauss's rule with two points is exact for the cubic
- * polynomial of a cell; where an integral reaches a value is found by Newton's steps, with bisection where one leaves
- * the bracket.
+ * A ray visits cells in order, leaving each through the nearest of the three planes ahead (Amanatides and Woo 1987).
+ * The crossing of a plane is computed from the number of the plane, so that errors do not accumulate. Empty bricks of
+ * cells are crossed in one step. Gauss's rule with two points is exact for the cubic polynomial in a cell; the position
+ * at which an integral reaches a value is found by Newton's method, with bisection if a step leaves the bracket.
  *
- * Cannot fail: a ray that does not meet the box, or is not finite, passes no cell.
+ * Nothing fails: a ray that misses the box, or is not finite, visits no cell.
  */
 #include "worker/render/volume/grid.h"
 
@@ -16,7 +15,7 @@
 
 /* ---- values ---- */
 
-/* The point used as the i-th, which may lie outside the grid. */
+/* Returns the index of the point that stands for the i-th, which may lie outside the grid. */
 static int point_of(enum grid_outside outside, int i, int n)
 {
 	if (i >= 0 && i < n)
@@ -30,7 +29,7 @@ static int point_of(enum grid_outside outside, int i, int n)
 	return i < 0 ? 0 : n - 1;
 }
 
-/* Coordinates of which those outside of the grid have their like nearby, so that they fit an int. */
+/* Maps a coordinate outside the grid to an equivalent one near it, so that it fits an int. */
 static double bring_near(enum grid_outside outside, double x, int n)
 {
 	int period = outside == GRID_REPEAT ? n : 2 * n;
@@ -39,7 +38,7 @@ static double bring_near(enum grid_outside outside, double x, int n)
 	return fmin(fmax(x, -1), n);
 }
 
-/* The points around a cell, those further along x, y and z in the bits 1, 2 and 4. */
+/* Finds the points around a cell; bits 1, 2 and 4 of an index select the further point along x, y and z. */
 static void corners_of(const struct grid *g, const int cell[3], const float *corner[8])
 {
 	size_t stride[3] = {(size_t)g->channels, (size_t)g->channels * (size_t)g->size[0],
@@ -55,10 +54,10 @@ static void corners_of(const struct grid *g, const int cell[3], const float *cor
 		corner[k] = g->value + at[2][k >> 2] + at[1][k >> 1 & 1] + at[0][k & 1];
 }
 
-/* The weights that select a channel. */
+/* Row k: the weights that select channel k. */
 static const double one_of[GRID_CHANNELS_MAX][GRID_CHANNELS_MAX] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 
-/* The weighted sum of the channels at each corner. */
+/* Computes the weighted sum of the channels at each corner. */
 static void weigh(const float *const corner[8], int channels, const double weight[GRID_CHANNELS_MAX], double v[8])
 {
 	for (int i = 0; i < 8; i++) {
@@ -73,7 +72,7 @@ static double mix(double t, double a, double b)
 	return a + t * (b - a);
 }
 
-/* x: from 0 to 1 in the cell. */
+/* x: position in the cell, from 0 to 1. */
 static double interpolate(const double c[8], const double x[3])
 {
 	double low = mix(x[1], mix(x[0], c[0], c[1]), mix(x[0], c[2], c[3])),
@@ -129,7 +128,7 @@ size_t grid_bricks(const struct grid *g)
 	return (size_t)bricks_along(g, 0) * (size_t)bricks_along(g, 1) * (size_t)bricks_along(g, 2);
 }
 
-/* Cells begin at -1. */
+/* Returns the brick that contains a cell; cell numbers begin at -1. */
 static size_t brick_of(const struct grid *g, const int cell[3])
 {
 	size_t at[3];
@@ -138,8 +137,8 @@ static size_t brick_of(const struct grid *g, const int cell[3])
 	return (at[2] * (size_t)bricks_along(g, 1) + at[1]) * (size_t)bricks_along(g, 0) + at[0];
 }
 
-/* A cell of each brick along axis i that the point counts in: in the cells before and behind it, and if the grid
- * repeats itself, at its other end. */
+/* Lists, along axis i, one cell of each brick in which the value of a point counts: the cells before and behind the
+ * point, and those at the other end of the grid, in case it repeats. Returns their number. */
 static int cells_with(const struct grid *g, int i, int point, int cell[3])
 {
 	int n = 0;
@@ -174,31 +173,32 @@ void grid_find_full(const struct grid *g, unsigned char *full)
 
 /* ---- rays ---- */
 
-/* Cells that are crossed at once: one; an empty brick of them; or where the values at the border go on for ever all
- * those outside along an axis, which differ from each other along the other axes only. */
+/* Cells that are crossed in one step: a single cell; an empty brick; or, outside the points of a grid whose border
+ * values continue, all cells along an axis, since values there change along the other axes only. */
 struct block {
 	int first[3], last[3];
-	bool empty, wide; /* wide: may be more than one cell */
+	bool empty, wide; /* wide: possibly more than one cell */
 };
 
-/* A ray on its way through the cells. */
+/* The state of a ray on its way through the cells. */
 struct cells {
 	const struct grid *g;
-	double o[3], d[3], per[3]; /* in cells, in cells per unit of t, and its inverse */
+	double o[3], d[3], per[3]; /* origin in cells, direction in cells per unit of t, and its inverse */
 	double t, end;
-	int cell[3], past[3], step[3]; /* past: the first cell behind the box in the direction of the ray */
-	struct block block;	       /* around the cell */
-	double leave[3];	       /* the t at which the ray leaves it along each axis */
-	double area[8];		       /* if the grid has a matrix: the square of the factor at the cell's corners */
+	int cell[3], past[3], step[3]; /* past: the first cell beyond the box, in the direction of the ray */
+	struct block block;	       /* the block that contains `cell` */
+	double leave[3];	       /* the t at which the ray leaves the block along each axis */
+	double area[8];		       /* if the grid has `area`: the squared factor at the cell's corners */
 };
 
-/* The t at which the ray meets the plane of that number across axis i. */
+/* Returns the t at which the ray meets the plane with the given number across axis i. */
 static double crossing_of_plane(const struct cells *c, int i, double plane)
 {
 	return (plane - c->o[i]) * c->per[i];
 }
 
-/* Clips the range of t to the part of the ray o + t d between two planes across an axis; false: nothing is left. */
+/* Clips the range of t to the part of the ray o + t d between two planes across an axis; Returns false if no part is
+ * left. */
 static bool clip(struct cells *c, double o, double d, double low, double high)
 {
 	if (d == 0)
@@ -227,7 +227,7 @@ static void find_leave(struct cells *c, int i)
 	c->leave[i] = c->step[i] ? crossing_of_plane(c, i, plane) : INFINITY;
 }
 
-/* The block around a cell that is outside of the points or in an empty brick; `within` is the nearest one inside. */
+/* Finds the block of a cell that is outside the points or in an empty brick; within: the nearest cell inside. */
 static void find_wide_block(struct cells *c, const int within[3], bool outside)
 {
 	const struct grid *g = c->g;
@@ -248,7 +248,7 @@ static void find_wide_block(struct cells *c, const int within[3], bool outside)
 	b->wide = true;
 }
 
-/* crossed: the axis along which the ray came into the cell; 3: it begins there. */
+/* Updates the block for the new cell. crossed: the axis along which the ray entered; 3: the ray begins in the cell. */
 static void enter_cell(struct cells *c, int crossed)
 {
 	const struct grid *g = c->g;
@@ -273,14 +273,14 @@ static void enter_cell(struct cells *c, int crossed)
 		}
 }
 
-/* The axis across which the ray leaves the block first. */
+/* Returns the axis along which the ray leaves the block first. */
 static int way_out(const struct cells *c)
 {
 	int axis = c->leave[1] < c->leave[0] ? 1 : 0;
 	return c->leave[2] < c->leave[axis] ? 2 : axis;
 }
 
-/* Goes on to the next block; false: that is the end. */
+/* Advances to the next block. Returns false at the end of the ray or of the box. */
 static bool go_on(struct cells *c, int axis)
 {
 	const struct block *b = &c->block;
@@ -298,7 +298,7 @@ static bool go_on(struct cells *c, int axis)
 	return true;
 }
 
-/* A component whose inverse overflows counts as 0. */
+/* Returns d, or 0 if its inverse overflows. */
 static double without_tiny(double d)
 {
 	return fabs(d) >= DBL_MIN ? d : 0;
@@ -335,8 +335,9 @@ static double value_at(const struct cells *c, const double corner[8], double t)
 	return c->g->area ? value * sqrt(fmax(interpolate(c->area, x), 0)) : value;
 }
 
-/* The factor is the root of a cubic polynomial, which Gauss's rule of eight points integrates to 1e-9 of the integral
- * where it changes by half in a cell, and to 1e-4 at worst, where it goes down to 0. */
+/* Integrates values times the factor by Gauss's rule with eight points. The factor is the square root of a cubic
+ * polynomial: the relative error is 1e-9 where it changes by half within a cell, and 1e-4 at worst, where it falls to
+ * 0. */
 static double integral_with_area(const struct cells *c, const double corner[8], double a, double b)
 {
 	static const double at[] = {0.18343464249564980, 0.52553240991632899, 0.79666647741362674, 0.96028985649753623},
@@ -349,7 +350,7 @@ static double integral_with_area(const struct cells *c, const double corner[8], 
 	return half * sum;
 }
 
-/* Over t from a to b, in this cell. */
+/* Returns the integral over t from a to b within the current cell. */
 static double integral(const struct cells *c, const double corner[8], double a, double b)
 {
 	static const double gauss = 0.57735026918962576; /* 1 / sqrt 3 */
@@ -359,7 +360,7 @@ static double integral(const struct cells *c, const double corner[8], double a, 
 	return half * (value_at(c, corner, middle - gauss * half) + value_at(c, corner, middle + gauss * half));
 }
 
-/* d: of the ray, in the world. */
+/* Computes the squared factor at the cell's corners. d: direction of the ray in the world. */
 static void find_area(struct cells *c, vec3 d)
 {
 	const float *even[8], *mixed[8];
@@ -374,7 +375,7 @@ static void find_area(struct cells *c, vec3 d)
 	}
 }
 
-/* Adds the integral of each channel up to `end` in this cell. */
+/* Computes the integral of each channel over the cell, from the current t to `end`. */
 static void integrate_cell(const struct cells *c, const float *const corner[8], double end,
 			   double part[GRID_CHANNELS_MAX])
 {
@@ -389,7 +390,7 @@ static void integrate_cell(const struct cells *c, const float *const corner[8], 
 	}
 }
 
-/* The t in [a,b] where the integral from a on is `least`, which is at most that up to b. */
+/* Returns the t in [a,b] at which the integral from a reaches `least`, which is at most the integral up to b. */
 static double reach_in_cell(const struct cells *c, const double corner[8], double a, double b, double least)
 {
 	enum { STEPS_MAX = 100 };

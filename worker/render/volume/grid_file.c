@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * "VOL", the version 3, and as 32-bit little-endian numbers: the type (1: floats, 3: bytes), three sizes, the number of
- * channels, a box of six floats, the values.
+ * The format: "VOL", the version 3, and as 32-bit little-endian numbers the type (1: floats, 3: bytes), three sizes,
+ * the number of channels, a box of six floats, and the values.
  *
- * Failures: another format, type or number of channels, a side of more than GRID_SIDE_MAX, a file that is too short, a
- * value that is not finite.
+ * Reading fails if the format, the type or the number of channels is another one, if a side is longer than
+ * GRID_SIDE_MAX, if the file is too short, or if a value is not finite.
  */
 #include "worker/render/volume/grid_file.h"
 
@@ -18,7 +18,7 @@
 
 enum { VERSION = 3, FLOATS = 1, BYTES = 3, HEAD = 4 + 4 * 5 + 4 * 6, TICK_INTERVAL = 1 << 16 };
 
-/* *count: of all values. */
+/* Reads and checks the header. *count: number of all values. */
 static int read_head(const unsigned char *p, size_t size, const struct scene_node *n, const char *name, uint32_t most,
 		     struct grid_file *out, uint64_t *count, struct error *e)
 {

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Where a grid lies. In Mitsuba 3 its values are those of the cells of the unit cube, which to_world takes to its
- * place; with use_grid_bbox that cube is first fitted to the file's box. In 0.6 the outermost values lie on the faces
- * of the file's box, or of that from `min` to `max`, before to_world.
+ * Reads volumes and evaluates them. In Mitsuba 3, the values of a grid are those of the centres of the cells of the
+ * unit cube, which to_world transforms; with use_grid_bbox, the cube is first fitted to the file's box. In 0.6, the
+ * outermost values lie on the faces of the file's box, or of the box from `min` to `max`, before to_world.
  *
- * Failures: those of the file, negative numbers, a box without a volume, reflectances above 1.
+ * Creation fails if the file cannot be read, if a value is negative, if a reflectance exceeds 1, or if the box has no
+ * volume.
  */
 #include "worker/render/volume/volume.h"
 
@@ -14,7 +15,7 @@
 
 #define PLACE VALUE_POINT, PARAM_UNDERSTOOD, -PARAM_LENGTH_MAX, PARAM_LENGTH_MAX, NULL
 
-/* The upper bound of values that are not reflectances. */
+/* Upper bound of values that are not reflectances. */
 #define LARGEST 1e30
 
 const struct plugin_decl volume_decls[] = {
@@ -25,14 +26,14 @@ const struct plugin_decl volume_decls[] = {
 	       {"filter_type", VALUE_STRING | VALUE_OF_3, PARAM_UNDERSTOOD, 0, 0, "trilinear|nearest"},
 	       {"wrap_mode", VALUE_STRING | VALUE_OF_3, PARAM_UNDERSTOOD, 0, 0, "clamp|repeat|mirror"},
 	       {"min", PLACE},			 /* of 0.6 */
-	       {"max", PLACE}, {"raw", IGNORED}, /* numbers are never decoded */
+	       {"max", PLACE}, {"raw", IGNORED}, /* values are never decoded from sRGB */
 	       {"max_value", IGNORED}, {"accel", IGNORED}, {"send_data", IGNORED}),
 	{0, NULL, NULL, 0, 0},
 };
 
 /* ---- place ---- */
 
-/* The box that to_world is applied to. */
+/* Finds the box to which to_world is applied. */
 static void box_of(const struct scene_node *n, const struct grid_file *f, bool dialect_3, double box[2][3])
 {
 	const struct property *min = node_find(n, "min"), *max = node_find(n, "max");
@@ -48,7 +49,8 @@ static void box_of(const struct scene_node *n, const struct grid_file *f, bool d
 	memcpy(box, corner, sizeof corner);
 }
 
-/* Around its cells, parallel to the world's axes. */
+/* Finds the bounding box of the grid's cells that is parallel to the world's axes. Returns false if to_cells has no
+ * inverse. */
 static bool box_in_world(const struct grid *g, vec3 *least, vec3 *most)
 {
 	mat4 to_world;
@@ -81,7 +83,8 @@ static void set_box(struct grid *g, vec3 least, vec3 most)
 	}
 }
 
-/* Whether an axis of the volume is not along one of the world's, by more than the sine of 180 degrees is off. */
+/* Returns whether some axis of the volume is not parallel to one of the world's, allowing for the rounding of sines and
+ * cosines in a rotation. */
 static bool is_turned(const mat4 *m)
 {
 	for (int i = 0; i < 3; i++) {
@@ -118,7 +121,7 @@ static int place_grid(struct grid *g, const struct scene_node *n, double box[2][
 	g->to_cells = mat4_mul(to_cells, to_scene);
 	if (!b->dialect_3 || !is_turned(&g->to_cells))
 		return 0;
-	/* Mitsuba 3 limits a medium by the box around its volume that is parallel to the world's axes. */
+	/* Mitsuba 3 bounds a medium by the bounding box of its volume that is parallel to the world's axes. */
 	vec3 least, most;
 	if (!box_in_world(g, &least, &most))
 		return node_error(n, e, EINVAL, FLATTENED);
@@ -196,7 +199,7 @@ static const struct grid one_cell = {.size = {1, 1, 1},
 				     .nearest = true,
 				     .outside = GRID_CLAMP};
 
-/* The same colour in the unit cube, and nothing outside. */
+/* Limits a constant colour to the unit cube; outside, the value is 0. */
 static int add_cube(struct volume *v, const struct scene_node *n, const struct volume_build *b, struct error *e)
 {
 	double unit[2][3] = {{0, 0, 0}, {1, 1, 1}};
@@ -231,7 +234,7 @@ int volume_from_node(struct volume *v, const struct scene_node *n, const char *n
 	return in_cube ? add_cube(v, n, b, e) : 0;
 }
 
-/* One cell of value 1 that is the box. */
+/* Gives v a grid that consists of one cell of value 1, which is the given box. */
 static int add_cell(struct volume *v, vec3 least, vec3 most, const struct volume_build *b)
 {
 	struct grid *g = arena_alloc(b->arena, 1, sizeof *g);
@@ -249,7 +252,7 @@ static int add_cell(struct volume *v, vec3 least, vec3 most, const struct volume
 int volume_cover(struct volume *v, const struct volume *other, const struct scene_node *n, const struct volume_build *b,
 		 struct error *e)
 {
-	/* The scene's radius is 1. */
+	/* Without a grid, the box of the whole scene, whose radius is 1. */
 	vec3 least = {-2, -2, -2}, most = {2, 2, 2};
 	if (other->grid && !box_in_world(other->grid, &least, &most))
 		return node_error(n, e, EINVAL, FLATTENED);
@@ -278,7 +281,7 @@ static bool same_points(const struct grid *a, const struct grid *b)
 	return same && memcmp(&a->to_cells, &b->to_cells, sizeof a->to_cells) == 0;
 }
 
-/* Ones at the points of another grid, within the box of v's. */
+/* Makes a grid of ones at the points of `at`, within the box of `box`. */
 static int add_ones(struct grid *g, const struct grid *at, const struct grid *box, const struct volume_build *b)
 {
 	vec3 least, most;

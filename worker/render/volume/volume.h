@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A colour that depends on the place: one for all places (`constvolume`, or a value), or that of a grid (`gridvolume`).
- * A grid of three channels holds R, G and B. Its spectrum is linear in them, so that sums and integrals of spectra are
- * those of the channels: each channel's colour is the reflectance that its primary has elsewhere, and at each
- * wavelength they are scaled to add up to 1, so that grey is the same at all. Immutable after creation; any thread.
+ * A colour that may vary in space: a constant (`constvolume`, or a value), or a grid (`gridvolume`). A grid of three
+ * channels holds R, G and B. Its spectrum is linear in the channels, so that sums and integrals of spectra follow from
+ * those of the channels: each channel's spectrum is the upsampled reflectance of its primary, and at each wavelength
+ * the three are scaled to add up to 1, so that grey is constant over wavelengths. Immutable after creation; any thread.
  */
 #ifndef WORKER_RENDER_VOLUME_VOLUME_H
 #define WORKER_RENDER_VOLUME_VOLUME_H
@@ -13,9 +13,9 @@
 
 struct volume {
 	struct color color;
-	const struct grid *grid; /* its numbers times the colour; NULL: the same everywhere */
-	double least, largest;	 /* bounds of all its numbers */
-	struct color primary[GRID_CHANNELS_MAX];
+	const struct grid *grid; /* its values are factors of the colour; NULL: the same colour everywhere */
+	double least, largest;	 /* bounds of the grid's values */
+	struct color primary[GRID_CHANNELS_MAX]; /* spectra of the channels, before scaling */
 };
 
 extern const struct plugin_decl volume_decls[]; /* ends with a NULL type */
@@ -26,29 +26,31 @@ struct volume_build {
 	const struct asset_source *assets;
 	struct arena *arena;
 	struct grid_cache *cache;
-	bool dialect_3; /* otherwise 0.6's way to place a grid */
+	bool dialect_3; /* a scene of 3.x; otherwise grids are placed as in 0.6 */
 	vec3 center;	/* a scene point p is at scale (p - center) in the rescaled world */
 	double scale;
 };
 
-/* Property `name` of node n: a colour or a nested volume; `fallback` if absent. in_cube: without a grid it is limited
- * to the unit cube, at the place of the nested volume. */
+/* Reads the property `name` of node n: a colour or a nested volume, `fallback` if absent. in_cube: a volume without a
+ * grid is limited to the unit cube, transformed by the to_world of the nested volume. Returns 0 or a negative error
+ * code. */
 int volume_from_node(struct volume *v, const struct scene_node *n, const char *name, double fallback,
 		     enum color_role role, bool in_cube, const struct volume_build *build, struct error *e);
 
-/* Gives v the bounds of another volume, beyond which it counts 0: the box of its grid, in which v goes on as at its own
- * border. Where the other one has no grid and is the same everywhere, the whole scene. n: what is to blame. -ENOTSUP: v
- * repeats itself. */
+/* Gives v the bounds of another volume, outside which it is 0: the box of the other's grid, or the whole scene if that
+ * has no grid. Within these bounds v continues beyond its own grid with the values at its border. n: the node that
+ * errors name. -ENOTSUP if the grid of v repeats. */
 int volume_cover(struct volume *v, const struct volume *other, const struct scene_node *n,
 		 const struct volume_build *build, struct error *e);
 
-/* The grid of a node's file, with its place. */
+/* Makes the grid of a file that was read for node n, and places it in the world. Returns 0 or a negative error code. */
 struct grid_file;
 int volume_grid(struct grid *g, const struct scene_node *n, const struct grid_file *f, const struct volume_build *build,
 		struct error *e);
 
-/* Lets the numbers of v count by the area of two grids (struct grid.area) that outlive it. n: what is to blame.
- * -ENOTSUP: v has no grid, or one with other points; a box of one number takes over theirs. */
+/* Multiplies the values of v along rays by the area of two grids (struct grid.area), which must outlive v. n: the node
+ * that errors name. -ENOTSUP if v has no grid, or one with other points; a constant in a cube adopts the points of
+ * `area`. */
 int volume_by_area(struct volume *v, const struct grid area[2], const struct scene_node *n,
 		   const struct volume_build *build, struct error *e);
 
@@ -57,13 +59,14 @@ static inline bool volume_varies(const struct volume *v)
 	return v->grid;
 }
 
-double volume_least(const struct volume *v); /* lower bound over places and wavelengths; 0 where not known */
-double volume_max(const struct volume *v);   /* upper bound over places and wavelengths */
+double volume_least(const struct volume *v); /* lower bound over positions and wavelengths; 0 if not known */
+double volume_max(const struct volume *v);   /* upper bound over positions and wavelengths */
 bool volume_is_coloured(const struct volume *v);
 
-/* Spectra by which the channels are weighted, without the colour; of one channel: 1. Returns the number of channels. */
+/* Computes the spectra that weight the channels, without v's colour; 1 for a single channel. Returns the number of
+ * channels. */
 int volume_weights(const struct volume *v, const struct wavelengths *w, spectrum weight[GRID_CHANNELS_MAX]);
-/* The colour at p. `bounded`: 0 outside of the grid's box. */
+/* Returns the colour at p. bounded: 0 outside the grid's box. */
 spectrum volume_at(const struct volume *v, vec3 p, bool bounded, const struct wavelengths *w);
 
 #endif

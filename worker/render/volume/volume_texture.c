@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The texture `volume`: what a volume is at the surface's place in the world. Three channels are interpolated as rgb
- * and then upsampled, as those of meshes and images are. A probe has no place: u and v stand for three numbers that
- * fill the grid's box.
+ * The texture `volume`: the value of a volume at the position of the surface in the world. Three channels are
+ * interpolated as RGB and then upsampled, like those of meshes and images. A probe has no position: its u and v are
+ * mapped to points that fill the grid's box.
  */
 #include "worker/render/volume/volume.h"
 
@@ -10,7 +10,7 @@
 
 struct volume_texture {
 	struct volume volume;
-	mat4 to_world; /* of a grid: from its cells */
+	mat4 to_world; /* from the cells of the grid */
 	enum color_role role;
 };
 
@@ -34,7 +34,8 @@ static bool is_rgb(const struct volume_texture *x)
 	return x->volume.grid && x->volume.grid->channels > 1;
 }
 
-/* The third number goes through its range once for each step of the second. */
+/* Returns the point of the world at which the volume is evaluated. For probes, the third coordinate runs through its
+ * range once for each step of the second. */
 static vec3 place_of(const struct volume_texture *x, const struct texture_point *at)
 {
 	const struct grid *g = x->volume.grid;
@@ -58,7 +59,7 @@ static spectrum eval(const struct texture *t, const struct texture_point *at, co
 	return x->role == COLOR_ILLUMINANT ? color_eval_rgb_illuminant(rgb, w) : color_eval_rgb_reflectance(rgb, w);
 }
 
-/* The spectrum of a reflectance is not bounded by its components. */
+/* An upsampled reflectance may exceed its RGB components. */
 static double max(const struct texture *t)
 {
 	const struct volume_texture *x = t->data;
