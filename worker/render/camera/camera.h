@@ -31,8 +31,7 @@ struct camera {
 	double center_x, center_y;   /* the film point on the axis: the middle of the film plus the offset of the
 					principal point */
 	double near_clip, far_clip;  /* distances along the axis, in the rescaled world */
-	bool lens; /* x_k is sampled and mutated: the aperture's radius is above 0, or camera_force_aperture was called
-		    */
+	bool lens; /* x_k is sampled and mutated: the radius is above 0, or camera_force_aperture says so */
 	double aperture, focus;			    /* radius; distance of the plane of focus along the axis */
 	const struct camera_projection *projection; /* NULL: onto a plane */
 	double kc[2], fold;	    /* for perspective_rdist; fold: squared slope at which the image ends */
@@ -78,8 +77,8 @@ double camera_jac_film_from_solid(const struct camera *c, vec3 d);
 /* Returns whether the camera sees anything along d. */
 bool camera_looks(const struct camera *c, vec3 d);
 /* Computes how the point seen along the unit direction d, at the given distance from x_k, moves across d as film_x and
- * film_y change: two axes, of unit length before their component along d is removed, and the lengths per pixel. The
- * distortion of perspective_rdist is ignored. */
+ * film_y change: two unit axes, whose components along d are to be ignored, and lengths per pixel. The distortion of
+ * perspective_rdist is ignored. */
 void camera_pixel(const struct camera *c, vec3 d, double distance, vec3 axis[2], double length[2]);
 /* Computes the distances along d, in units of d, from x_k to the near and far planes. camera_looks is true for d. */
 void camera_clip(const struct camera *c, vec3 d, double *t_min, double *t_max);

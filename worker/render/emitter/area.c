@@ -1,22 +1,22 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Light from a surface, equal in all directions on the side of its normal, or on both (two_sided). Meshes: uniform per
- * area. Spheres: uniform per area for light sub-paths; seen from outside, uniform over the cone that the sphere
- * subtends (Shirley, Wang, Zimmerman 1996, sec. 4.1.1), with its angle computed from the sine so that distant spheres
- * keep their precision.
+ * A surface with the same radiance in all directions on the side of its normal, or on both sides (two_sided). Points on
+ * meshes are sampled uniformly per area. So are points on spheres for light sub-paths; next event estimation from
+ * outside a sphere samples uniformly over the cone that it subtends (Shirley, Wang, Zimmerman 1996, sec. 4.1.1), whose
+ * angle is computed from its sine to keep its precision for distant spheres.
  *
- * A light sub-path leaves on either side by chance. What encloses a body is mostly seen from outside, so few start
- * inside it, unless it is so large that it may be a dome around the scene; how many do is a matter of variance, not of
- * the result.
+ * If both sides emit, the side of a light sub-path is random. A closed surface is mostly seen from outside, so few
+ * sub-paths start on its inside, unless it is so large that it may be a dome around the scene. The probability only
+ * affects the variance.
  */
 #include "worker/render/emitter/surface_light.h"
 
 struct area_light {
 	struct surface_light light; /* first: surface_light.h */
-	double back;		    /* probability that a sub-path leaves against the normal; 0: one side */
+	double back;		    /* probability that a sub-path leaves against the normal; 0: one-sided */
 };
 
-/* The triangles' normals, weighted by area, add up to 0 where they enclose a body. */
+/* Returns whether the surface encloses a body: the normals of its triangles, weighted by area, then add up to 0. */
 static bool is_closed(const struct surface_light *l)
 {
 	vec3 sum = {0, 0, 0};
@@ -34,7 +34,7 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	if (rc)
 		return rc;
 	bool both = node_bool(n, "two_sided", node_bool(n, "twosided", false));
-	/* The scene's radius is 1: a ball of half of that has an area of pi. */
+	/* The scene's radius is 1; a sphere of half that radius has an area of pi. */
 	l->back = !both ? 0 : is_closed(&l->light) && l->light.area < M_PI ? 0.0625 : 0.5;
 	em->power = l->light.area * M_PI * em->brightest * (both ? 2 : 1);
 	return 0;
@@ -69,8 +69,8 @@ static double pdf_direction(const struct emitter *em, const struct emitter_point
 	return (cosine > 0 ? (1 - l->back) * cosine : -l->back * cosine) / M_PI;
 }
 
-/* The sphere as seen from outside: distance and squared sine of its half angle. false: seen from inside, or it emits
- * inwards. */
+/* Computes the cone that the sphere subtends at ref: its axis, the distance of the centre, and the squared sine of its
+ * half angle. Returns false if the light is not a sphere that emits outwards, or ref is inside it. */
 static bool sphere_cone(const struct surface_light *l, vec3 ref, vec3 *axis, double *distance, double *sin2)
 {
 	vec3 to = vec3_sub(l->surface.center, ref);
@@ -105,7 +105,8 @@ static bool sample_toward(const struct emitter *em, vec3 ref, const double u[2],
 	double distance, sin2;
 	if (!sphere_cone(l, ref, &axis, &distance, &sin2))
 		return surface_light_sample_point(em, u, x, pdf);
-	/* q = 1 - cos(theta) of the direction within the cone; then the near crossing, as an angle at the centre. */
+	/* q = 1 - cos(theta), with theta the angle of the direction to the axis; t: distance of the nearer
+	 * intersection. */
 	double q = u[0] * sin2 / (1 + sqrt(1 - sin2)), s2 = q * (2 - q), c = 1 - q, r = l->surface.radius;
 	double t = distance * c - sqrt(fmax(r * r - distance * distance * s2, 0));
 	double phi = 2 * M_PI * u[1], s = sqrt(s2);
@@ -114,7 +115,7 @@ static bool sample_toward(const struct emitter *em, vec3 ref, const double u[2],
 	vec3 p = vec3_madd(ref, t, w);
 	x->infinite = false;
 	vec3 out = vec3_sub(p, l->surface.center);
-	/* So distant that it rounds to a point: the nearest one is used. */
+	/* A sphere so distant that it rounds to a point: use the point nearest to ref. */
 	surface_light_on_sphere(l, vec3_length(out) > 0 ? vec3_normalize(out) : vec3_neg(axis), x);
 	*pdf = sphere_pdf_area(ref, sin2, x);
 	return *pdf > 0;
@@ -133,7 +134,7 @@ static double pdf_toward(const struct emitter *em, vec3 ref, const struct emitte
 const struct emitter_ops emitter_ops_area = {
 	.decl = PLUGIN(EMITTER, "area", {.name = "radiance", .types = VALUE_TEXTURE, .max = PARAM_LIGHT_MAX},
 		       {.name = "two_sided", .types = VALUE_BOOL},
-		       {.name = "twosided", .types = VALUE_BOOL}, /* the same, by Mitsuba 3's name */
+		       {.name = "twosided", .types = VALUE_BOOL}, /* Mitsuba 3's name of two_sided */
 		       {.name = "sampling_weight", .types = VALUE_FLOAT, .status = PARAM_IGNORED}),
 	SURFACE_LIGHT_OPS,
 	.data_size = sizeof(struct area_light),

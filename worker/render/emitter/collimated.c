@@ -2,14 +2,14 @@
 /*
  * `collimated` of 0.5/0.6: `power` along a line without width, from the origin of to_world towards its +z.
  *
- * Both the place and the direction of a path's first edge are given, and so is where it ends: a path begins like every
- * path of this light, and only techniques that draw this beginning from the light, with two of its vertices or more,
- * can make one. The delta distribution of the direction is left out of power and density alike: where the beam goes,
- * `radiance` is the power and the density 1 per solid angle, elsewhere both are 0. No point is drawn to be joined to.
+ * The position and the direction of a path's first edge are fixed, and so is its end: all paths from this light begin
+ * alike, and only techniques that sample at least two vertices from the light can generate them. The delta distribution
+ * of the direction is omitted from both power and density: along the beam, `radiance` is the power and the density 1,
+ * elsewhere both are 0. No point is sampled for next event estimation.
  */
 #include "worker/render/emitter/delta.h"
 
-/* What vertices that were moved or rounded may be off. */
+/* Tolerance for the direction between two vertices that have been offset or rounded. */
 static const double same_direction = 1e-7;
 
 struct beam {
@@ -71,7 +71,8 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 		return code;
 	em->beam = true;
 	em->power = delta_strength(&b->light);
-	/* All of it may come from one point, seen by one pixel: a million of them see a unit of solid angle. */
+	/* All of the light may come from one point, seen by one pixel: allow for pixels of a millionth of a
+	 * steradian. */
 	em->brightest *= 0x1p20;
 	return 0;
 }

@@ -3,13 +3,14 @@
 
 #include "worker/render/math/cie.h"
 
-/* By albedo 0 and 1, turbidity 1 to 10 and control point: A to G, I, H, and the mean radiance. */
+/* For X, Y and Z, by albedo (0 and 1), turbidity (1 to 10) and control point: A to G, I, H, and the mean radiance. */
 enum { TURBIDITIES = 10, POINTS = 6, NUMBERS = 10 };
 static const double table[3][2][TURBIDITIES][POINTS][NUMBERS] = {
 #include "worker/render/emitter/data/hosek_wilkie.inc"
 };
 
-/* Weights of the control points: a Bezier curve of degree 5 in the cube root of the elevation over a right angle. */
+/* Computes the weights of the control points of a Bezier curve of degree 5 in the cube root of the elevation over 90
+ * degrees. */
 static void point_weights(double sun, double weight[POINTS])
 {
 	static const double binomial[POINTS] = {1, 5, 10, 10, 5, 1};
@@ -38,7 +39,7 @@ struct daylight daylight_of(double turbidity, const double albedo[3], double sun
 	return d;
 }
 
-/* Equation (8) with chi of equation (9). */
+/* Returns the value of equation (8), with chi of equation (9). */
 static double radiance_of(const double s[9], double angle, double gamma)
 {
 	double up = cos(angle), toward = cos(gamma);
@@ -64,8 +65,8 @@ void daylight_sky(const struct daylight *d, double angle, double gamma, double r
 	rgb_from_xyz(xyz, rgb);
 }
 
-/* Preetham's table 2: the sun outside the atmosphere, W / (m^2 sr nm), and absorption by ozone and water vapour, 1 /
- * cm, from 380 nm by 10. Other gases absorb next to 760 nm only. */
+/* Preetham's table 2: radiance of the sun outside the atmosphere, W / (m^2 sr nm), and absorption by ozone and by water
+ * vapour, 1 / cm, from 380 nm in steps of 10 nm. Other gases absorb near 760 nm only and are left out. */
 enum { TABLE_NM = 380, TABLE_STEP = 10, TABLE_COUNT = 38 };
 static const double sun_outside[TABLE_COUNT] = {16559.0, 16233.7, 21127.5, 25888.2, 25829.1, 24232.3, 26760.5, 29658.3,
 						30545.4, 30057.5, 30663.7, 28830.4, 28712.1, 27825.0, 27100.6, 27233.6,
@@ -78,7 +79,7 @@ static const double ozone[TABLE_COUNT] = {0,	 0,	0,     0,     0,     0,	    0,	
 					  0.036, 0.028, 0.023, 0.018, 0.014, 0.011, 0.01,  0.009};
 static const double vapour[TABLE_COUNT] = {[31] = 0.016, 0.024, 0.0125, 1, 0.87, 0.061, 0.001};
 
-/* Beyond the table its last value. */
+/* Interpolates linearly; beyond the table, its first or last value applies. */
 static double at_wavelength(const double table_of[TABLE_COUNT], double nm)
 {
 	double x = fmin(fmax((nm - TABLE_NM) / TABLE_STEP, 0), TABLE_COUNT - 1);
@@ -86,7 +87,7 @@ static double at_wavelength(const double table_of[TABLE_COUNT], double nm)
 	return table_of[low] + (x - low) * (table_of[low + 1] - table_of[low]);
 }
 
-/* The transmittance of an amount x of an absorber. */
+/* Returns the transmittance of an amount x of water vapour. */
 static double through_vapour(double x)
 {
 	return exp(-0.2385 * x / pow(1 + 20.07 * x, 0.45));
@@ -109,18 +110,18 @@ void daylight_sun(double turbidity, double sun, double rgb[3])
 	rgb_from_xyz(xyz, rgb);
 }
 
-/* Days from noon (UT) of January 1, 2000; of the Gregorian calendar, whose leap days come last if years begin in March.
- */
+/* Returns the days since noon (UT) of January 1, 2000, in the Gregorian calendar. Years are counted from March, so that
+ * leap days are their last days. */
 static double days_of(const struct daylight_time *t)
 {
 	int y = t->month > 2 ? t->year : t->year - 1, m = (t->month + 9) % 12;
 	int day = 365 * y + y / 4 - y / 100 + y / 400 + (153 * m + 2) / 5 + t->day - 1;
-	const int first = 730425; /* of January 1, 2000 */
+	const int first = 730425; /* the day number of January 1, 2000 */
 	return day - first - 0.5 + (t->hour - t->zone) / 24;
 }
 
-/* Section 3 of the paper: the ecliptic, right ascension and declination, then hour angle, azimuth from north and angle
- * from the zenith, with the parallax of the earth's surface. */
+/* Section 3 of the paper: ecliptic coordinates, right ascension and declination, then hour angle, azimuth from north,
+ * and angle from the zenith, corrected for the parallax of an observer on the earth's surface. */
 vec3 daylight_position(const struct daylight_time *t)
 {
 	double n = days_of(t), omega = 2.1429 - 0.0010394594 * n, anomaly = 6.2400600 + 0.0172019699 * n;
@@ -128,7 +129,7 @@ vec3 daylight_position(const struct daylight_time *t)
 		       0.0001134 - 0.0000203 * sin(omega);
 	double tilt = 0.4090928 - 6.2140e-9 * n + 0.0000396 * cos(omega);
 	double ascension = atan2(cos(tilt) * sin(along), cos(along)), declination = asin(sin(tilt) * sin(along));
-	double sidereal = 6.6974243242 + 0.0657098283 * n + t->hour - t->zone; /* of Greenwich, hours */
+	double sidereal = 6.6974243242 + 0.0657098283 * n + t->hour - t->zone; /* sidereal time at Greenwich, hours */
 	double turn = (sidereal * 15 + t->longitude) * M_PI / 180 - ascension, l = t->latitude * M_PI / 180;
 	double zenith = acos(fmax(fmin(cos(l) * cos(turn) * cos(declination) + sin(declination) * sin(l), 1), -1));
 	double azimuth = atan2(-sin(turn), tan(declination) * cos(l) - sin(l) * cos(turn));

@@ -14,30 +14,32 @@
 	0.0046757 /* angular radius of the sun's disk seen from the earth: half of 0.5358 degrees \
 		   */
 
-/* Of X, Y and Z. */
+/* Parameters of the sky for one position of the sun, for each of X, Y and Z. */
 struct daylight {
 	double shape[3][9]; /* A to G, I and H of equations (8) and (9) */
-	double mean[3];	    /* radiance, W / (m^2 sr) */
+	double mean[3];	    /* mean radiance, W / (m^2 sr) */
 };
 
-/* turbidity 1 (clear) to 10 (haze); albedo of the ground for X, Y and Z, 0 to 1; sun from 0 to pi/2. */
+/* Computes the sky. turbidity: 1 (clear) to 10 (haze); albedo: of the ground for X, Y and Z, 0 to 1; sun: its angle
+ * from the zenith, 0 to pi/2. */
 struct daylight daylight_of(double turbidity, const double albedo[3], double sun);
-/* The sky at `angle` from the zenith and `gamma` from the sun; not negative. Black below the horizon. */
+/* Computes the radiance of the sky at `angle` from the zenith and `gamma` from the sun, which is never negative, and 0
+ * below the horizon. */
 void daylight_sky(const struct daylight *d, double angle, double gamma, double rgb[3]);
-/* The sun's disk through the air, which scatters (Rayleigh, aerosols) and absorbs (ozone, other gases, water vapour).
- */
+/* Computes the radiance of the sun's disk, seen through an atmosphere that scatters (Rayleigh, aerosols) and absorbs
+ * (ozone, water vapour); sun: its angle from the zenith. */
 void daylight_sun(double turbidity, double sun, double rgb[3]);
 
-/* Where and when; time in hours by the clock of the zone, east and north positive. */
+/* A place and a time. */
 struct daylight_time {
-	double latitude, longitude; /* degrees */
-	double zone, hour;
+	double latitude, longitude; /* degrees; north and east are positive */
+	double zone, hour; /* hours: of the zone from UT, positive eastwards; of the day, by the zone's clock */
 	int year, month, day;
 };
-/* x east, y up, z south: Blanco-Muriel et al. 2001, "Computing the Solar Vector", by which both Mitsubas go. Good to an
- * arcminute until 2050. */
+/* Returns the unit direction to the sun, x east, y up, z south: Blanco-Muriel et al. 2001, "Computing the Solar
+ * Vector", as in both Mitsuba dialects. Accurate to an arcminute until 2050. */
 vec3 daylight_position(const struct daylight_time *t);
-/* Days from one date to the other. A day beyond the month's end counts on into the next month. */
+/* Returns the number of days from one date to the other. A day beyond the end of its month lies in the next month. */
 int daylight_days_between(const struct daylight_time *from, const struct daylight_time *to);
 
 #endif

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Shared by delta emitters, whose light comes from a single point. `data` of such an emitter begins with struct
- * delta_light.
+ * Functions shared by delta emitters, whose light comes from a single point. `data` of such an emitter begins with
+ * struct delta_light.
  *
- * They are never seen directly, so their own brightness bounds nothing. A white diffuse surface lit by a point at 1/57
- * of the scene's radius, or a highlight of roughness 0.01, is about a thousand times as bright as the intensity at a
- * distance of one world unit: DELTA_HEADROOM times that is given as `brightest`. It sets the grid of sums of an image
- * whose bootstrap was black; if it is too small the job ends with an error, if it is too large bits below 2^-30 of it
- * are lost.
+ * They are never seen directly, so their own brightness is no bound for that of pixels. A white diffuse surface lit by
+ * a point light at 1/57 of the scene's radius, or a highlight of roughness 0.01, is about a thousand times as bright as
+ * the intensity at a distance of one world unit. `brightest` is therefore DELTA_HEADROOM times the latter. It
+ * determines the grid for the sums of an image whose bootstrap was black: if it is too small, the job fails; if it is
+ * too large, bits below 2^-30 times its value are lost.
  */
 #ifndef WORKER_RENDER_EMITTER_DELTA_H
 #define WORKER_RENDER_EMITTER_DELTA_H
@@ -17,26 +17,27 @@
 #define DELTA_HEADROOM 1024.0
 
 struct delta_light {
-	struct color color; /* intensity or irradiance, in the scene's units */
-	double factor;	    /* from those to the rescaled world's */
-	struct emitter_point x;
+	struct color color;	/* intensity or irradiance, in the scene's units */
+	double factor;		/* factor that converts `color` to the units of the rescaled world */
+	struct emitter_point x; /* the point, or the direction at infinity */
 };
 
-/* `x` of em->data is set. Reads the colour `name` of the node (default 1) and sets everything of `em` except its power,
- * which is that of intensity 1 times the result of delta_strength. */
+/* Reads the colour `name` of the node (1 by default) and sets all members of `em` except its power, which is the power
+ * for intensity 1 times delta_strength(). The caller has set `x` of em->data. Returns 0 or a negative error code. */
 int delta_create(struct emitter *em, const struct scene_node *n, const char *name, double factor,
 		 const struct emitter_build *build, struct error *e);
-/* The same without the colour: the caller sets shape, brightest and power. */
+/* Like delta_create(), but without the colour: the caller sets shape, brightest and power. */
 int delta_place(struct emitter *em, const struct scene_node *n, double factor, struct error *e);
-/* Unit axes of to_world: +z as it is, +y made perpendicular to it; a mirrored transform stays mirrored.
- * false: it is singular. */
+/* Computes unit axes of to_world: +z is kept, +y is made perpendicular to it, and a mirrored transform stays mirrored.
+ * Returns false if to_world is singular. */
 bool delta_axes_of(const mat4 *to_world, vec3 axes[3]);
-/* The same for a node; -EINVAL with a sentence. */
+/* Like delta_axes_of(), but returns 0, or -EINVAL with a sentence that names the node. */
 int delta_axes(const struct scene_node *n, const mat4 *to_world, vec3 axes[3], struct error *e);
+/* Returns the factor times the mean of the colour over wavelengths. */
 double delta_strength(const struct delta_light *l);
-/* -EINVAL with a sentence if the node gives both `name` and to_world. */
+/* Returns -EINVAL with a sentence if the node has both `name` and to_world, otherwise 0. */
 int delta_either(const struct scene_node *n, const char *name, struct error *e);
-/* The origin of to_world in the rescaled world. */
+/* Returns the origin of to_world in the rescaled world. */
 vec3 delta_origin(const mat4 *to_world, const struct emitter_build *build);
 
 bool delta_sample_point(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf_point);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Parallel light from infinity: irradiance on a plane perpendicular to the direction in which it travels,
- * `direction` or to_world's +z. */
+/* Parallel light from infinity, given by its irradiance on a plane perpendicular to the direction in which it travels:
+ * `direction`, or +z of to_world. */
 #include "worker/render/emitter/delta.h"
 
 static spectrum radiance(const struct emitter *em, const struct emitter_point *x, vec3 w, const struct wavelengths *wl)

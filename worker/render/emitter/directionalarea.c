@@ -1,32 +1,33 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Light that leaves a surface along its normal, with `radiance` as the power per area. An exactly parallel beam could
- * only be followed from the light; this one diverges by SPREAD, as a laser pointer's does, so that every integrator and
- * every mutation has it as it has other emitters. Its edge is blurred by a thousandth of the distance.
+ * only be traced from the light; this beam diverges by SPREAD, like that of a laser pointer, so that every integrator
+ * and mutation can treat it like other emitters. Its edge is blurred by a thousandth of the distance.
  *
  * At a point x with normal n, with rho = sin(angle between w and n) / sin(SPREAD) < 1:
  *
  *   L(x, w) = M 2 (1 - rho^2) / (pi sin^2 SPREAD),   the integral of L cos over w is M,
  *
- * and directions are sampled in proportion to L cos. It falls to 0 at the edge, so that a direction that is computed
- * again from two points, and differs by rounding, is no other light.
+ * and directions are sampled in proportion to L cos. L falls to 0 at the edge, so that the rounding of a direction that
+ * is computed again from two points changes the light only slightly.
  *
- * Next event estimation from a point needs the places that shine at it: those around its projection on a plane, within
- * the distance times the tangent; around the nearest point of a sphere; of any other surface they are not looked for,
- * and paths must come from the light.
+ * Next event estimation from a point needs the part of the surface that shines at it: on a plane, a disc around the
+ * point's projection, of radius distance times tan SPREAD; on a sphere, a cap around the nearest point. On other
+ * surfaces this part is not searched for, and paths have to start at the light.
  *
- * A point that is behind the plane or inside of the sphere, or whose place is not on the shape, gets no sample.
+ * Sampling fails for a point behind the plane or inside the sphere, and if the sampled position is not on the shape.
  */
 #include "worker/render/emitter/surface_light.h"
 
-/* Half of the angle of the beam, in radians. */
+/* Half the opening angle of the beam, in radians. */
 #define SPREAD 1e-3
 
-/* How far the corners of a plane may be off it, as a share of its extent: they are rounded. All of it shines along the
- * plane's normal, since that of a thin triangle with rounded corners may differ by more than SPREAD. */
+/* The distance by which corners may be off a plane because of rounding, as a share of its extent. All triangles shine
+ * along the normal of the plane, since the normal of a thin triangle with rounded corners may differ by more than
+ * SPREAD. */
 #define PLANE_OFFSET 1e-5
 
-/* What is searched is wider than what shines by this factor, because of rounding. */
+/* The searched part of a surface is larger than the shining part by this factor, because of rounding. */
 #define MARGIN 1.02
 
 enum { PLANE_TRIANGLES = 256 };
@@ -34,12 +35,14 @@ enum { PLANE_TRIANGLES = 256 };
 struct beam {
 	struct surface_light light;
 	bool is_plane;
-	vec3 origin, n; /* of the plane */
-	double offset;	/* the most that a corner is off it */
-	vec3 own[3];	/* of a mesh that moves: what is, when the shutter opens, a right-handed frame around n */
+	vec3 origin, n; /* a point of the plane, and its unit normal */
+	double offset;	/* largest distance of a corner from the plane */
+	vec3 own[3];	/* of a mesh that moves, in its own coordinates: a frame around n, right-handed when the shutter
+			   opens */
 };
 
-/* Whether all triangles lie in the plane of their sum, and face the same side. */
+/* Sets is_plane if all triangles lie in one plane, perpendicular to the sum of their normals, and face the same
+ * side. */
 static void find_plane(struct beam *b)
 {
 	const struct surface_light *l = &b->light;
@@ -66,6 +69,8 @@ static void find_plane(struct beam *b)
 	b->is_plane = b->offset <= PLANE_OFFSET * extent;
 }
 
+/* Stores the frame of the plane in the mesh's own coordinates; if to_world has no inverse, the mesh counts as not
+ * plane. */
 static void keep_own(struct beam *b)
 {
 	const struct frame f = frame_around(b->n);
@@ -78,8 +83,8 @@ static void keep_own(struct beam *b)
 	b->own[2] = mat4_vector(&back, f.n);
 }
 
-/* The plane moves with the emitter: its normal is the cross product of two vectors in it, transformed, and heights over
- * it scale as a third vector's does. */
+/* Moves the plane with the emitter. Its normal is the cross product of two transformed vectors of the plane; heights
+ * above it scale like the normal component of the transformed third axis. */
 static void place(struct emitter *em, const mat4 *to_world)
 {
 	struct beam *b = em->data;
@@ -106,7 +111,7 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	return 0;
 }
 
-/* L over M: per projected solid angle. 0 outside. */
+/* Returns L / M, a density per projected solid angle; 0 outside the beam. */
 static double profile(vec3 n, vec3 w)
 {
 	double cosine = vec3_dot(n, w), edge = sin(SPREAD);
@@ -117,7 +122,7 @@ static double profile(vec3 n, vec3 w)
 	return rho2 < 1 ? 2 * (1 - rho2) / (M_PI * edge * edge) : 0;
 }
 
-/* The middle of the beam from x. */
+/* Returns the central direction of the beam at x. */
 static vec3 beam_axis(const struct beam *b, const struct emitter_point *x)
 {
 	return b->is_plane ? b->n : x->n;
@@ -130,7 +135,7 @@ static spectrum radiance(const struct emitter *em, const struct emitter_point *x
 	return share > 0 ? spectrum_scale(share, texture_eval(&b->light.radiance, &x->where, wl)) : spectrum_of(0);
 }
 
-/* rho of the profile, from a number in [0,1). */
+/* Samples rho of the profile from a number in [0,1). */
 static double sample_rho(double u)
 {
 	return sqrt(u / (1 + sqrt(1 - u))); /* rho^2 = 1 - sqrt(1 - u) */
@@ -153,11 +158,12 @@ static double pdf_direction(const struct emitter *em, const struct emitter_point
 	return profile(axis, w) * fmax(vec3_dot(axis, w), 0);
 }
 
-/* A round piece of the surface that holds all that shines at a point. */
+/* A disc or cap of the surface that contains everything that shines at a point. */
 struct spot_around {
-	vec3 axis;     /* unit; the plane's normal, or from the sphere's centre to the spot */
-	vec3 center;   /* on the plane */
-	double radius; /* on the plane, or the angle at the sphere's centre */
+	vec3 axis; /* unit; the normal of the plane, or the direction from the sphere's centre to the middle of the cap
+		    */
+	vec3 center;   /* of the disc; unused for a cap */
+	double radius; /* of the disc, or the angle of the cap at the sphere's centre */
 };
 
 static bool spot_of_plane(const struct beam *b, vec3 ref, struct spot_around *s)
@@ -170,8 +176,8 @@ static bool spot_of_plane(const struct beam *b, vec3 ref, struct spot_around *s)
 	return reach > 0;
 }
 
-/* A point whose normal is off the direction to ref by SPREAD is off the axis, seen from the centre, by
- * SPREAD - asin(r / d sin SPREAD), which is SPREAD (1 - r / d) up to SPREAD^3. */
+/* Finds the cap. If the normal at a point and the direction to ref differ by SPREAD, the angle between the point and
+ * the axis at the sphere's centre is SPREAD - asin(r / d sin SPREAD), or SPREAD (1 - r / d) up to terms of SPREAD^3. */
 static bool spot_of_sphere(const struct surface_light *l, vec3 ref, struct spot_around *s)
 {
 	vec3 to = vec3_sub(ref, l->surface.center);
@@ -212,7 +218,7 @@ static bool sample_plane(const struct beam *b, vec3 ref, const double u[2], stru
 	return false;
 }
 
-/* Per area of the sphere, with rho^2 as the share of the cap's height. */
+/* Returns the density per area of the sphere. rho2: height from the top of the cap over that of the whole cap. */
 static double cap_pdf(const struct surface_light *l, const struct spot_around *s, double rho2)
 {
 	double half = sin(0.5 * s->radius);
@@ -258,7 +264,7 @@ static double pdf_toward(const struct emitter *em, vec3 ref, const struct emitte
 		return surface_light_pdf_point(em, x);
 	if (!spot_of_sphere(&b->light, ref, &s))
 		return 0;
-	/* From the chord, which has all digits. */
+	/* Computed from the chord, without cancellation. */
 	vec3 off = vec3_sub(vec3_normalize(vec3_sub(x->p, b->light.surface.center)), s.axis);
 	double half = sin(0.5 * s.radius);
 	return cap_pdf(&b->light, &s, vec3_dot(off, off) / (4 * half * half));

@@ -5,8 +5,8 @@
  * `pdf_point` and `pdf_toward` are per area (world units of the rescaled scene), or per solid angle at infinity.
  * Immutable after creation; any thread; allocates nothing after create.
  *
- * Delta emitters are a single point (or direction): no path hits them by chance, x_0 has the counting measure, and both
- * densities are 1. `radiance` gives intensity per solid angle at a point (without a cosine; n is 0), or irradiance
+ * Delta emitters are a single point (or direction): no path hits them by chance, x_0 is in the counting measure, and
+ * both densities are 1. `radiance` gives intensity per solid angle at a point (without a cosine; n is 0), or irradiance
  * across the direction at infinity.
  */
 #ifndef WORKER_RENDER_EMITTER_EMITTER_H
@@ -28,20 +28,20 @@ struct emitter_surface {
 	bool is_sphere;
 	vec3 center;
 	double radius, normal_sign; /* -1: normals point inwards */
-	struct frame sphere_axes;   /* of the (u,v) parametrisation */
+	struct frame sphere_axes;   /* axes of the (u,v) parametrisation */
 	uint32_t triangle_count;
 	const float (*position)[3];
-	const double (*unrounded)[3]; /* NULL: position; see worker/render/geom/primitive.h */
+	const double (*unrounded)[3]; /* replaces `position` unless NULL; see worker/render/geom/primitive.h */
 	const uint32_t (*index)[3];
 	const float (*uv)[2];	    /* NULL: none */
-	const struct motion *moves; /* to the rescaled world, for a sphere from where it is here; NULL: it is still */
+	const struct motion *moves; /* to the rescaled world, of a sphere from `center`; NULL: no motion */
 };
 
 struct emitter_build {
 	const struct asset_source *assets;
 	struct arena *arena;
 	bool dialect_3;
-	const struct emitter_surface *surface; /* NULL if it has no shape */
+	const struct emitter_surface *surface; /* NULL: the emitter has no shape */
 	struct attribute_table *attributes;    /* of the mesh; NULL: none */
 	vec3 center;			       /* a scene point p is at scale (p - center) in the rescaled world */
 	double scale;
@@ -53,53 +53,56 @@ struct emitter;
 
 struct emitter_ops {
 	struct plugin_decl decl;
-	size_t data_size;   /* of em->data, which is zeroed memory before `create`; 0: it has none yet */
-	bool needs_surface; /* area: belongs to a shape */
-	bool in_medium;	    /* what is inside its shape shines: no struct emitter is made of it */
+	size_t data_size;   /* bytes of em->data, which is zeroed before `create` is called; 0: none */
+	bool needs_surface; /* belongs to a shape */
+	bool in_medium;	    /* the medium inside its shape emits: no struct emitter is created for it */
 	int (*create)(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
 		      struct error *e);
-	/* Radiance leaving x in direction w (unit, away from the emitter, into the scene). */
+	/* Returns the radiance that leaves x in direction w (unit, away from the emitter, into the scene). */
 	spectrum (*radiance)(const struct emitter *em, const struct emitter_point *x, vec3 w,
 			     const struct wavelengths *wl);
-	/* Samples where a light sub-path starts. */
+	/* Samples the point at which a light sub-path starts. Returns false if there is none. */
 	bool (*sample_point)(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf_point);
 	double (*pdf_point)(const struct emitter *em, const struct emitter_point *x);
-	/* The numbers in [0,1) from which sample_point makes x; NULL for delta emitters. */
+	/* Computes the numbers in [0,1) that sample_point maps to x; NULL for delta emitters. */
 	void (*point_inverse)(const struct emitter *em, const struct emitter_point *x, double u[2]);
-	/* Samples the direction in which it leaves; not called for infinite emitters. */
+	/* Samples the direction in which a light sub-path leaves x; pdf_solid: per solid angle. Not called for infinite
+	 * emitters. */
 	bool (*sample_direction)(const struct emitter *em, const struct emitter_point *x, const double u[2], vec3 *w,
 				 double *pdf_solid);
 	double (*pdf_direction)(const struct emitter *em, const struct emitter_point *x, vec3 w);
-	/* Samples a point for next event estimation from ref. Both NULL: as sample_point and pdf_point. */
+	/* Samples a point for next event estimation from ref. If both are NULL, sample_point and pdf_point are used. */
 	bool (*sample_toward)(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x,
 			      double *pdf_toward);
 	double (*pdf_toward)(const struct emitter *em, vec3 ref, const struct emitter_point *x);
-	/* Puts it where a transform to the rescaled world leads: the motion of its surface, or what its to_world, a
-	 * VALUE_PLACE, is at a time. NULL: it cannot move. */
+	/* Moves the emitter to its position at one time. to_world: transform to the rescaled world, from the motion of
+	 * the surface or from the emitter's own to_world, a VALUE_PLACE. NULL: the emitter cannot move. */
 	void (*place)(struct emitter *em, const mat4 *to_world);
 };
 
 struct emitter {
 	const struct emitter_ops *ops;
 	bool infinite, textured, delta;
-	bool beam; /* a delta emitter of one direction: no path is joined to it, and light sub-paths begin all alike */
+	bool beam; /* a delta emitter of one direction: nothing connects to it, and all its light sub-paths begin alike
+		    */
 	enum color_shape shape; /* CONSTANT, D65: the same spectrum everywhere, up to a factor */
 	double power; /* for choosing among emitters: area x pi x mean radiance; infinite ones: mean radiance x 4 pi, or
 			 irradiance, which the caller multiplies by the scene's cross section pi R^2 */
-	double brightest; /* upper bound of the radiance over places, directions and wavelengths; for delta emitters a
-			     bound that pixels are expected to stay below, see delta.h */
-	const struct motion *moves; /* to the rescaled world; NULL: it is still. Otherwise `data` is that when the
-				       shutter opens */
+	double brightest; /* upper bound of the radiance over positions, directions and wavelengths; for delta emitters,
+			     a bound below which pixels are expected to stay (delta.h) */
+	const struct motion *moves; /* motion to the rescaled world; NULL: none. With one, `data` describes the emitter
+				       when the shutter opens */
 	void *data;
 };
 
-/* For an emitter that moves, as it is at one time. */
+/* Storage for a moving emitter at one time. EMITTER_ROOM: the largest data_size. */
 enum { EMITTER_ROOM = 1024 };
 struct emitter_room {
 	struct emitter em;
 	_Alignas(16) unsigned char data[EMITTER_ROOM];
 };
 
+/* Sets room->em to the moving emitter em at the given time. emitter_at returns it, or em itself if em does not move. */
 void emitter_move(const struct emitter *em, double time, struct emitter_room *room) __attribute__((cold));
 static inline const struct emitter *emitter_at(const struct emitter *em, double time, struct emitter_room *room)
 {
@@ -121,14 +124,17 @@ static inline double emitter_pdf_toward(const struct emitter *em, vec3 ref, cons
 	return em->ops->pdf_toward ? em->ops->pdf_toward(em, ref, x) : em->ops->pdf_point(em, x);
 }
 
-/* Whether it belongs to a shape. */
+/* Returns whether emitters of this type belong to a shape. */
 bool emitter_needs_surface(const struct scene_node *n);
-/* Whether the medium inside a shape shines. */
+/* Returns whether emitters of this type make the medium inside a shape emit. */
 bool emitter_is_in_medium(const struct scene_node *n);
 
+/* Creates em from n, with em->data in build->arena. Returns 0 or a negative error code: -ENOTSUP if the type is not
+ * known, -EINVAL if it has to be inside a shape and is not, or the other way round, -ENOMEM, or the code of the
+ * plug-in. */
 int emitter_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e);
 
-/* Reads property `name` of an emitter: a colour or a texture; 1 if absent. */
+/* Reads the property `name` of an emitter, a colour or a texture; 1 if absent. Returns 0 or a negative error code. */
 int emitter_texture(struct texture *t, const struct scene_node *n, const char *name, enum color_role role,
 		    const struct emitter_build *build, struct error *e);
 

@@ -1,21 +1,22 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * An equirectangular environment map. Local +y is up (the top row), the middle column looks along +z and the one a
- * quarter from the left along +x: u = atan2(x, -z) / 2 pi, v = acos(y) / pi, in both dialects. Pixel centres are at
- * half-integers, but in 3.x the centres of the first and last rows are the poles, and the others are at equal angles
- * between them.
+ * An equirectangular environment map. Local +y is up (the top row), the middle column is in direction +z, and the
+ * column a quarter from the left in direction +x: u = atan2(x, -z) / 2 pi, v = acos(y) / pi, in both dialects. Pixel
+ * centres are at half-integers, except that in 3.x the centres of the first and last rows are the poles, and the other
+ * rows are at equal angles between them.
  *
  * Sampling: the radiance is bilinear between pixel centres, so the cells of the density also lie between pixel centres
- * (and between the outer rows and the poles, where these are not one). Within a cell the density is constant in solid
- * angle and proportional to the mean luminance of its four corners: it is positive wherever there is light. The
- * probabilities of a row's cells are multiples of 2^-31, at least one where there is light, stored as running sums:
- * sampling and density use the same numbers.
+ * (and between the outer rows and the poles, unless these coincide). Within a cell the density is constant per solid
+ * angle and proportional to the mean luminance of its four corners, so it is positive wherever there is light. The
+ * probabilities of the cells of a row are multiples of 2^-31, at least one unit if there is light, and are stored as
+ * running sums, which both sampling and density use.
  *
- * to_world may stretch: a direction d sees the image where A d points, A the inverse of to_world's matrix with
- * determinant 1. The map from d to A d / |A d| makes |A d|^-3 solid angles of one, which multiplies densities.
+ * to_world may stretch the map: a direction d of the world sees the image in the local direction A d, where A is the
+ * inverse of to_world's matrix, scaled to determinant 1. The map from d to A d / |A d| multiplies solid angles by |A
+ * d|^-3, and with them densities.
  *
- * A to_world that is flat is refused, and so is a file that is no image. A map without light has a power of 0 and no
- * samples.
+ * Creation fails if to_world is flat, or if the file is not an image. For a map without light, the power is 0 and
+ * sampling fails.
  */
 #include "worker/render/emitter/envmap.h"
 
@@ -26,8 +27,8 @@
 #include <errno.h>
 #include <string.h>
 
-/* The least volume spanned by to_world's columns, scaled so that the longest is 1; below it, few pixels would fill the
- * sphere. */
+/* The smallest volume that to_world's columns may span, if scaled so that the longest has length 1; with a smaller one,
+ * few pixels would fill the sphere. */
 #define ENVMAP_VOLUME_MIN 1e-6
 
 static vec3 to_local(const struct envmap *m, vec3 d)
@@ -40,7 +41,7 @@ static vec3 to_world(const struct envmap *m, vec3 d)
 	return vec3_madd(vec3_madd(vec3_scale(d.x, m->at.axis[0]), d.y, m->at.axis[1]), d.z, m->at.axis[2]);
 }
 
-/* Solid angle around the local direction of `d`, a vector of the world, per solid angle around that of d / |d|. */
+/* Returns the local solid angle per solid angle in the world, at the world's direction d of any length. */
 static double jac_local_from_world(const struct envmap *m, vec3 d)
 {
 	double length = m->at.stretched ? vec3_length(to_local(m, d)) / vec3_length(d) : 1;
@@ -67,14 +68,14 @@ spectrum envmap_radiance(const struct emitter *em, const struct emitter_point *x
 	return spectrum_scale(m->scale, color_eval_rgb_illuminant(rgb, wl));
 }
 
-static double row_edge(const struct envmap *m, uint32_t row) /* angle from the pole above row */
+static double row_edge(const struct envmap *m, uint32_t row) /* angle of the upper edge of the row from the pole */
 {
 	if (m->to_poles)
 		return M_PI * row / m->rows;
 	return row == 0 ? 0 : row == m->rows ? M_PI : M_PI * (row - 0.5) / (m->rows - 1);
 }
 
-static double row_height(const struct envmap *m, uint32_t row) /* in the cosine: no cancellation at the poles */
+static double row_height(const struct envmap *m, uint32_t row) /* in the cosine, without cancellation */
 {
 	double a = row_edge(m, row), b = row_edge(m, row + 1);
 	return 2 * sin(0.5 * (a + b)) * sin(0.5 * (b - a));
@@ -85,7 +86,7 @@ static const uint32_t *row_cells(const struct envmap *m, uint32_t row)
 	return m->cell_cdf + (size_t)row * (m->columns + 1);
 }
 
-/* The position relative to the density's cells; across: fraction within its cell. */
+/* Finds the cell of the density that contains direction d; across: fraction of the way across the cell. */
 static void find_place(const struct envmap *m, vec3 d, uint32_t *row, uint32_t *column, double *across)
 {
 	double u, v;
@@ -119,7 +120,7 @@ void envmap_point_inverse(const struct emitter *em, const struct emitter_point *
 	find_place(m, x->p, &row, &column, &across);
 	const uint32_t *cells = row_cells(m, row);
 	vec3 d = to_local(m, x->p);
-	/* Heights in the cosine, computed from differences of angles. */
+	/* Share of the cell above d, as a difference of cosines computed from angles. */
 	double angle = atan2(hypot(d.x, d.z), d.y), edge = row_edge(m, row);
 	double down = 2 * sin(0.5 * (angle + edge)) * sin(0.5 * (angle - edge)) / row_height(m, row);
 	u[0] = cells[m->columns] ? (cells[column] + across * (cells[column + 1] - cells[column])) / cells[m->columns]
@@ -151,7 +152,7 @@ bool envmap_sample_point(const struct emitter *em, const double u[2], struct emi
 	return *pdf_point > 0;
 }
 
-/* Solid angle in the world per local one, in the cell's middle. */
+/* Returns the solid angle in the world per local solid angle, in the middle of the cell. */
 static double cell_stretch(const struct envmap *m, uint32_t row, uint32_t column)
 {
 	double theta = 0.5 * (row_edge(m, row) + row_edge(m, row + 1)), phi = 2 * M_PI * (column + 1.0) / m->columns;
@@ -161,7 +162,7 @@ static double cell_stretch(const struct envmap *m, uint32_t row, uint32_t column
 
 /* The luminances of one row of the image's pixels. */
 struct light_row {
-	uint32_t row; /* UINT32_MAX before any is loaded */
+	uint32_t row; /* UINT32_MAX: none is loaded yet */
 	double *luminance;
 };
 
@@ -175,8 +176,9 @@ static void load_row(const struct envmap *m, uint32_t row, struct light_row *to)
 	to->row = row;
 }
 
-/* The weight of each cell of a row: the mean luminance of its corners, times its solid angle in the world per local
- * one. pixels: the rows of pixels above and below the row of cells; each is loaded once as `row` counts up. */
+/* Computes the weight of each cell of a row: the mean luminance of its corners, times the solid angle in the world per
+ * local solid angle. pixels: the rows of pixels above and below the row of cells; each is loaded only once if `row`
+ * counts up. */
 static void weigh_cells(const struct envmap *m, uint32_t row, struct light_row pixels[2], double *weight)
 {
 	uint32_t below = row + m->to_poles, above = below == 0 ? 0 : below - 1;
@@ -197,7 +199,7 @@ static void weigh_cells(const struct envmap *m, uint32_t row, struct light_row p
 	}
 }
 
-/* Sets the integral of the luminance over the sphere. -ENOMEM. */
+/* Fills the tables of the density. *integral: that of the luminance over the sphere. -ENOMEM. */
 static int build_density(struct envmap *m, double *integral)
 {
 	size_t columns = m->columns;
@@ -225,7 +227,7 @@ static int build_density(struct envmap *m, double *integral)
 	return 0;
 }
 
-/* The axes of to_world, scaled so that their determinant is 1, and the rows of the inverse of that matrix. */
+/* Computes the axes of to_world, scaled so that their determinant is 1, and the rows of the inverse of that matrix. */
 static int stretched_axes(const struct scene_node *n, const mat4 *to_world, struct envmap_axes *a, struct error *e)
 {
 	double longest = 0;
@@ -247,12 +249,12 @@ static int stretched_axes(const struct scene_node *n, const mat4 *to_world, stru
 	return 0;
 }
 
-/* The axes for a to_world that keeps angles. */
+/* Computes the axes for a to_world that preserves angles. */
 static void turned_axes(const mat4 *to_world, struct envmap_axes *a)
 {
 	for (int c = 0; c < 3; c++)
 		a->axis[c] = vec3_normalize((vec3){to_world->m[0][c], to_world->m[1][c], to_world->m[2][c]});
-	/* Files give few digits: orthonormalised. */
+	/* Orthonormalise, since files give few digits. */
 	double sign = vec3_dot(vec3_cross(a->axis[0], a->axis[1]), a->axis[2]) < 0 ? -1 : 1;
 	a->axis[1] = vec3_normalize(vec3_madd(a->axis[1], -vec3_dot(a->axis[0], a->axis[1]), a->axis[0]));
 	a->axis[2] = vec3_scale(sign, vec3_cross(a->axis[0], a->axis[1]));

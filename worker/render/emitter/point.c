@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A point that emits equally in all directions: intensity, at a position or at the origin of to_world. */
+/* A point at `position`, or at the origin of to_world, that emits `intensity` in all directions. */
 #include "worker/render/emitter/delta.h"
 #include "worker/render/emitter/uniform.h"
 

@@ -1,25 +1,27 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A pinhole that throws a picture: the perspective camera the other way round, with the same axes, `fov` and `fov_axis`
- * (of the picture's shape). The picture is the irradiance across the axis at distance 1, divided by pi: a direction at
- * the angle t from the axis gets the intensity
+ * A pinhole that projects a picture: the inverse of the perspective camera, with the same axes, `fov` and `fov_axis`
+ * (applied to the shape of the picture). The picture is the irradiance on a plane across the axis at distance 1,
+ * divided by pi: a direction at the angle t from the axis gets the intensity
  *
  *     I = pi scale irradiance(u,v) / cos^3 t,
  *
- * so that a plane at distance z has pi scale irradiance / z^2 everywhere, as in Mitsuba. Light paths leave it uniformly
- * over the picture: with A its area at distance 1 their density is 1 / (A cos^3 t) per solid angle.
+ * so that a plane at distance z receives pi scale irradiance / z^2 everywhere, as in Mitsuba. Light sub-paths are
+ * sampled uniformly over the picture; their density is 1 / (A cos^3 t) per solid angle, with A the area of the picture
+ * at distance 1.
  */
 #include "worker/render/emitter/delta.h"
 #include "worker/render/scene/fov.h"
 
 struct projector {
-	struct delta_light light; /* its colour is unused */
+	struct delta_light light; /* light.color is unused */
 	struct texture irradiance;
-	vec3 axes[3];	 /* unit; the image's u goes along -x, v along -y, as a camera's */
-	double reach[2]; /* half the image's width and height at distance 1 */
+	vec3 axes[3];	 /* unit; u of the picture runs along -x, v along -y, as in a camera */
+	double reach[2]; /* half the width and height of the picture at distance 1 */
 };
 
-/* Where w meets the image plane, and the cosine of its angle with the axis. */
+/* Finds the point (u,v) of the picture in direction w, and the cosine of w to the axis. Returns false if w misses the
+ * picture. */
 static bool find(const struct projector *p, vec3 w, double uv[2], double *cosine)
 {
 	*cosine = vec3_dot(p->axes[2], w);

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A point that emits into a cone around to_world's +z: `intensity` up to the angle `beam_width` from the axis, from
- * there linear in the angle to 0 at `cutoff_angle` (degrees; by default 20, and 3/4 of the cut-off). Light sub-paths
- * leave it uniformly over the cone. A `texture` multiplies the intensity: the cone circumscribes its upright unit
- * square on a plane across the axis.
+ * A point that emits into a cone around +z of to_world: `intensity` up to the angle `beam_width` from the axis, and
+ * from there falling linearly with the angle to 0 at `cutoff_angle` (in degrees; by default the cut-off is 20, and the
+ * beam width 3/4 of it). Light sub-paths are sampled uniformly over the cone. A `texture` multiplies the intensity: on
+ * a plane across the axis, its unit square, upright, circumscribes the cone.
  */
 #include "worker/render/emitter/delta.h"
 #include "worker/render/math/frame.h"
@@ -12,10 +12,10 @@ struct spot {
 	struct delta_light light;
 	struct frame axes;
 	double cutoff, beam; /* radians */
-	double height;	     /* of the cone's cap: 1 - cos(cutoff) */
+	double height;	     /* height of the cone's spherical cap: 1 - cos(cutoff) */
 	bool textured;
 	struct texture texture;
-	vec3 local[3]; /* of the texture: unit axes */
+	vec3 local[3]; /* unit axes of the texture */
 	double reach;  /* tan(cutoff) */
 };
 
@@ -64,7 +64,7 @@ static int read_texture(struct emitter *em, struct spot *s, const struct scene_n
 {
 	const struct property *given = node_find(n, "texture");
 	s->textured =
-		given && (build->dialect_3 || given->value.type == VALUE_NODE); /* 0.6 ignores a colour or number */
+		given && (build->dialect_3 || given->value.type == VALUE_NODE); /* 0.6 ignores a colour or a number */
 	if (!s->textured)
 		return 0;
 	if (s->cutoff > 89 * (M_PI / 180))
@@ -101,13 +101,14 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	int code = delta_create(em, n, "intensity", build->scale * build->scale, build, e);
 	if (code)
 		return code;
-	/* Integral of the fall-off over the cone. */
+	/* The integral of the fall-off over the cone is 2 pi (1 - slope). */
 	double slope = s->cutoff > s->beam ? (sin(s->cutoff) - sin(s->beam)) / (s->cutoff - s->beam) : cos(s->cutoff);
 	em->power = 2 * M_PI * (1 - slope) * delta_strength(&s->light);
 	return read_texture(em, s, n, &to_world, build, e);
 }
 
-/* A moving transform has an inverse and keeps its side, so what create accepted has axes at every time. */
+/* delta_axes_of cannot fail: a moving transform has an inverse and its determinant keeps its sign, so it has axes at
+ * every time if `create` accepted it. */
 static void place(struct emitter *em, const mat4 *to_world)
 {
 	struct spot *s = em->data;

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Daylight (daylight.h) as an environment map: `sky`, `sun`, `sunsky`. A sky has 512 x 256 pixels, one with a sun 2048
- * x 1024: its disk is three pixels wide, and its total power is preserved. Below the horizon it is black, unless
- * `stretch` or `extend` of 0.6 are given. Up is +y in 0.5/0.6 and +z in 3.x. If time and place determine the sun, south
- * is +z and west -x in 0.5/0.6, and south +x and west +y in 3.x, as in Mitsuba, which so mirrors the compass there.
+ * Daylight (daylight.h) as an environment map: `sky`, `sun`, `sunsky`. A sky without a sun has 512 x 256 pixels, one
+ * with a sun 2048 x 1024: the sun's disk is three pixels wide, and its total power is preserved. The map is black below
+ * the horizon, unless `stretch` or `extend` of 0.6 is given. Up is +y in 0.5/0.6 and +z in 3.x. If the sun is given by
+ * time and place, south is +z and west -x in 0.5/0.6; in 3.x, south is +x and west +y, as in Mitsuba, which mirrors the
+ * compass there.
  *
- * Refused: a to_world that does more than rotate, a sun below the horizon or without a direction, a day that the month
- * has not, an albedo that depends on the place.
+ * Creation fails if to_world does more than rotate, if the sun is below the horizon or its direction has no length, if
+ * the month does not have the given day, or if the albedo is textured.
  */
 #include "worker/render/emitter/sunsky.h"
 
@@ -20,9 +21,9 @@
 struct baking {
 	struct daylight sky;
 	struct image image;
-	vec3 towards;  /* the sun, local */
-	vec3 disk;     /* where it is seen: `stretch` moves it down with the sky */
-	double radius; /* of its disk, an angle */
+	vec3 towards;  /* direction of the sun in the axes of the map */
+	vec3 disk;     /* direction in which the sun is seen: `stretch` moves it down with the sky */
+	double radius; /* angular radius of the disk */
 };
 
 static vec3 direction(const struct image *m, double column, double row)
@@ -36,14 +37,15 @@ static float *pixel(const struct image *m, uint32_t x, uint32_t y)
 	return m->pixels + 3 * ((size_t)y * m->width + x);
 }
 
-/* The part of the horizon's light that `extend` sends up from below it: all at the horizon, none from the nadir. */
+/* Returns the share of the horizon's radiance that `extend` gives to directions below it: 1 at the horizon, 0 at the
+ * nadir. */
 static double extension_below_horizon(double angle)
 {
 	double t = fmin(2 - 2 * angle / M_PI, 1);
 	return t * t * (3 - 2 * t);
 }
 
-/* stretch: the factor by which all angles from the zenith grow, so that the horizon goes down. */
+/* stretch: factor of all angles from the zenith, which lowers the horizon. */
 static void bake_sky(const struct baking *b, double scale, double stretch, bool extend)
 {
 	const struct image *m = &b->image;
@@ -66,7 +68,7 @@ static void bake_sky(const struct baking *b, double scale, double stretch, bool 
 	}
 }
 
-/* Share of a pixel that the disk covers. */
+/* Returns the share of a pixel that the disk covers. */
 static double covered_share(const struct baking *b, uint32_t x, uint32_t y)
 {
 	enum { PARTS = 8 };
@@ -81,7 +83,7 @@ static double covered_share(const struct baking *b, uint32_t x, uint32_t y)
 	return (double)inside / (PARTS * PARTS);
 }
 
-/* rgb: of the disk at its true size; a larger one is dimmed. */
+/* rgb: radiance of the disk at its true size; a larger disk is dimmed to the same power. */
 static void bake_sun(const struct baking *b, const double rgb[3])
 {
 	const struct image *m = &b->image;
@@ -91,7 +93,7 @@ static void bake_sun(const struct baking *b, const double rgb[3])
 	for (uint32_t y = first; y <= last; y++)
 		for (uint32_t x = 0; x < m->width; x++)
 			solid += covered_share(b, x, y) * pixel_row * sin(M_PI * (y + 0.5) / m->height);
-	/* Solid angles of the true disk, without cancellation. */
+	/* Solid angle of the true disk, without cancellation, over that of the covered pixels. */
 	double whole = 4 * M_PI * pow(sin(0.5 * DAYLIGHT_SUN_RADIUS), 2), factor = solid > 0 ? whole / solid : 0;
 	for (uint32_t y = first; y <= last; y++)
 		for (uint32_t x = 0; x < m->width; x++)
@@ -116,7 +118,7 @@ vec3 sunsky_compass(vec3 d, bool dialect_3)
 	return dialect_3 ? (vec3){d.z, d.y, d.x} : d; /* the third axis is -y in 3.x */
 }
 
-/* In the world. axis: of the map, whose second is up. */
+/* Reads the direction of the sun in the world. axis: axes of the map, the second of which is up. */
 static int read_sun(const struct scene_node *n, const vec3 axis[3], bool dialect_3, vec3 *towards, struct error *e)
 {
 	static const char *const clock[] = {"latitude", "longitude", "timezone", "year",  "month",
@@ -172,7 +174,7 @@ int sunsky_albedo(const struct scene_node *n, const struct emitter_build *build,
 	return 0;
 }
 
-/* Down from the zenith to so many times the angle. */
+/* Moves d down, to `by` times its angle from the zenith. */
 static vec3 stretch_from_zenith(vec3 d, double by)
 {
 	double angle = by * vec3_angle(d, (vec3){0, 1, 0}), across = hypot(d.x, d.z);
@@ -180,8 +182,8 @@ static vec3 stretch_from_zenith(vec3 d, double by)
 	return (vec3){part * d.x, across > 0 ? cos(angle) : 1, part * d.z};
 }
 
-/* In 0.6 `scale` is what `sunScale` and `skyScale` of sunsky are without their own values, and all that sky and sun
- * have. In 3.x, which has no `scale`, it multiplies both. */
+/* Returns the scale of the sky or of the sun. In 0.6, `scale` is the default of sunsky's `sunScale` and `skyScale`, and
+ * the only scale of `sky` and `sun`. In 3.x, which has no `scale`, it multiplies both. */
 static double scale_of(const struct scene_node *n, const char *name, bool dialect_3)
 {
 	double both = node_float(n, "scale", 1);
@@ -190,7 +192,8 @@ static double scale_of(const struct scene_node *n, const char *name, bool dialec
 	return strcmp(n->type, "sunsky") == 0 ? node_float(n, name, both) : both;
 }
 
-/* A sun without width, 0 in 0.6, is as wide as a third of a pixel. */
+/* Returns the angular radius of the sun. A sun without width (scale 0 in 0.6) gets a tenth of the true radius, a third
+ * of a pixel in diameter. */
 static double disk_radius(const struct scene_node *n)
 {
 	double radius = DAYLIGHT_SUN_RADIUS * fmax(node_float(n, "sun_radius_scale", 1), SUN_SCALE_MIN);

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Points on a sphere or on triangles that are drawn by their areas, where the surface is now. Most lamps stand still:
- * what those that move need is kept out of their way, in calls of its own.
+ * Samples points on a sphere, or on triangles chosen by their areas, at the current position of the surface. Most
+ * lights do not move: the code for moving ones is in functions that are not inlined, so as not to slow down the others.
  *
- * A shape without area is refused. A triangle without area is never drawn.
+ * Creation fails if the shape has no area. A triangle without area is never sampled.
  */
 #include "worker/render/emitter/surface_light.h"
 
@@ -31,7 +31,7 @@ struct wedge {
 	vec3 v0, e1, e2;
 };
 
-/* Not inline: most lamps stand still, and are neither very large nor very small. */
+/* Not inlined: most lights do not move, and are neither very large nor very small. */
 __attribute__((noinline)) static void other_wedge(const struct surface_light *l, uint32_t i, struct wedge *t)
 {
 	t->v0 = surface_light_corner(l, i, 0);
@@ -112,7 +112,7 @@ void surface_light_place(struct emitter *em, const mat4 *to_world)
 	move(em->data, to_world);
 }
 
-/* The mean area of a surface that moves, for choosing among emitters. */
+/* Returns the mean area of a moving surface over time, which is used to choose among emitters. */
 static double mean_area(const struct surface_light *l)
 {
 	enum { TIMES = 8 };
@@ -228,7 +228,7 @@ static void triangle_inverse(const struct surface_light *l, const struct emitter
 	double b[2];
 	surface_light_weights(l, x->where.prim, x->p, b);
 	double root = fmin(fmax(1 - b[0], 0), 1), low = l->cdf[x->where.prim], high = l->cdf[x->where.prim + 1];
-	/* Rounding must not change the triangle. */
+	/* Rounding must not select another triangle. */
 	u[0] = fmax(fmin(low + root * root * (high - low), nextafter(high, 0)), low);
 	u[1] = root > 0 ? below_1(b[1] / root) : 0;
 }

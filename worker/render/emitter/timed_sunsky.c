@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Daylight over a time, `timed_sunsky` of Mitsuba 3.7: while the camera's shutter is open, which is a share of the
- * emitter's own time, the days pass from the first to the one before the last, and each day's window of hours. The
- * emitter is an environment map of the mean light: the sky at SKIES times, and the sun at SUNS times, each at one point
- * of its disk. If the shutter opens and closes at once, it is one sky and DISK points of the sun. There is no light
- * while the sun is below the horizon.
+ * Daylight over a period, `timed_sunsky` of Mitsuba 3.7. The emitter's time from shutter_open to shutter_close covers a
+ * window of hours on each day from the first to the one before the last; the camera's shutter is open for a part of
+ * that time. The emitter is an environment map of the mean light in that part: the sky at SKIES times, and the sun at
+ * SUNS times, each with one point of its disk. If the camera's shutter closes at the time it opens, the map consists of
+ * one sky and DISK points of the sun. There is no light while the sun is below the horizon.
  *
- * Failures: those of sunsky.c; times in another order, a shutter that is open beyond the emitter's, a scene of 0.6.
+ * Creation fails as described in sunsky.c, if times are not in order, if the camera's shutter is open outside the
+ * emitter's time, and in a scene of 0.6.
  */
 #include "worker/render/emitter/sunsky.h"
 
@@ -25,7 +26,7 @@ enum {
 	DAYS_MAX = 366 * 200
 };
 
-/* Irrational steps, so that the numbers of many times fill an interval or a square evenly (Roberts 2018). */
+/* Irrational steps whose multiples, modulo 1, fill an interval or a square evenly (Roberts 2018). */
 #define STEP 0.6180339887498949
 #define STEP_X 0.7548776662466927
 #define STEP_Y 0.5698402909980532
@@ -36,17 +37,18 @@ static double fraction(double x)
 }
 
 struct timed {
-	struct daylight_time first; /* hour: of the window's begin */
-	double hours;		    /* the window's length */
+	struct daylight_time first; /* hour: beginning of the window */
+	double hours;		    /* length of the window */
 	int days;
-	double from, to; /* the part of all this that the image sees */
-	int skies, suns; /* samples */
+	double from, to; /* the part of the emitter's time, from 0 to 1, during which the camera's shutter is open */
+	int skies, suns; /* numbers of samples */
 	double turbidity, albedo[3], radius, sky_scale, sun_scale;
 	struct envmap_axes axes;
 	struct image image;
 };
 
-/* Where the sun is at a share of the time that the image sees; false: below the horizon. */
+/* Computes the direction of the sun and its angle from the zenith at a share of the camera's shutter time. Returns
+ * false if the sun is below the horizon. */
 static bool sun_at(const struct timed *t, double share, vec3 *towards, double *angle)
 {
 	struct daylight_time now = t->first;
@@ -81,7 +83,7 @@ static void add_sky(const struct timed *t, vec3 towards, double angle, double *m
 	tick();
 }
 
-/* Bilinear between the coarse points; the outer rows go on to the pole and to the horizon. */
+/* Interpolates the coarse sky bilinearly; its outer rows continue to the pole and to the horizon. */
 static void put_sky(const struct timed *t, const double *mean)
 {
 	for (uint32_t y = 0; y < t->image.height / 2; y++)
@@ -116,14 +118,14 @@ static int bake_sky(const struct timed *t, struct arena *room)
 	return 0;
 }
 
-/* The colours of the disk at its true size, for HEIGHTS angles from the zenith. */
+/* Computes the radiance of the disk at its true size, for HEIGHTS angles from the zenith. */
 static void sun_colors(const struct timed *t, double rgb[HEIGHTS][3])
 {
 	for (int i = 0; i < HEIGHTS; i++)
 		daylight_sun(t->turbidity, 0.5 * M_PI * i / (HEIGHTS - 1), rgb[i]);
 }
 
-/* Light from a direction, bilinear between four pixels. l: radiance times solid angle. */
+/* Adds light from a direction to four pixels, with bilinear weights. l: radiance times solid angle. */
 static void splat(const struct timed *t, vec3 d, const double l[3])
 {
 	const struct image *m = &t->image;
@@ -166,7 +168,7 @@ static void bake_sun(const struct timed *t)
 
 /* ---- reading ---- */
 
-/* The part of the emitter's time in which the camera's shutter is open. */
+/* Reads the part of the emitter's time in which the camera's shutter is open. */
 static int read_shutter(struct timed *t, const struct scene_node *n, const struct emitter_build *build, struct error *e)
 {
 	double open = node_float(n, "shutter_open", 0), length = node_float(n, "shutter_close", 1) - open;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The unit square onto the unit sphere, area-preserving up to a factor, and back. Pure. */
+/* Maps the unit square to the unit sphere, preserving ratios of areas, and back. Pure. */
 #ifndef WORKER_RENDER_EMITTER_UNIFORM_H
 #define WORKER_RENDER_EMITTER_UNIFORM_H
 
@@ -11,7 +11,8 @@ static inline vec3 direction_of_square(const double u[2])
 	return (vec3){r * cos(phi), r * sin(phi), z};
 }
 
-/* Numbers in [0,1); u[0] keeps its precision around the pole where it is 0. */
+/* The inverse of direction_of_square(), with numbers in [0,1); u[0] keeps its precision around the pole where it is
+ * 0. */
 static inline void square_of_direction(vec3 w, double u[2])
 {
 	double r2 = w.x * w.x + w.y * w.y, turn = atan2(w.y, w.x) / (2 * M_PI);

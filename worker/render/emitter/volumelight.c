@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The medium inside its shape shines: worker/render/medium/emission.h. */
+/* Makes the medium inside its shape emit light: worker/render/medium/emission.h. */
 #include "worker/render/emitter/emitter.h"
 
 const struct emitter_ops emitter_ops_volumelight = {

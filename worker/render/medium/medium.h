@@ -26,7 +26,7 @@ struct medium {
 
 extern const struct plugin_decl medium_decls[]; /* ends with a NULL type */
 
-/* Looks up the coefficients of the measured material `name` of 0.6, (measured_media.h) with the scale of 0.6. reduced:
+/* Looks up the coefficients of the measured material `name` (measured_media.h) with the scale of Mitsuba 0.6. reduced:
  * multiply sigma_s by one minus the mean cosine, for an isotropic phase function. -EINVAL if there is no such material;
  * the error names n. */
 int medium_measured(const struct scene_node *n, const char *name, bool reduced, double sigma_a[3], double sigma_s[3],
@@ -48,8 +48,7 @@ spectrum medium_extinction(const struct medium *m, vec3 p, vec3 d, const struct 
 struct medium_lanes {
 	const struct grid *grid; /* NULL: sigma_t[0] everywhere */
 	int channels;
-	spectrum sigma_t[GRID_CHANNELS_MAX]; /* extinction at points where channel k of the grid is 1 and the others are
-						0 */
+	spectrum sigma_t[GRID_CHANNELS_MAX]; /* extinction where channel k of the grid is 1, and the others are 0 */
 };
 
 struct medium_lanes medium_at(const struct medium *m, vec3 d, const struct wavelengths *w);
