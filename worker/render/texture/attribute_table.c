@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* "the mesh of bunny.ply (room.xml:12)", "the rectangle in room.xml:3" */
+/* Describes a shape for messages: "the mesh of bunny.ply (room.xml:12)", "the rectangle in room.xml:3". */
 static const char *describe(const struct scene_node *shape, char *text, size_t size)
 {
 	const char *file = node_string(shape, "filename", NULL);
@@ -79,7 +79,7 @@ void attribute_table_sides(const struct attribute_table *t, uint32_t triangle, v
 	}
 }
 
-/* FNV-1a over words; matches are compared. */
+/* FNV-1a over 32-bit words; values with equal hashes are compared. */
 static uint64_t hash_of(const float *value, size_t count)
 {
 	uint64_t h = 0xcbf29ce484222325;
@@ -112,7 +112,7 @@ const struct attribute_values *attribute_keep(struct attribute_table *t, const s
 	size_t count = (size_t)(a->per_face ? t->triangle_count : t->vertex_count) * a->channels;
 	if (!t->asked)
 		t->asked = ASKED_ATTRIBUTES;
-	/* Decoded before it is compared, because the pool holds decoded numbers. */
+	/* Decoding comes first, because the pool holds decoded values. */
 	float *own = NULL;
 	if (decode) {
 		own = arena_alloc(arena, count, sizeof *own);

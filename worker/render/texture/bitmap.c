@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * An image file. (u,v) = (0,0) is the upper left corner of the image in both dialects: Mitsuba's OBJ loaders invert v
- * (flip_tex_coords), and its bitmaps do not. Reflectances are clamped to [0,1]. Linear rgb is interpolated; trilinear,
- * anisotropic and ewa become bilinear, since there are no footprints: sampling does the filtering. `isotropic` and
- * `none` are names of before 0.5.
+ * (flip_tex_coords), and its bitmaps do not. Reflectances are clamped to [0,1]. Interpolation is in linear RGB. The
+ * filters trilinear, anisotropic and ewa are treated as bilinear: there are no footprints, and sampling filters
+ * instead. `isotropic` and `none` are names from before 0.5.
  *
- * Creation fails if the file is no image, or if `coordinates` names no such attribute of the mesh. Evaluation does
- * not: outside of [0,1] the wrap mode decides.
+ * Creation fails if the file is not an image, or if the mesh does not have the attribute that `coordinates` names.
+ * Evaluation cannot fail: outside [0,1] the wrap mode applies.
  */
 #include "common/base/color.h"
 #include "worker/render/texture/attribute_table.h"
@@ -17,19 +17,19 @@
 #include <float.h>
 #include <string.h>
 
-enum { BOUND_PIXELS_MAX = 1 << 22 }; /* with more pixels, the upper bound is not searched pixel by pixel */
+enum { BOUND_PIXELS_MAX = 1 << 22 }; /* with more pixels, the upper bound is 1 without a search */
 
 struct bitmap {
 	struct raster raster;
 	struct uv_map map;
-	const float *coordinates; /* two at each vertex, for (u,v); NULL: those of the shape */
+	const float *coordinates; /* (u,v) at each vertex; NULL: those of the shape */
 	const uint32_t (*index)[3];
 	enum color_role role;
 	enum color_shape shape;
 	double max;
 };
 
-/* In the order of enum raster_wrap. `zero` and `one` are other words of 0.6 for the last two. */
+/* In the order of enum raster_wrap. `zero` and `one` are names of 0.6 for `black` and `white`. */
 #define WRAP_MODES "repeat|mirror|clamp|black|white|zero|one"
 
 static enum raster_wrap wrap_of(const char *mode)
@@ -75,7 +75,7 @@ static double upper_bound(const struct bitmap *b)
 	return m;
 }
 
-/* `coordinates`: an attribute of the mesh takes the place of (u,v). */
+/* Reads `coordinates`, the name of a mesh attribute that replaces (u,v). */
 static int read_coordinates(struct bitmap *b, const struct scene_node *n, const struct texture_build *build,
 			    struct error *e)
 {
@@ -102,7 +102,7 @@ static int bitmap_create(struct texture *t, const struct scene_node *n, enum col
 			 const struct texture_build *build, struct error *e)
 {
 	struct bitmap *b = t->data;
-	if (role == COLOR_UNBOUNDED) /* as in Mitsuba, whose images have values up to 1 unless they are emitters' */
+	if (role == COLOR_UNBOUNDED) /* as in Mitsuba, whose images are limited to 1 unless emitters use them */
 		role = COLOR_REFLECTANCE;
 	const struct raster_range range = {color_role_is_number(role) ? -DBL_MAX : 0,
 					   role == COLOR_REFLECTANCE ? 1 : DBL_MAX, role == COLOR_HEIGHT,
@@ -141,7 +141,7 @@ static spectrum bitmap_eval(const struct texture *t, const struct texture_point 
 	return b->role == COLOR_ILLUMINANT ? color_eval_rgb_illuminant(rgb, w) : color_eval_rgb_reflectance(rgb, w);
 }
 
-/* The luminance of coloured images. */
+/* The height of a coloured image is its luminance. */
 static double bitmap_height(const struct texture *t, double u, double v)
 {
 	const struct bitmap *b = t->data;

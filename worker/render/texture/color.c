@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A colour is a scale times a shape: constant, D65, a sigmoid polynomial from rgb, or a table. color_from_* decide once
- * which it is; color_eval has one loop over the four wavelengths for each. rgb of textures goes through a table of
- * coefficients made at build time.
+ * A colour is a scale times a shape: constant, D65, a sigmoid polynomial fitted to RGB, or a table. color_from_* choose
+ * the shape once; color_eval has a loop over the wavelengths for each. RGB values of textures are looked up in a table
+ * of coefficients, which is computed when the program is built.
  *
- * Failures: colours out of the range of their role; evaluation cannot fail.
+ * Creation fails if a colour is outside the range of its role; evaluation cannot fail.
  */
 #include "worker/render/texture/color.h"
 
@@ -19,8 +19,8 @@ static const float table[3 * UPSAMPLE_TABLE_SIZE * UPSAMPLE_TABLE_SIZE * UPSAMPL
 #include "upsample_table.inc"
 };
 
-/* Luminance of D65 at its tabulated scale: the integral of d65 y_bar, both linear between their
- * values, over 106.857 nm. A test computes it again. */
+/* Luminance of D65 at its tabulated scale: the integral of d65 y_bar, both linear between their values, divided by
+ * 106.857 nm. A test recomputes it. */
 #define D65_LUMINANCE 98.889832367126914
 
 double color_d65(double nm)
@@ -37,11 +37,11 @@ double color_d65(double nm)
 #define STEP(x) ((x) * (x) * (3 - 2 * (x)))
 #define VALUE(k) STEP(STEP((double)(k) / (UPSAMPLE_TABLE_SIZE - 1)))
 #define VALUES(k) VALUE(k), VALUE((k) + 1), VALUE((k) + 2), VALUE((k) + 3)
-/* upsample_table_value, computed once: it is used at every textured vertex. */
+/* The values of upsample_table_value(), tabulated because every textured vertex needs them. */
 static const double values[UPSAMPLE_TABLE_SIZE] = {VALUES(0),  VALUES(4),  VALUES(8),  VALUES(12),
 						   VALUES(16), VALUES(20), VALUES(24), VALUES(28)};
 
-/* Coefficients by trilinear interpolation; the largest component is > 0. */
+/* Interpolates the coefficients of a colour trilinearly; its largest component must be > 0. */
 static void table_lookup(const double rgb[3], double c[3])
 {
 	const int n = UPSAMPLE_TABLE_SIZE;
@@ -108,7 +108,7 @@ struct color color_constant(double x)
 	return (struct color){.shape = COLOR_SHAPE_CONSTANT, .scale = x};
 }
 
-/* The same value at all wavelengths, or the role's white. */
+/* Returns x times the white of the role: D65 for illuminants, otherwise constant. */
 static struct color color_white(double x, enum color_role role)
 {
 	struct color c = color_constant(x);
@@ -119,7 +119,7 @@ static struct color color_white(double x, enum color_role role)
 	return c;
 }
 
-/* From the polynomial in t to the one in nm. */
+/* Converts the coefficients of the polynomial in t to those in nm. */
 static void coefficients_in_nm(const double t[3], double nm[3])
 {
 	const double center = UPSAMPLE_CENTER_NM, r = 1 / UPSAMPLE_HALF_NM;
@@ -128,7 +128,8 @@ static void coefficients_in_nm(const double t[3], double nm[3])
 	nm[2] = t[0] * r * r * center * center - t[1] * r * center + t[2];
 }
 
-/* The largest number that a colour of the role may have: for textures, whose tables do not limit it. */
+/* Returns the largest component that a colour of the role may have. The declarations of textures' parameters do not
+ * limit it. */
 static double role_max(enum color_role role)
 {
 	return role == COLOR_REFLECTANCE ? 1 : role == COLOR_ILLUMINANT ? PARAM_LIGHT_MAX : PARAM_METAL_MAX;
@@ -162,13 +163,14 @@ int color_from_rgb(const double rgb[3], enum color_role role, struct color *out)
 	return 0;
 }
 
-/* The table is linear from sample i to i + 1; nm is at `part` of the way. */
+/* A position in a table: from sample i, `part` of the way to sample i + 1. */
 struct piece {
 	uint32_t i;
 	double part;
 };
 
-/* Beyond the ends, the end. Most tables are equidistant, so the first guess is right. */
+/* Finds the position of nm, clamped to the ends of the table. Most tables are equidistant, so the first guess is
+ * right. */
 static struct piece piece_of(const struct color *c, double nm)
 {
 	const double *at = c->nm;
@@ -196,7 +198,8 @@ static double table_value(const struct color *c, double nm)
 	return piece_value(c, piece_of(c, nm));
 }
 
-/* What the lanes are where colours are rgb, for scale 1: D65 is white, and negative components are 0. */
+/* Computes the RGB components that stand for the colour, at scale 1, if paths carry RGB: D65 is white, and negative
+ * components become 0. */
 static void set_rgb(struct color *c, bool under_d65)
 {
 	double xyz[3] = {0, 0, 0}, d65_xyz[3] = {0, 0, 0}, white[3];
@@ -254,7 +257,7 @@ int color_from_value(const struct value *v, enum color_role role, struct arena *
 		     struct error *e)
 {
 	double x;
-	bool equal = false; /* at all wavelengths, not white */
+	bool equal = false; /* constant over wavelengths rather than white */
 	switch (v->type) {
 	case VALUE_RGB:
 		if (color_from_rgb(v->as.rgb, role, out))
@@ -335,7 +338,7 @@ void color_eval_both(const struct color *a, const struct color *b, const struct 
 	}
 }
 
-/* The polynomial's maximum: at an end of the range, or at its vertex. */
+/* Returns the maximum of the sigmoid, where the polynomial has its own: at an end of the range, or at its vertex. */
 static double sigmoid_max(const double c[3])
 {
 	double nm[3] = {WAVELENGTH_MIN, WAVELENGTH_MAX, WAVELENGTH_MIN};

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Tables that are made at build time: published data as C initialisers, and the coefficients of upsampled colours.
+# Tables that are generated at build time: published data as C initialisers, and the coefficients of upsampled colours.
 TABLES := $(addprefix $(BUILD)/gen/,cie_observer.inc cie_d65.inc wavelength_cells.inc wavelength_guide.inc conductors.inc upsample_table.inc)
 generated: $(TABLES)
 
@@ -11,7 +11,7 @@ $(BUILD)/gen/cie_d65.inc: worker/render/math/data/cie_d65_1nm.csv
 	@mkdir -p $(@D)
 	awk -F, '!/^#/ { printf "%s,\n", $$2 }' $< > $@.part && mv $@.part $@
 
-# Cell by cell of 1 nm: the share of wavelengths drawn below it and in it, a mixture of 95 % |r| + |g| + |b| and 5 % uniform
+# For each cell of 1 nm, the shares of sampled wavelengths below it and in it: a mixture of 95 % |r| + |g| + |b| and 5 % uniform
 # (worker/render/math/spectrum.h). r, g, b are the matching functions of linear Rec. 709, by the matrix of common/base/color.h.
 $(BUILD)/gen/wavelength_cells.inc: worker/render/math/data/cie1931_2deg_1nm.csv
 	@mkdir -p $(@D)
@@ -25,7 +25,7 @@ $(BUILD)/gen/wavelength_cells.inc: worker/render/math/data/cie1931_2deg_1nm.csv
 				sum += 0.95 * (curve[i] + curve[i + 1]) / total + 0.05 / (n - 1); \
 				printf "{%.17g, %.17g},\n", below, (i + 2 < n ? sum : 1) - below } }' $< > $@.part && mv $@.part $@
 
-# For each of WAVELENGTH_GUIDE equal parts of [0,1) the cell in which it begins.
+# For each of WAVELENGTH_GUIDE equal parts of [0,1), the cell in which it begins.
 $(BUILD)/gen/wavelength_guide.inc: $(BUILD)/gen/wavelength_cells.inc
 	awk -F'[{,]' '{ below[n++] = $$2 } \
 		END { for (k = 0; k < 512; k++) { \
@@ -37,7 +37,7 @@ $(BUILD)/gen/conductors.inc: worker/render/bsdf/data/conductors.csv
 	awk -F, '!/^#/ { if ($$1 != name) printf "%s{\"%s\", {\n", (name != "" ? "}},\n" : ""), $$1; name = $$1; \
 		printf "{%s, %s, %s},\n", $$2, $$3, $$4 } END { print "}}," }' $< > $@.part && mv $@.part $@
 
-# The generator is a program of this machine without sanitizers: it runs for seconds, once.
+# The generator is compiled for the build host, without sanitizers: it runs once, for seconds.
 UPSAMPLE_GEN_SRC := worker/render/texture/upsample_gen.c worker/render/texture/upsample.c worker/render/math/cie.c
 $(BUILD)/gen/upsample_gen: $(UPSAMPLE_GEN_SRC) worker/render/texture/upsample.h worker/render/math/cie.h \
 		$(BUILD)/gen/cie_observer.inc $(BUILD)/gen/cie_d65.inc $(BUILD)/gen/wavelength_guide.inc

@@ -7,18 +7,19 @@
 #include <string.h>
 
 enum {
-	NUMBERS_MAX = 1 << 16, /* that an index of two bytes tells apart */
-	/* The most failed probes per place, on average: a file whose numbers collide is stored without indices instead
-	 * of taking hours. */
+	NUMBERS_MAX = 1 << 16, /* the most numbers that an index of two bytes can distinguish */
+	/* The most failed probes per value, on average. A file whose numbers collide more often is stored without
+	 * indices, since indexing it could take hours. */
 	DETOUR_MAX = 8,
 };
 
-/* The different numbers of an image by their bits, -0 apart from 0: a hash table with open addressing. */
+/* The distinct numbers of an image, in a hash table with open addressing. Numbers are compared by their bits, so that
+ * -0 differs from 0. */
 struct number_table {
 	struct {
-		uint32_t bits, known; /* known: 1 + its index; 0: the slot is free */
+		uint32_t bits, known; /* known: 1 + the index of the number; 0: the slot is free */
 	} * slot;
-	uint32_t slots; /* a power of two, at least twice as many as there may be numbers */
+	uint32_t slots; /* a power of two, at least twice the most numbers */
 	uint32_t numbers;
 };
 
@@ -34,7 +35,7 @@ static uint32_t first_slot(uint32_t bits)
 	return bits * 0x9e3779b1u >> 15;
 }
 
-/* The number's slot or a free one: half of all are. */
+/* Returns the slot of the number, or a free one; at least half of the slots are free. */
 static uint32_t slot_of(const struct number_table *t, uint32_t bits)
 {
 	uint32_t at = first_slot(bits) & (t->slots - 1);
@@ -43,7 +44,8 @@ static uint32_t slot_of(const struct number_table *t, uint32_t bits)
 	return at;
 }
 
-/* False: there are more than an index can tell apart, or finding them again would take long. */
+/* Enters all numbers into the table. Returns false if there are more than an index can distinguish, or if there are too
+ * many collisions. */
 static bool find_numbers(struct number_table *t, const float *x, size_t count)
 {
 	size_t detours = 0;
@@ -67,7 +69,7 @@ static size_t number_count(const struct image *i)
 	return (size_t)i->width * i->height * i->channels;
 }
 
-/* Memory for that many numbers, and for an index at each place if indices have bytes. */
+/* Allocates memory for the numbers and, if bytes > 0, for `count` indices of that size. -EFBIG or -ENOMEM. */
 static int allocate(struct indexed_image *out, size_t numbers, size_t count, size_t bytes, void **index,
 		    struct arena *arena, struct error *e)
 {

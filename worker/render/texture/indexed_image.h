@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * An image that keeps each of its numbers once, and for each place where one stands an index of one or two bytes: a
- * quarter of the memory where a file has 8 bits, half where it has 16 or half floats. Without loss, whatever the file
- * was. An image with more numbers keeps them as they are. Immutable but for indexed_image_numbers; any thread.
+ * An image that stores each distinct number once, and for each value an index of one or two bytes: a quarter of the
+ * memory of floats if the file has 8 bits per value, half if it has 16 bits or half floats. This is lossless. An image
+ * with too many distinct numbers is stored as floats. Immutable, except for the changes that indexed_image_numbers
+ * describes; any thread.
  */
 #ifndef WORKER_RENDER_TEXTURE_INDEXED_IMAGE_H
 #define WORKER_RENDER_TEXTURE_INDEXED_IMAGE_H
@@ -13,24 +14,26 @@
 
 #include <stddef.h>
 
-#define IMAGE_SCENE_BYTES_MAX ((size_t)4 << 30) /* of everything in an arena that holds images */
+#define IMAGE_SCENE_BYTES_MAX ((size_t)4 << 30) /* limit of everything in an arena that holds images */
 
 struct indexed_image {
 	uint32_t width, height, channels; /* channels: 1 or 3 */
-	float *number;			  /* the different ones; without indices all: [height][width][channels] */
-	const uint8_t *index8;		  /* [height][width][channels]; at most one of these, else NULL */
+	float *number;			  /* the distinct numbers; without indices all: [height][width][channels] */
+	const uint8_t *index8;		  /* [height][width][channels]; at least one of index8 and index16 is NULL */
 	const uint16_t *index16;
-	uint32_t numbers; /* with indices: how many */
+	uint32_t numbers; /* count of distinct numbers, with indices */
 };
 
-/* A copy, in the arena. -ENOMEM, or -EFBIG if that would hold more than IMAGE_SCENE_BYTES_MAX, with a sentence. */
+/* Copies an image into the arena. Returns 0, -ENOMEM, or -EFBIG with a sentence if the arena would hold more than
+ * IMAGE_SCENE_BYTES_MAX. */
 int indexed_image_make(const struct image *from, struct arena *arena, struct indexed_image *out, struct error *e);
-/* The pixels of `from`, not copied. */
+/* Returns an image that refers to the pixels of `from` without copying them. */
 struct indexed_image indexed_image_of(const struct image *from);
-/* How many numbers there are to look at or to change, by a rule for each: those at out->number. */
+/* Returns the count of numbers at i->number. To inspect or map all values of the image, it suffices to do so with these
+ * numbers. */
 size_t indexed_image_numbers(const struct indexed_image *i);
 
-/* The number at a place, counted through rows, columns and channels. */
+/* Returns the value at a place, counted in the order [height][width][channels]. */
 static inline float indexed_image_at(const struct indexed_image *i, size_t place)
 {
 	return i->number[i->index8 ? i->index8[place] : i->index16 ? i->index16[place] : place];

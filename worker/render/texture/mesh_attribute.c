@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Numbers at the vertices of a mesh, interpolated linearly, or one per triangle: `mesh_attribute` of 3.x, and
- * `vertexcolors` of 0.5/0.6, which is the attribute vertex_color. Colours are interpolated as linear rgb and then
- * upsampled; one number is grey. Reflectances are clamped to [0,1], like those of images; what may exceed 1, a metal's
- * `eta` and `k`, an exponent, is the attribute's numbers.
+ * Values at the vertices of a mesh, interpolated linearly, or one value per triangle: `mesh_attribute` of 3.x, and
+ * `vertexcolors` of 0.5/0.6, which is the attribute vertex_color. Colours are interpolated in linear RGB and then
+ * upsampled; a single channel is grey. Reflectances are clamped to [0,1], like those of images; quantities that may
+ * exceed 1, such as a metal's `eta` and `k` or an exponent, are not clamped.
  *
- * Derivatives of an attribute by (u,v) are not known, so it cannot displace or bend normals.
+ * The derivatives of an attribute with respect to (u,v) are not known, so it cannot displace surfaces or bend normals.
  */
 #include "worker/render/texture/attribute_table.h"
 #include "worker/render/texture/texture.h"
@@ -14,7 +14,7 @@
 
 struct mesh_attribute {
 	const float *value;
-	const uint32_t (*index)[3]; /* NULL: a value for each triangle */
+	const uint32_t (*index)[3]; /* NULL: one value per triangle */
 	size_t channels;
 	double scale, max;
 	enum color_role role;
@@ -41,7 +41,7 @@ static void find_bounds(struct mesh_attribute *m, const struct attribute_values 
 		m->max = v->grey ? most : COLOR_UNBOUNDED_OVER * most;
 		return;
 	}
-	/* The spectrum of a colour is not bounded by the colour's components. */
+	/* An upsampled colour may exceed its RGB components. */
 	m->max = v->grey ? fmin(most, 1) : 1;
 }
 
@@ -125,7 +125,7 @@ static enum color_shape mesh_attribute_shape(const struct texture *t)
 	return ((const struct mesh_attribute *)t->data)->shape;
 }
 
-/* They are only made in roles that need neither a height nor a derivative. */
+/* No height and no jet: creation refuses the roles that need them. */
 const struct texture_ops texture_ops_mesh_attribute = {
 	.decl = PLUGIN(TEXTURE, "mesh_attribute", {.name = "name", .types = VALUE_STRING},
 		       {.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX}),

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Textures that are one of two others, depending on (u,v).
+ * Textures that choose one of two others, depending on (u,v).
  *
- * `checkerboard`: a 2 x 2 pattern on the unit square; color0 where both halves agree, or, as in Mitsuba 3, where they
- * do not, if the pattern is of numbers (roughness, opacity, weights). `gridtexture` (0.5/0.6): lines of color1 on
- * color0, along the edges of the unit squares. A line is twice line_width wide, as in Mitsuba.
+ * `checkerboard`: a 2 x 2 pattern on the unit square, with color0 in the squares on the main diagonal and color1 in the
+ * others. In Mitsuba 3 the two are exchanged if the pattern stands for numbers (roughness, opacity, weights).
+ * `gridtexture` (0.5/0.6): lines of color1 on color0, along the edges of the unit squares. A line is twice line_width
+ * wide, as in Mitsuba.
  */
 #include "worker/render/texture/texture.h"
 #include "worker/render/texture/uv.h"
@@ -23,7 +24,7 @@ static unsigned square_at(const struct pattern *p, double u, double v)
 	return right != low;
 }
 
-/* Distance to the nearest integer. */
+/* Returns the distance to the nearest integer. */
 static double distance(double x)
 {
 	return fabs(x - round(x));
@@ -34,7 +35,7 @@ static unsigned line_at(const struct pattern *p, double u, double v)
 	return distance(u) < p->line_width || distance(v) < p->line_width;
 }
 
-/* The defaults are those of color0 and color1; exchange: each takes the other's place. */
+/* defaults: of color0 and color1; exchange: each takes the place of the other. */
 static int create(struct texture *t, const struct scene_node *n, const double defaults[2], bool exchange,
 		  enum color_role role, const struct texture_build *build, struct error *e)
 {
@@ -77,7 +78,7 @@ static double pattern_height(const struct texture *t, double u, double v)
 	return texture_height(texture_at(t->data, u, v), u, v);
 }
 
-/* The derivative is 0 between the edges. */
+/* Edges between the two textures have no effect on the derivatives. */
 static void pattern_jet(const struct texture *t, double u, double v, struct texture_jet *j)
 {
 	texture_jet(texture_at(t->data, u, v), u, v, j);

@@ -6,8 +6,8 @@
 struct picture_entry {
 	struct picture_key key;
 	struct picture picture;
-	double least, largest; /* the range it was clamped to; if nothing was clamped: the pixels' own */
-	bool cut;
+	double least, largest; /* the range to which the pixels were clamped; if that changed none, their own range */
+	bool cut;	       /* clamping changed some pixel */
 	struct picture_entry *next;
 };
 
@@ -23,7 +23,7 @@ static uint64_t mix(uint64_t h, uint64_t word)
 	return (h ^ word) * 0x100000001b3 ^ h >> 29;
 }
 
-/* Keys that are equal have equal hashes. */
+/* Returns the list of a key. Only some members are hashed; equal keys have equal hashes. */
 static size_t list_of(const struct picture_key *k)
 {
 	const double number[2] = {k->threshold, k->power};
@@ -46,6 +46,7 @@ struct picture *picture_find(const struct picture_cache *c, const struct picture
 	return NULL;
 }
 
+/* Computes the smallest and the largest value of an image. */
 static void own_range(const struct indexed_image *i, double *least, double *largest)
 {
 	size_t count = indexed_image_numbers(i);

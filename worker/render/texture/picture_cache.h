@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The images that a scene has decoded: materials that use the same image share its pixels. One arena holds pixels and
- * list; one thread; freed with the arena.
+ * The images that a scene has decoded, so that materials that use the same image share its pixels. One arena holds the
+ * pixels and the cache, which is freed with it. One thread.
  */
 #ifndef WORKER_RENDER_TEXTURE_PICTURE_CACHE_H
 #define WORKER_RENDER_TEXTURE_PICTURE_CACHE_H
@@ -11,33 +11,34 @@
 
 struct picture_entry;
 
-/* By hashes of their keys: a scene may read one image in 10^5 ways. */
+/* A hash table by key: a scene may read one image in 10^5 different ways. */
 enum { PICTURE_LISTS = 1 << 10 };
 struct picture_cache {
-	const struct arena *arena; /* further images are not shared */
+	const struct arena *arena; /* images in other arenas are not shared */
 	struct picture_entry *first[PICTURE_LISTS];
 };
 
-/* Everything that determines the pixels, except for the range that they are clamped to. */
+/* Everything that determines the pixels, except the range to which they are clamped. */
 struct picture_key {
 	const char *name;
 	int64_t first_byte, byte_count, skip_bytes;
 	bool base64, linear;
 	enum image_channel channel;
-	double threshold, power; /* power: what the stored numbers are raised to; 1 unless linear */
+	double threshold, power; /* power: exponent applied to the stored numbers; 1 unless linear */
 };
 
 struct picture {
 	struct indexed_image image;
-	/* Space for users; negative: not known yet. */
-	double largest; /* of all numbers, at least 0 */
-	double bound;	/* of the spectra of all pixels */
+	/* Computed by users of the picture; negative: not known yet. */
+	double largest; /* largest of all values, at least 0 */
+	double bound;	/* upper bound of the spectra of all pixels */
 };
 
-/* The pixels with that key whose values equal those clamped to [least, largest]. NULL: there are none. */
+/* Returns a picture with this key whose pixels are the same as if clamped to [least, largest], or NULL if there is
+ * none. */
 struct picture *picture_find(const struct picture_cache *c, const struct picture_key *k, double least, double largest);
-/* image: was clamped to [least, largest], and `cut` says whether that changed anything. If memory is out, it is not
- * shared. */
+/* Adds an image that was clamped to [least, largest]; cut: whether that changed any pixel. Returns NULL if out of
+ * memory; the image is then not shared. */
 struct picture *picture_add(struct picture_cache *c, const struct picture_key *k, const struct indexed_image *image,
 			    double least, double largest, bool cut, struct arena *arena);
 

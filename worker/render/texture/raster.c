@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * An image as a texture's table of texels: decoded once for all textures that use it alike (the assets' cache, if they
- * have one), then looked up with its wrap modes and filter.
+ * Reads images as tables of texels, and looks these up with wrap modes and a filter. An image is decoded once for all
+ * textures that use it in the same way, if the assets have a cache.
  *
- * Failures: a file that is missing or no image, with the node's place. Look-ups cannot fail.
+ * Reading fails, with the position of the node, if the file is missing or is not an image. Look-ups cannot fail.
  */
 #include "worker/render/texture/raster.h"
 
@@ -31,7 +31,7 @@ static int decode(struct raster *r, const struct scene_node *n, const struct ass
 	return code ? node_error(n, e, -code, "%s", reason.text) : 0;
 }
 
-/* Whether a pixel was outside the range. */
+/* Applies the threshold, if there is one, and clamps to the range. Returns whether a pixel was outside the range. */
 static bool cut_to(struct indexed_image *i, double threshold, const struct raster_range *range)
 {
 	size_t count = indexed_image_numbers(i);
@@ -93,14 +93,14 @@ void raster_pixel(const struct raster *r, uint32_t x, uint32_t y, double rgb[3])
 		rgb[k] = (double)indexed_image_at(&r->image, r->image.channels == 3 ? at + k : at);
 }
 
-enum { OUTSIDE = UINT32_MAX }; /* a column or row in a border of one colour */
+enum { OUTSIDE = UINT32_MAX }; /* index of columns and rows in a border of one colour */
 
 static bool has_border(enum raster_wrap mode)
 {
 	return mode == RASTER_BLACK || mode == RASTER_WHITE;
 }
 
-/* Into the unit interval; if the image has a border, into that or near it. */
+/* Maps x into the unit interval, or near it if the image has a border. */
 static double wrap(double x, enum raster_wrap mode)
 {
 	if (!isfinite(x))
@@ -115,7 +115,8 @@ static double wrap(double x, enum raster_wrap mode)
 	return y > 1 ? 2 - y : y;
 }
 
-/* A pixel's neighbour beyond the border: on the other side if repeated, itself if mirrored or clamped. */
+/* Returns the index of the pixel that stands for the i-th, which may be one beyond the edge: on the opposite side if
+ * repeated, the outermost pixel if mirrored or clamped. */
 static uint32_t neighbour(int64_t i, uint32_t n, enum raster_wrap mode)
 {
 	if (has_border(mode) && (i < 0 || i >= (int64_t)n))
@@ -136,7 +137,7 @@ static void texel(const struct raster *r, uint32_t x, uint32_t y, double rgb[3])
 	rgb[0] = rgb[1] = rgb[2] = (x == OUTSIDE ? r->wrap_u : r->wrap_v) == RASTER_WHITE;
 }
 
-/* The four pixels around a position, and the fractions between them. */
+/* The four pixels around a position, and the position between their centres, from 0 to 1. */
 struct corners {
 	double c[4][3], fx, fy;
 };
@@ -182,7 +183,7 @@ void raster_eval(const struct raster *r, double u, double v, double rgb[3])
 		rgb[k] = interpolate(&q, k);
 }
 
-/* Pixels per unit of u; negative if the image is mirrored. */
+/* Returns the pixels per unit of u; negative where the image is mirrored. */
 static double pixels_per_unit(double x, uint32_t pixels, enum raster_wrap mode)
 {
 	bool backwards = mode == RASTER_MIRROR && isfinite(x) && x - 2 * floor(0.5 * x) > 1;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * An image as a function on the plane: u to the right, v DOWN; the unit square is the image once. Pixel centres are at
- * ((i + 1/2) / width, (j + 1/2) / height). Immutable; any thread.
+ * An image as a function on the plane, u to the right, v DOWN; the unit square shows the image once. Pixel centres are
+ * at ((i + 1/2) / width, (j + 1/2) / height). Immutable; any thread.
  */
 #ifndef WORKER_RENDER_TEXTURE_RASTER_H
 #define WORKER_RENDER_TEXTURE_RASTER_H
@@ -12,25 +12,25 @@
 #include "worker/render/texture/indexed_image.h"
 #include "worker/render/texture/picture_cache.h"
 
-/* BLACK, WHITE: around the image all is 0, or 1. */
+/* RASTER_BLACK, RASTER_WHITE: outside the image the value is 0, or 1. */
 enum raster_wrap { RASTER_REPEAT, RASTER_MIRROR, RASTER_CLAMP, RASTER_BLACK, RASTER_WHITE };
 
 struct raster {
 	struct indexed_image image;
 	enum raster_wrap wrap_u, wrap_v;
-	bool nearest;		/* else bilinear */
+	bool nearest;		/* otherwise bilinear */
 	struct picture *shared; /* NULL: the pixels are not shared */
 };
 
 struct raster_range {
-	double least, largest; /* pixels outside are clamped */
-	bool raw;	       /* default of raw, unless the parameters raw or gamma are given */
-	enum image_channel
-		all; /* what is kept of a pixel unless `channel` says: IMAGE_ALL, IMAGE_LUMINANCE or IMAGE_MEAN */
+	double least, largest;	/* pixels outside are clamped */
+	bool raw;		/* default of the parameter `raw`, unless `gamma` is given */
+	enum image_channel all; /* default of the parameter `channel`: IMAGE_ALL, IMAGE_LUMINANCE or IMAGE_MEAN */
 };
 
-/* Reads the image that n names (asset_part.h), and the parameters raw, gamma, channel (r, g, b, a: only that one, as
- * three equal values) and threshold (pixels become 1 from there on, and 0 below). */
+/* Reads the image that n names (asset_part.h), and the parameters raw, gamma, channel (r, g, b, a: only this
+ * channel, as three equal values) and threshold (pixels become 1 at or above it, 0 below). Returns 0 or a negative
+ * error code. */
 int raster_read(struct raster *r, const struct scene_node *n, const struct asset_source *assets,
 		const struct raster_range *range, struct arena *arena, struct error *e);
 #define RASTER_PARAMS                                                                        \
@@ -44,8 +44,8 @@ int raster_read(struct raster *r, const struct scene_node *n, const struct asset
 	}
 
 void raster_eval(const struct raster *r, double u, double v, double rgb[3]);
-/* The same with its derivatives by u and v, and the mixed one: the other second derivatives are 0 between pixel
- * centres. */
+/* The value with its derivatives with respect to u and v, and the mixed one. The other second derivatives are 0 between
+ * pixel centres. */
 struct raster_patch {
 	double x[3], du[3], dv[3], duv[3];
 };

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Another texture, or a colour, times a number or, for colours, a colour or (ours) a texture: 0.5/0.6. Reflectances are
- * limited to 1. */
+/* `scale` of 0.5/0.6: a texture, or a colour, times a number; for colours, also times a colour or, as an extension, a
+ * texture. Reflectances are limited to 1. */
 #include "worker/render/texture/texture.h"
 
 struct scale {
@@ -8,11 +8,11 @@ struct scale {
 	double factor;
 	struct color tint; /* its largest component is 1 */
 	bool tinted;
-	struct texture by; /* times this one; constantly 1 if there is none */
+	struct texture by; /* factor given as a texture; otherwise the constant 1 */
 	enum color_role role;
 };
 
-/* A colour is its largest component times a reflectance. */
+/* Splits a colour into its largest component and a reflectance. */
 static int read_tint(struct scale *s, const struct scene_node *n, const struct property *p, struct error *e)
 {
 	const double *rgb = p->value.as.rgb;
@@ -103,7 +103,7 @@ static double scale_aspect(const struct texture *t)
 	return texture_aspect(&((const struct scale *)t->data)->inner);
 }
 
-/* Clamping at 1 changes the shape of a spectrum, unless it is constant. */
+/* Clamping at 1 does not change the color_shape: only reflectances are clamped, which are CONSTANT or OTHER. */
 static enum color_shape scale_shape(const struct texture *t)
 {
 	const struct scale *s = t->data;

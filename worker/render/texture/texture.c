@@ -30,7 +30,8 @@ int texture_create(struct texture *t, const struct scene_node *n, enum color_rol
 	return node_error(n, e, ENOTSUP, "\"%s\" is not a texture that is supported", n->type);
 }
 
-/* A height is a colour's luminance, as in a coloured image. */
+/* Reads a constant for COLOR_HEIGHT or COLOR_RELIEF. The height of a colour is its luminance, as in a coloured
+ * image. */
 static int height_from_value(struct texture *t, const struct scene_node *n, const char *name, const struct value *v,
 			     struct error *e)
 {

@@ -13,16 +13,17 @@ struct texture;
 struct attribute_table;
 struct volume_build;
 
-/* Where on a surface a texture is evaluated. */
+/* The point of a surface at which a texture is evaluated. */
 struct texture_point {
 	double u, v;   /* texture coordinates */
-	double b1, b2; /* barycentrics on the triangle `prim`; 0 on a sphere and without a surface */
+	double b1, b2; /* barycentric coordinates on the triangle `prim`; 0 on a sphere or without a surface */
 	uint32_t prim;
-	bool probe; /* of a material by itself: p is not known */
-	vec3 p;	    /* in the world */
+	bool probe; /* probes a material without a surface: p is not known */
+	vec3 p;	    /* position in the world */
 };
 
-/* Channel k of numbers at the vertices of a mesh, interpolated linearly: `channels` a vertex, by the mesh's indices. */
+/* Interpolates channel k of values at the vertices of a mesh linearly. value: `channels` numbers per vertex; index: the
+ * mesh's. */
 static inline double texture_interpolate(const float *value, size_t channels, const uint32_t (*index)[3],
 					 const struct texture_point *at, size_t k)
 {
@@ -32,49 +33,51 @@ static inline double texture_interpolate(const float *value, size_t channels, co
 	       at->b2 * (double)value[i[2] * channels + k];
 }
 
-/* What making a texture needs. */
+/* What texture_create needs besides the node. */
 struct texture_build {
 	const struct asset_source *assets;
 	struct arena *arena;
 	bool dialect_3;
-	struct attribute_table *attributes; /* of the mesh (attribute_table.h); NULL: there is no mesh */
-	const struct volume_build *volumes; /* NULL: what has the texture is not a surface in the world */
-	/* The texture stands for a number, a roughness or a weight, not for a spectrum: of coloured images Mitsuba 3
-	 * then takes the luminance and 0.6 the mean, and Mitsuba 3 exchanges the colours of a checkerboard. */
+	struct attribute_table *attributes; /* of the mesh (attribute_table.h); NULL: no mesh */
+	const struct volume_build *volumes; /* NULL: the texture is not on a surface in the world */
+	/* The texture stands for a number such as a roughness or a weight, not for a spectrum. For coloured images,
+	 * Mitsuba 3 then takes the luminance and 0.6 the mean; Mitsuba 3 also exchanges the colours of a
+	 * checkerboard. */
 	bool number;
 };
 
 /* Three numbers as a function of (u,v), with their first and second derivatives. */
 struct texture_jet {
 	double x[3], du[3], dv[3], duu[3], duv[3], dvv[3];
-	bool grey; /* all three are one */
+	bool grey; /* all three numbers are equal */
 };
 
 struct texture_ops {
 	struct plugin_decl decl;
-	size_t data_size; /* of t->data, which is zeroed memory before `create` */
+	size_t data_size; /* bytes of t->data, which is zeroed before `create` is called */
 	int (*create)(struct texture *t, const struct scene_node *n, enum color_role role,
 		      const struct texture_build *build, struct error *e);
 	spectrum (*eval)(const struct texture *t, const struct texture_point *at, const struct wavelengths *w);
-	double (*height)(const struct texture *t, double u, double v); /* for COLOR_HEIGHT, which has nothing else */
-	void (*jet)(const struct texture *t, double u, double v, struct texture_jet *j); /* the same for COLOR_RELIEF */
+	double (*height)(const struct texture *t, double u, double v);			 /* for COLOR_HEIGHT */
+	void (*jet)(const struct texture *t, double u, double v, struct texture_jet *j); /* for COLOR_RELIEF */
 	double (*max)(const struct texture *t); /* upper bound over (u,v) and wavelengths */
 	enum color_shape (*shape)(const struct texture *t);
 	double (*aspect)(const struct texture *t); /* width over height of the image; NULL: 1 */
 };
 
 struct texture {
-	const struct texture_ops *ops; /* NULL: constant, `color` below, or `relief` */
+	const struct texture_ops *ops; /* NULL: a constant, `color` or `relief` below */
 	struct color color;
-	double relief[3]; /* COLOR_RELIEF; `color` is their luminance */
+	double relief[3]; /* in role COLOR_RELIEF; `color` is their luminance */
 	void *data;
 };
 
-/* Property `name` of node n: a colour or a nested texture; `fallback` if absent. */
+/* Reads the property `name` of node n: a colour or a nested texture, `fallback` if absent. Returns 0 or a negative
+ * error code. */
 int texture_from_node(struct texture *t, const struct scene_node *n, const char *name, double fallback,
 		      enum color_role role, const struct texture_build *build, struct error *e);
 
-/* The texture that node n itself is. */
+/* Creates the texture that node n is. Returns 0 or a negative error code; -ENOTSUP if its type is not known. */
 int texture_create(struct texture *t, const struct scene_node *n, enum color_role role,
 		   const struct texture_build *build, struct error *e);
 

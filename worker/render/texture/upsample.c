@@ -11,7 +11,7 @@ static double det3(const double a[3][3])
 	       a[0][2] * (a[1][0] * a[2][1] - a[1][1] * a[2][0]);
 }
 
-/* Cramer's rule; false when there is no finite solution. */
+/* Solves a x = b by Cramer's rule. Returns false if there is no finite solution. */
 static bool solve3(const double a[3][3], const double b[3], double x[3])
 {
 	double d = det3(a);
@@ -29,7 +29,8 @@ static bool solve3(const double a[3][3], const double b[3], double x[3])
 	return true;
 }
 
-/* Columns: the primaries of Rec. 709, scaled so that (1,1,1) is `white`. */
+/* Computes the matrix from RGB to XYZ: its columns are the primaries of Rec. 709, scaled so that (1,1,1) gives
+ * `white`. */
 static void rec709_matrix(const double white[3], double m[3][3])
 {
 	static const double xy[3][2] = {{0.64, 0.33}, {0.30, 0.60}, {0.15, 0.06}};
@@ -96,7 +97,7 @@ static double lab_curve(double x, double *slope)
 	return x * *slope + 4.0 / 29.0;
 }
 
-/* L a b from XYZ, and the derivative by XYZ. */
+/* Converts XYZ to L a b, with the derivatives with respect to XYZ. */
 static void to_lab(const struct upsample *s, const double xyz[3], double lab[3], double d[3][3])
 {
 	double f[3], slope[3];
@@ -119,7 +120,7 @@ static double norm3(const double a[3])
 	return sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
 }
 
-/* residual = Lab(c) - target, and its Jacobian by c. */
+/* Computes residual = Lab(c) - target, and its Jacobian with respect to c. Returns the norm of the residual. */
 static double residual_of(const struct upsample *s, const double target[3], const double c[3], double residual[3],
 			  double jacobian[3][3])
 {
@@ -146,7 +147,7 @@ double upsample_fit(const struct upsample *s, const double rgb[3], double tolera
 
 	double r[3], j[3][3], error = residual_of(s, target, c, r, j), damping = 1e-6;
 	for (int i = 0; i < ITERATIONS && error > tolerance; i++) {
-		/* Levenberg-Marquardt: damped in proportion to the diagonal, so that units do not matter. */
+		/* Levenberg-Marquardt: the damping is proportional to the diagonal, so that units do not matter. */
 		double a[3][3], b[3], step[3], next[3], next_r[3], next_j[3][3];
 		for (int p = 0; p < 3; p++) {
 			b[p] = -(j[0][p] * r[0] + j[1][p] * r[1] + j[2][p] * r[2]);

@@ -7,7 +7,7 @@
 
 static float table[3][UPSAMPLE_TABLE_SIZE][UPSAMPLE_TABLE_SIZE][UPSAMPLE_TABLE_SIZE][3];
 
-/* From the middle brightness outwards; each fit starts from its neighbour's. */
+/* Fits one column of the table, from a middle brightness outwards; each fit starts from that of its neighbour. */
 static void fit_column(const struct upsample *s, int largest, int y, int x)
 {
 	const int n = UPSAMPLE_TABLE_SIZE, start = n / 5;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The affine map from a surface's (u,v) to a texture's: to_uv of 3.x, uscale ... voffset of 0.5/0.6. */
+/* The affine map from the (u,v) of a surface to those of a texture: to_uv of 3.x, uscale ... voffset of 0.5/0.6. */
 #ifndef WORKER_RENDER_TEXTURE_UV_H
 #define WORKER_RENDER_TEXTURE_UV_H
 
@@ -31,7 +31,7 @@ static inline void uv_map_apply(const struct uv_map *map, double *u, double *v)
 	*v = map->m[1][0] * x + map->m[1][1] * y + map->m[1][2];
 }
 
-/* Larger offsets and factors would leave no digits of (u,v). */
+/* Larger offsets and factors would leave no significant digits of (u,v). */
 #define UV_NUMBER(name_)                                                                                   \
 	{                                                                                                  \
 		.name = name_, .types = VALUE_FLOAT | VALUE_INT, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX \

@@ -1,15 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * `wireframe` of 0.5/0.6: the edges of a mesh's triangles. With d the distance to the nearest edge of the triangle,
- * in scene units, and s(t) = t^2 (3 - 2 t) on [0,1], the colour is
+ * `wireframe` of 0.5/0.6: the edges of a mesh's triangles. With d the distance to the nearest edge of the triangle, in
+ * scene units, and s(t) = t^2 (3 - 2 t) on [0,1], the colour is
  *
  *     edge_color + (interior_color - edge_color) s((d - (1 - step_width) line_width) / (step_width line_width)),
  *
- * so a line has line_width on either side of an edge. Without one it is a tenth of the edges' mean length, over
- * triangles: an edge between two counts twice. What is no mesh in Mitsuba has the interior's colour, although some are
- * triangles here.
+ * so a line extends by line_width on either side of an edge. By default, line_width is a tenth of the mean length of
+ * the edges, averaged over triangles: an edge between two triangles counts twice. Shapes that are not meshes in Mitsuba
+ * have the colour of the interior only, even if they consist of triangles here.
  *
- * The distance to the edge across from a corner is the corner's barycentric coordinate times its height.
+ * The distance to the edge opposite a corner is the barycentric coordinate of the corner times the height of the
+ * triangle above that edge.
  */
 #include "common/base/text.h"
 #include "worker/render/texture/attribute_table.h"
@@ -19,9 +20,9 @@
 
 struct wireframe {
 	struct texture edge, interior;
-	struct attribute_table mesh; /* its triangles alone */
+	struct attribute_table mesh; /* only its triangles are used */
 	bool lines;
-	double inner, outer; /* the line's colour ends from here to there */
+	double inner, outer; /* distances at which the transition from edge to interior begins and ends */
 };
 
 static bool has_lines(const struct attribute_table *mesh)
@@ -70,7 +71,7 @@ static int create(struct texture *t, const struct scene_node *n, enum color_role
 	return 0;
 }
 
-/* How much of the interior's colour is at a point. */
+/* Returns the share of the interior's colour at a point. */
 static double interior_share(const struct wireframe *f, const struct texture_point *at)
 {
 	if (!f->lines)
@@ -110,7 +111,7 @@ static enum color_shape shape(const struct texture *t)
 	return first == texture_shape(&f->interior) ? first : COLOR_SHAPE_OTHER;
 }
 
-/* It is only made in roles that need neither a height nor a derivative. */
+/* No height and no jet: creation refuses the roles that need them. */
 const struct texture_ops texture_ops_wireframe = {
 	.decl = PLUGIN(TEXTURE, "wireframe", {.name = "edge_color", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
 		       {.name = "interior_color", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
