@@ -43,7 +43,7 @@ static bool is_colour(const char *property, uint32_t *channel)
 	return false;
 }
 
-/* Channels of a colour are one attribute, even if others are between them. */
+/* Finds or adds the attribute of a colour: its channels belong together even if other properties are between them. */
 static bool add_colour(struct attribute_groups *g, uint32_t *group)
 {
 	char name[ATTRIBUTE_NAME_MAX];

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Which properties of a file form one attribute of a mesh, by the rules of Mitsuba 3: adjacent ones with the same
- * prefix and the endings _x _y _z _w, _r _g _b _a, _0 _1 _2 _3 or _1 _2 _3 _4; and r g b (a), or red green blue
- * (alpha), anywhere, which are `color`. Any other property is an attribute with one channel.
+ * Groups the properties of a file into attributes of a mesh, by the rules of Mitsuba 3. Adjacent properties with the
+ * same prefix and the endings _x _y _z _w, _r _g _b _a, _0 _1 _2 _3 or _1 _2 _3 _4 form one attribute; so do r g b (a),
+ * or red green blue (alpha), wherever they are, which become `color`. Any other property is an attribute with one
+ * channel.
  */
 #ifndef WORKER_RENDER_SHAPE_ATTRIBUTE_NAMES_H
 #define WORKER_RENDER_SHAPE_ATTRIBUTE_NAMES_H
@@ -12,23 +13,25 @@
 enum { ATTRIBUTE_GROUPS_MAX = 64 };
 
 struct attribute_group {
-	char name[ATTRIBUTE_NAME_MAX]; /* with `vertex_` or `face_` in front */
-	uint32_t channels;	       /* bits of the channels found */
+	char name[ATTRIBUTE_NAME_MAX]; /* begins with `vertex_` or `face_` */
+	uint32_t channels;	       /* bit k: channel k has been found */
 };
 
 struct attribute_groups {
 	const char *kind; /* "vertex_" or "face_" */
 	uint32_t count;
-	int scheme; /* of the last group's endings, if it may continue; -1 */
+	int scheme; /* scheme of the last group's endings if the group may continue, otherwise -1 */
 	struct attribute_group of[ATTRIBUTE_GROUPS_MAX];
 };
 
+/* Returns an empty set of groups. kind: "vertex_" or "face_". */
 struct attribute_groups attribute_groups_none(const char *kind);
 
-/* Adds a property, and returns its attribute and channel. false: too many. */
+/* Adds a property; *group and *channel: its attribute and its channel of that. Returns false if there are too many
+ * groups. */
 bool attribute_groups_add(struct attribute_groups *g, const char *property, uint32_t *group, uint32_t *channel);
 
-/* The number of channels; 0: not an attribute, such as colours with fewer than three channels. */
+/* Returns the number of channels, or 0 if the group is not an attribute, such as a colour with two channels. */
 uint32_t attribute_group_channels(const struct attribute_group *g);
 
 #endif

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Curves that are uniform cubic B-splines, of positions and radii (spline.h): circles swept along them, with open ends.
- * to_world moves the control points and does not change their radii. u is once around, v from 0 to 1 over all pieces of
- * the file.
+ * Circles swept along uniform cubic B-splines of positions and radii (spline.h), with open ends. to_world transforms
+ * the control points, but not their radii. u runs once around the tube, v from 0 to 1 over all pieces of the file.
  */
 #include "worker/render/shape/curve_file.h"
 #include "worker/render/shape/curve_shape.h"

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* From -1 to 1 in each direction. */
+/* A cube from -1 to 1 in each direction. */
 #include "worker/render/shape/declare.h"
 #include "worker/render/shape/mesh.h"
 
-/* Each face with its normal and the directions of u and v, as on Mitsuba's cube. Some are left-handed: mesh_finish
- * winds the triangles by their normals. */
+/* The normal of each face, and its directions of u and v, as on Mitsuba's cube. Some faces are left-handed: mesh_finish
+ * winds triangles by their normals. */
 static const struct face {
 	vec3 n, u, v;
 } faces[6] = {

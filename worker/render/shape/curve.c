@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Chains of a linear curve are its control points; those of a spline are where a tube would have its rings, with a
- * tolerance of their own: a chain has smooth normals and no sides, so only its outline differs.
+ * Makes chains and meshes from control points. The chain of a linear curve is its control points. That of a spline has
+ * points where a tube would have rings, but with a coarser tolerance: a chain has smooth normals and no sides, so that
+ * only its outline is approximate.
  *
- * Failures: no memory, too many points or triangles.
+ * Fails if memory is out, or if there are too many points or triangles.
  */
 #include "worker/render/shape/curve.h"
 
@@ -12,10 +13,10 @@
 #include "worker/render/shape/tube.h"
 
 enum { CHAIN_POINTS_MAX = 1 << 28 };
-/* In radii. */
+/* Tolerances in units of the radius. */
 static const double chain_tolerance = 0.05, tube_tolerance = 0.02;
 
-/* Pieces before curve i, and of all. */
+/* Returns the number of pieces before curve i; for i = c->curves, of all pieces. */
 static uint32_t pieces_before(const struct curve *c, uint32_t i)
 {
 	return c->first[i] - (c->spline ? SPLINE_POINTS - 1 : 1) * i;

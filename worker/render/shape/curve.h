@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Curves as a shape has them, by control points, and what they are made of: chains of points, between which round cones
- * are traced (worker/render/geom/curves.h), or a mesh of tubes (tube.h), for what needs triangles.
+ * The curves of a shape, given by control points, and their two representations: chains of points, between which round
+ * cones are intersected (worker/render/geom/curves.h), and meshes of tubes (tube.h) for uses that need triangles.
  *
  * One thread.
  */
@@ -12,28 +12,30 @@
 #include "worker/render/shape/mesh.h"
 
 struct curve {
-	const double (*point)[4]; /* control points in world space, and radii */
-	const uint32_t *first;	  /* of each curve, and the count of points at the end */
+	const double (*point)[4]; /* control points in world space, and their radii */
+	const uint32_t *first;	  /* index of each curve's first point; first[curves] is `count` */
 	uint32_t count, curves;
-	bool spline; /* with open ends */
-	/* The chains' number of points, the box of their spheres, and the largest radius. */
+	bool spline; /* cubic B-splines with open ends, otherwise straight pieces */
+	/* Set by curve_measure: the number of points of all chains, the bounding box of their spheres, and the largest
+	 * radius. */
 	uint32_t chain_points;
 	vec3 low, high;
 	double thickest;
 };
 
 struct chain_point {
-	vec3 center, tangent; /* unit; 0 on straight pieces */
+	vec3 center, tangent; /* tangent: unit, or 0 on straight pieces */
 	double radius, v;
 };
 
-/* The chain of curve i, in `points`, a list of struct chain_point; its items before are removed. A chain of a spline is
- * off by at most a twentieth of the largest radius around. v: 0 to 1 over all curves. -ENOMEM. */
+/* Replaces the contents of `points`, a list of struct chain_point, by the chain of curve i. The chain of a spline
+ * deviates by at most a twentieth of the largest radius nearby, unless it needs more than 64 points per piece. v runs
+ * from 0 to 1 over all curves. -ENOMEM. */
 int curve_chain(const struct curve *c, uint32_t i, struct list *points);
-/* Sets the members that describe the chains. -EFBIG: too many points; -ENOMEM. */
+/* Sets the members of c that describe the chains. -EFBIG if there are too many points; -ENOMEM. */
 int curve_measure(struct curve *c);
 
-/* -EFBIG: more triangles than a mesh may have; -ENOMEM. */
+/* Makes a mesh of tubes. -EFBIG if there are more triangles than a mesh may have; -ENOMEM. */
 int curve_mesh(const struct curve *c, struct arena *arena, struct mesh *out);
 
 #endif

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * curve_file_read and curve_file_read_hair open the file that the shape names and add its points one by one. The binary
- * form of hair is "BINARY_HAIR", the number of vertices as 32 bits, and three floats for each, all little-endian; an
- * infinity between vertices begins a new hair.
+ * form of hair files is "BINARY_HAIR", the number of vertices (32 bits), and three floats per vertex, all
+ * little-endian; an infinity between vertices begins a new hair.
  *
- * Failures, with the file's name and the line: a number that is missing, not finite or too large, a negative radius, a
- * curve with too few points; a file without points, a binary one that ends too early.
+ * Reading fails, with the name of the file and the line, if a number is missing, not finite or too large, if a radius
+ * is negative, or if a curve has too few points; it also fails if the file has no curve, or if a binary file is
+ * truncated.
  */
 #include "worker/render/shape/curve_file.h"
 
@@ -23,10 +24,10 @@ struct curve_reader {
 	const struct scene_node *node;
 	const char *name;
 	mat4 to_world;
-	double radius; /* of all points; negative: each line has one */
-	uint32_t least;
-	bool drop_short; /* curves of fewer points are left out */
-	bool begun;	 /* the last curve has a point */
+	double radius;	 /* of all points; negative: each line has its own */
+	uint32_t least;	 /* least number of points of a curve */
+	bool drop_short; /* curves with fewer points are left out */
+	bool begun;	 /* a curve has been begun */
 	struct curve_points *out;
 	struct error *error;
 };
@@ -169,7 +170,7 @@ static int read_file(struct curve_reader *r, const struct asset_source *assets)
 	if (!rc && out->curves == 0)
 		rc = node_error(r->node, r->error, EINVAL, "%s: has no curve", r->name);
 	if (!rc)
-		rc = add_start(r); /* the end of the last */
+		rc = add_start(r); /* the end of the last curve */
 	if (rc) {
 		curve_points_free(out);
 		return rc;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Files of curves: one control point per line, position and radius, and an empty line between curves. One thread; what
- * is read lasts until curve_points_free.
+ * Files of curves: one control point per line, position and radius, and an empty line between curves. One thread; the
+ * points are kept until curve_points_free.
  */
 #ifndef WORKER_RENDER_SHAPE_CURVE_FILE_H
 #define WORKER_RENDER_SHAPE_CURVE_FILE_H
@@ -11,15 +11,16 @@
 
 struct curve_points {
 	const double (*point)[4]; /* x y z in world space (to_world applied), radius */
-	const uint32_t *first;	  /* of each curve, and the count of points at the end */
+	const uint32_t *first;	  /* index of each curve's first point; first[curves] is `count` */
 	uint32_t count, curves;
-	struct list points, firsts; /* which hold them */
+	struct list points, firsts; /* own the memory of `point` and `first` */
 };
 
-/* A file of text in which a curve has at least that many points. */
+/* Reads a text file in which each curve has at least `least` points. Returns 0 or a negative error code. */
 int curve_file_read(const struct scene_node *n, const struct asset_source *assets, uint32_t least,
 		    struct curve_points *out, struct error *e);
-/* A file of Mitsuba 0.6's hair, text or binary, where all radii are the same. A hair of one point is left out. */
+/* Reads a text or binary hair file of Mitsuba 0.6, with the same radius at all points. Hairs of one point are left out.
+ * Returns 0 or a negative error code. */
 int curve_file_read_hair(const struct scene_node *n, const struct asset_source *assets, double radius,
 			 struct curve_points *out, struct error *e);
 void curve_points_free(struct curve_points *p);

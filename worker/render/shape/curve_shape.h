@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What the shapes made of curves share. */
+/* Shared by the shapes that consist of curves. */
 #ifndef WORKER_RENDER_SHAPE_CURVE_SHAPE_H
 #define WORKER_RENDER_SHAPE_CURVE_SHAPE_H
 
 #include "worker/render/shape/curve_file.h"
 #include "worker/render/shape/shape.h"
 
-/* Makes them the shape's geometry; frees the points. */
+/* Copies the points to the arena as the geometry of shape n, and frees them, also on error. Returns 0, -EFBIG or
+ * -ENOMEM. */
 int curve_shape_take(const struct scene_node *n, struct curve_points *points, bool spline, struct arena *arena,
 		     struct shape_geometry *out, struct error *e);
 

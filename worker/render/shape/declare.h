@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* For the parameter tables of shapes. */
+/* Parameters for the declarations of shapes. */
 #ifndef WORKER_RENDER_SHAPE_DECLARE_H
 #define WORKER_RENDER_SHAPE_DECLARE_H
 
 #include "worker/render/plugin/param.h"
 #include "worker/render/shape/displace.h"
 
-/* For meshes from files (smooth.h). */
+/* Of meshes from files (smooth.h). */
 #define MESH_SMOOTH_PARAM                                                                   \
 	{                                                                                   \
 		"max_smooth_angle", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, 0, 180, NULL \

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The unit disk in x and y, facing z. As in Mitsuba u is the distance from the centre, v the angle over 2 pi. */
+/* The unit disk in x and y, facing +z. As in Mitsuba, u is the distance from the centre, and v the angle over 2 pi. */
 #include "worker/render/shape/declare.h"
 #include "worker/render/shape/round.h"
 
-/* The centre once per triangle, because each has another v there. */
+/* Each triangle has its own vertex at the centre, because v there differs between triangles. */
 static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 		 struct shape_geometry *out, struct error *e)
 {

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * displace_triangles divides every triangle by the grid (displace_grid.h): each point is sampled with position, normal
- * and height, moved, and given the displaced surface's normal by differences. Points on edges and corners are
- * accumulated at their place first and finalised afterwards, so that neighbours agree to the bit.
+ * displace_triangles subdivides every triangle by the grid (displace_grid.h). At each point it samples position, normal
+ * and height, moves the point, and computes the normal of the displaced surface from differences. Points on edges and
+ * corners are accumulated at their place first and finalised afterwards, so that neighbouring triangles agree to the
+ * bit.
  *
- * Failures: more triangles than a mesh may have (before memory is allocated), heights that are not finite, no memory.
+ * Fails if there are more triangles than a mesh may have (before memory is allocated), if a vertex moves too far or
+ * heights are not finite, or if memory is out.
  */
 #include "worker/render/shape/displace.h"
 
@@ -13,19 +15,19 @@
 
 #include <string.h>
 
-/* Normals that differ by less than a thousandth of a radian (rounding in files), and heights that differ by less
- * than this share of the largest, are not a crease. */
+/* Normals that differ by less than a thousandth of a radian (rounding in files), and heights that differ by less than
+ * SEAM_HEIGHT times the largest, do not count as a crease. */
 #define CREASE_COSINE (1 - 1e-6)
 #define SEAM_HEIGHT 1e-9
 
-/* What the triangles around a place contribute to it. */
+/* The contributions of the triangles around a place. */
 struct place {
-	vec3 p, direction, normal; /* sums, except for p */
-	double weight, height, least, most;
-	bool seen, bent;
+	vec3 p, direction, normal;	    /* weighted sums, except for p */
+	double weight, height, least, most; /* sum of weights; weighted sum, least and largest of heights */
+	bool seen, bent;		    /* some triangle has contributed; the place is on a crease or seam */
 };
 
-/* The rotation of the triangles around a border vertex. */
+/* The change of the normals of the triangles around a border vertex, weighted by their angles. */
 struct turn {
 	vec3 sum;
 	double weight;
@@ -33,12 +35,12 @@ struct turn {
 
 struct displacer {
 	const struct displacement *d;
-	const struct sphere *sphere; /* NULL: the surface is the base mesh */
+	const struct sphere *sphere; /* NULL: the base mesh is the surface itself */
 	struct mesh base, out;
 	struct displace_grid grid;
 	struct place *places;
 	struct turn *turns;
-	double highest;
+	double highest; /* largest |height| */
 };
 
 /* The surface at a point before displacement, and the height there. */
@@ -58,7 +60,8 @@ static vec3 axis(const struct sphere *s, int k)
 	return (vec3){s->to_world.m[0][k], s->to_world.m[1][k], s->to_world.m[2][k]};
 }
 
-/* u continues beyond the octant's own quarter, and at the poles is its middle. */
+/* Samples the sphere in the direction `out`. u is continuous beyond the octant's own quarter, and at the poles has the
+ * value of its middle. */
 static void sphere_sample(const struct sphere *ball, uint32_t octant, vec3 out, struct sample *s)
 {
 	vec3 w = vec3_normalize(out);
@@ -103,7 +106,8 @@ static vec3 normal_or(vec3 v, vec3 otherwise)
 	return length > 0 && isfinite(length) ? vec3_scale(1 / length, v) : otherwise;
 }
 
-/* Differences over two steps, which may leave the triangle: its plane, normals and (u,v) are continued there. */
+/* Returns the normal of the displaced surface from central differences. The points may be outside the triangle: its
+ * plane, normals and (u,v) are extrapolated. */
 static vec3 displaced_normal(const struct displacer *w, uint32_t triangle, double b1, double b2,
 			     const struct sample *at)
 {
@@ -142,7 +146,7 @@ static void add_to_place(struct place *c, double weight, const struct sample *s,
 	c->weight += weight;
 }
 
-/* Attributes of a vertex of the finer mesh, interpolated in its triangle of the coarse one. */
+/* Interpolates the attributes of a vertex of the finer mesh in its triangle of the base mesh. */
 static void mix_attributes(const struct displacer *w, uint32_t triangle, double b1, double b2, uint32_t vertex)
 {
 	const uint32_t *t = w->base.index[triangle];
@@ -192,7 +196,8 @@ static void put_vertex(struct displacer *w, uint32_t triangle, uint32_t i, uint3
 	add_to_place(&w->places[at.place], weight, &s, normal);
 }
 
-/* Opposite sheets that touch have no common direction: their places do not move. */
+/* Moves a place by the mean height along the mean normal. Places without a mean normal, where opposite sheets touch, do
+ * not move. */
 static void settle_place(const struct displacer *w, struct place *c)
 {
 	double length = vec3_length(c->direction), height = c->height / c->weight;
@@ -213,7 +218,7 @@ static void settle_vertex(struct displacer *w, uint32_t triangle, uint32_t i, ui
 		mesh_store(w->out.normal[at.vertex], normal_or(c->normal, mesh_load(w->out.normal[at.vertex])));
 }
 
-/* Calls `what` for every point of the border of every triangle, or for all points. */
+/* Calls `what` for every point on the border of every triangle, or for all points. */
 static void each_point(struct displacer *w, bool all, void (*what)(struct displacer *, uint32_t, uint32_t, uint32_t))
 {
 	uint32_t n = w->grid.parts;
@@ -293,7 +298,7 @@ static void put_triangles(struct displacer *w)
 	}
 }
 
-/* The attributes of `from`, all 0. */
+/* Adds the attributes of `from` to m, with all values 0. Returns false if out of memory. */
 static bool same_attributes(struct mesh *m, const struct mesh *from, struct arena *arena)
 {
 	for (uint32_t i = 0; i < from->attribute_count; i++) {
@@ -321,7 +326,7 @@ static void split_attributes(struct mesh *m, const struct mesh *from, uint32_t t
 	}
 }
 
-/* One vertex a corner: flat triangles have a normal each. */
+/* Gives each corner its own vertex, since each flat triangle has its own normal. Returns false if out of memory. */
 static bool split_flat(struct mesh *m, const struct mesh *from, struct arena *arena)
 {
 	if (!mesh_alloc(m, 3 * from->triangle_count, from->triangle_count, true, from->uv != NULL, arena) ||
@@ -344,8 +349,8 @@ static bool split_flat(struct mesh *m, const struct mesh *from, struct arena *ar
 	return true;
 }
 
-/* Normals are the directions from the centre. Octants are numbered by quarter of longitude, the lower half from 4
- * on. */
+/* Makes an octahedron whose normals are the directions from the centre. Octants are numbered by their quarter of
+ * longitude, from 0 in the upper half and from 4 in the lower half. */
 static bool make_octahedron(struct mesh *m, const struct sphere *s, struct arena *arena)
 {
 	if (!mesh_alloc(m, 24, 8, true, true, arena))
@@ -364,7 +369,7 @@ static bool make_octahedron(struct mesh *m, const struct sphere *s, struct arena
 	return true;
 }
 
-/* Vertices that no triangle uses stay where they are. */
+/* Moves all vertices and makes the triangles. Vertices that no triangle uses stay where they are. */
 static int settle_places(struct displacer *w, const struct scene_node *n, struct error *e)
 {
 	for (uint32_t i = 0; i < w->base.vertex_count; i++) {

@@ -42,7 +42,7 @@ static bool weld_positions(struct displace_grid *g, const struct mesh *base, str
 	return true;
 }
 
-/* A side as an edge: its places in ascending order, then the vertices there. */
+/* The edge of a triangle's side: its two places in ascending order, then the vertices there. */
 struct edge {
 	uint32_t end[4];
 	uint32_t side;
@@ -121,7 +121,7 @@ struct displace_point displace_grid_at(const struct displace_grid *g, uint32_t t
 		return on_side(g, triangle, 1, j);
 	if (i == 0)
 		return on_side(g, triangle, 2, n - j);
-	/* Row i has n - 1 - i points inside; those of earlier rows come first. */
+	/* Row i has n - 1 - i points inside the triangle; those of earlier rows come first. */
 	uint64_t before = (uint64_t)(i - 1) * (2 * n - 2 - i) / 2, inside = (uint64_t)(n - 1) * (n - 2) / 2;
 	return (struct displace_point){(uint32_t)(g->border + triangle * inside + before + j - 1), 0, true};
 }

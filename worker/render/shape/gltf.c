@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A primitive of a glTF 2.0 mesh, as numbers in a buffer: `position`, `normal`, `texcoord` and `index` are each "first
- * stride count type", with bytes from the buffer's beginning and type one of f32 u8 u16 u32 (texture coordinates in u8
- * and u16 represent 0 to 1). The reader of glTF scenes (worker/render/gltf/gltf.h) writes them; everything is checked
- * again here.
+ * A primitive of a glTF 2.0 mesh. `position`, `normal`, `texcoord` and `index` each describe numbers in a buffer as
+ * "first stride count type": the offset of the first element and the distance between elements, in bytes, the number of
+ * elements, and the type f32, u8, u16 or u32 (texture coordinates in u8 and u16 stand for 0 to 1). The reader of glTF
+ * scenes (worker/render/gltf/gltf.h) writes these descriptions; they are checked again here.
  *
- * Failures: numbers that exceed the buffer, indices out of range, more vertices or triangles than a mesh may have.
+ * Creation fails if numbers lie outside the buffer, if an index is out of range, or if there are more vertices or
+ * triangles than a mesh may have.
  */
 #include "worker/render/scene/asset_part.h"
 #include "worker/render/text/number.h"
@@ -23,14 +24,14 @@ static const struct {
 	size_t size;
 } types[TYPES] = {{"f32", 4}, {"u8", 1}, {"u16", 2}, {"u32", 4}};
 
-/* Vectors of numbers in a buffer. */
+/* An array of vectors in a buffer. */
 struct accessor {
 	const unsigned char *at;
 	uint64_t stride, count;
 	enum number_type type;
 };
 
-/* 1: the property is absent. */
+/* Reads the description of an array. Returns 0, 1 if the property is absent, or a negative error code. */
 static int read_accessor(struct accessor *a, const struct scene_node *n, const char *name, unsigned components,
 			 unsigned allowed, const struct asset_range *buffer, struct error *e)
 {
@@ -81,7 +82,7 @@ static uint64_t triangles_of(enum mode mode, uint64_t corners)
 	return mode == TRIANGLES ? corners / 3 : corners > 2 ? corners - 2 : 0;
 }
 
-/* Corner k of triangle t among the indices; in strips every second triangle is reversed. */
+/* Returns the position of corner k of triangle t among the indices; in strips, every second triangle is reversed. */
 static uint64_t corner_of(enum mode mode, uint64_t t, unsigned k)
 {
 	if (mode == TRIANGLES)
@@ -124,7 +125,7 @@ static int fill_mesh(struct mesh *m, const struct scene_node *n, const struct ac
 	return 0;
 }
 
-/* Reads attributes of vertices, in the order of the buffer. */
+/* Adds the attribute that the property `name` describes, if that is present. */
 static int add_attribute(struct mesh *m, const struct scene_node *n, const char *name, const char *attribute,
 			 unsigned components, const struct asset_range *buffer, struct arena *arena, struct error *e)
 {
@@ -190,7 +191,7 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 }
 
 SHAPE_OPS(gltf, {"filename", UNDERSTOOD(VALUE_STRING)}, ASSET_PART_PARAMS,
-	  {"embedded", UNDERSTOOD(VALUE_STRING)}, /* the buffer in base64, in place of a file */
+	  {"embedded", UNDERSTOOD(VALUE_STRING)}, /* the buffer itself in base64, instead of a file */
 	  {"position", UNDERSTOOD(VALUE_STRING)}, {"normal", UNDERSTOOD(VALUE_STRING)},
 	  {"texcoord", UNDERSTOOD(VALUE_STRING)},
 	  {"texcoord_other", UNDERSTOOD(VALUE_STRING)}, /* the attribute vertex_texcoord */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Shapes that hold others: `merge` stands for everything in it; a `shapegroup` exists for `instance` to refer to, which
- * places all of it somewhere else. They are resolved before anything is built (group.h).
+ * Shapes that contain others: `merge` stands for its contents; a `shapegroup` is not rendered itself, but referred to
+ * by `instance`, which places its contents elsewhere. All of them are resolved before shapes are built (group.h).
  */
 #include "worker/render/shape/group.h"
 
@@ -22,8 +22,8 @@ struct listing {
 	struct arena *arena;
 	struct listed_shape *shapes;
 	uint32_t count, room;
-	double open, close;	       /* the shutter */
-	const struct animation *moves; /* of the instance that is being listed */
+	double open, close;	       /* times of the shutter */
+	const struct animation *moves; /* motion of the instance that is being listed */
 	struct report *found;
 	struct error *e;
 };
@@ -38,8 +38,8 @@ static const struct scene_node *placed_at(const struct scene_node *n, mat4 place
 	return node_with(n, "to_world", (struct value){.type = VALUE_TRANSFORM, .as.transform = place}, arena);
 }
 
-/* Replaces a node that moves by one that stands where it is when the shutter opens. *moves: how it goes on while the
- * shutter is open; NULL: it does not. */
+/* Replaces a moving node by a still one at its position when the shutter opens. *moves: its motion while the shutter is
+ * open; NULL if it does not move then. */
 static int stop(struct listing *l, const struct scene_node **n, const struct animation **moves)
 {
 	const struct animation *a = node_animation(*n);
@@ -83,7 +83,8 @@ static int append(struct listing *l, const struct scene_node *n, const struct sc
 
 static int list(struct listing *l, const struct scene_node *n, const struct scene_node *instance);
 
-/* An object has failed with `code`, or not; 0: the listing goes on. */
+/* Handles the result of listing one object: reports an error if problems are collected. Returns 0 to continue with the
+ * next object, or the code. */
 static int go_on(struct listing *l, int code)
 {
 	return l->found && code != -E2BIG ? report_problem_once(l->found, code, l->e) : code;
@@ -139,7 +140,8 @@ static int compare_uses(const void *x, const void *y)
 	return a->at < b->at ? -1 : a->at > b->at;
 }
 
-/* Addresses must not affect the result: of equal nodes the first in the list counts. */
+/* Finds the shapes that instantiate the same node. Addresses do not affect the result, since of equal nodes the first
+ * in the list is recorded. */
 static int find_uses(struct listing *l)
 {
 	uint32_t n = 0;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Mitsuba 0.6's hair: straight pieces of one radius, which to_world scales as it scales its z axis. Joints are rounded,
- * where Mitsuba has mitres, and ends are closed. angle_threshold, which merges pieces that are almost straight to save
- * time, has no effect.
+ * `hair` of Mitsuba 0.6: straight pieces of one radius, which to_world scales like its z axis. Joints are rounded,
+ * where Mitsuba has mitres, and ends are closed. angle_threshold, by which Mitsuba merges almost straight pieces to
+ * save time, has no effect.
  */
 #include "worker/render/shape/curve_file.h"
 #include "worker/render/shape/curve_shape.h"

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * An image's luminance as heights over the square from (-1,-1) to (1,1), along z and times `scale`: the height field of
- * Mitsuba 0.6. Each pixel is a vertex, the top row is at y = -1, and texture coordinates run over the square with x and
- * y. Between four pixels are two triangles, where Mitsuba has a bilinear patch.
+ * The height field of Mitsuba 0.6: the luminance of an image, times `scale`, is the height along z over the square from
+ * (-1,-1) to (1,1). Each pixel is a vertex, the top row is at y = -1, and texture coordinates run over the square with
+ * x and y. Between four pixels there are two triangles, where Mitsuba has a bilinear patch.
  *
- * Shading normals are Mitsuba's: in units of pixels, the mean of the unit normals that the adjacent patches have in
- * that corner. Mitsuba resamples images to sides of 2^n + 1 pixels first; here they are used unchanged.
+ * Shading normals are those of Mitsuba: in units of pixels, the mean of the unit normals that the adjacent patches have
+ * at the vertex. Mitsuba first resamples images to sides of 2^n + 1 pixels; here they are used unchanged.
  *
- * Failures: neither a file nor a bitmap, an image of less than 2 x 2 pixels or of more than a mesh may have.
+ * Creation fails if there is neither a file nor a bitmap, or both, or if the image has less than 2 x 2 pixels or more
+ * than a mesh may have.
  */
 #include "worker/render/image/image.h"
 #include "worker/render/shape/declare.h"
@@ -31,7 +32,7 @@ static double height_at(const struct field *f, uint32_t x, uint32_t y)
 	return f->scale * z;
 }
 
-/* The texture that is scaled, if one is. */
+/* Returns the texture inside nested `scale` textures, and multiplies *scale by their factors. */
 static const struct scene_node *unscaled(const struct scene_node *texture, double *scale)
 {
 	while (texture && strcmp(texture->type, "scale") == 0) {
@@ -44,7 +45,7 @@ static const struct scene_node *unscaled(const struct scene_node *texture, doubl
 	return texture;
 }
 
-/* The image is decoded like colours, unless its texture says that it contains numbers. */
+/* Reads the image, which is decoded like colours unless the node says that it contains raw numbers. */
 static int read_picture(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 			struct field *f, struct error *e)
 {
@@ -77,7 +78,8 @@ static void add_normal(double *normal, double x, double y)
 	normal[2] += 1 / length;
 }
 
-/* In units of pixels first, then of the square, whose half width is `cells` / 2 pixel distances. */
+/* Computes the normals, first in units of pixels, then of the square, in which pixels are at distances of `across` and
+ * `along`. */
 static void set_normals(const struct field *f, struct mesh *m, double across, double along)
 {
 	uint32_t width = f->picture.width, height = f->picture.height;
@@ -155,7 +157,7 @@ const struct shape_ops shape_ops_heightfield = {
 		 PARAMS({"filename", UNDERSTOOD(VALUE_STRING)},
 			{"scale", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, -PARAM_LENGTH_MAX, PARAM_LENGTH_MAX, NULL},
 			{"shading_normals", UNDERSTOOD(VALUE_BOOL)},
-			{"width", IGNORED}, /* of textures that are not images, which are refused */
+			{"width", IGNORED}, /* only for textures that are not images, which are refused */
 			{"height", IGNORED}, SHAPE_PARAMS),
 		 1u << PLUGIN_BSDF | 1u << PLUGIN_EMITTER | 1u << PLUGIN_TEXTURE, PARAM_UNDERSTOOD},
 	.build = build,

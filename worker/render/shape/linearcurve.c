@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Curves of straight pieces: cones with spheres as joints and ends, as in Mitsuba. to_world moves the control
- * points and does not change their radii. u is once around, v from 0 to 1 over all pieces of the file.
+ * Curves of straight pieces: cones with spheres as joints and ends, as in Mitsuba. to_world transforms the control
+ * points, but not their radii. u runs once around the curve, v from 0 to 1 over all pieces of the file.
  */
 #include "worker/render/shape/curve_file.h"
 #include "worker/render/shape/curve_shape.h"

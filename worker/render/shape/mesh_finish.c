@@ -37,7 +37,8 @@ static int place_vertices(struct mesh *m, const struct mesh_finish *f, const str
 			return node_error(n, e, ERANGE, "a texture coordinate lies beyond %g", MESH_UV_MAX);
 		if (!m->normal)
 			continue;
-		/* Normals become unit vectors or missing; scaling first keeps tiny and huge transforms in range. */
+		/* Normals become unit vectors, or 0 if missing; scaling first keeps those of tiny and huge transforms
+		 * in range. */
 		vec3 normal = mat4_normal(&inverse, mesh_load(m->normal[i]));
 		double largest = fmax(fabs(normal.x), fmax(fabs(normal.y), fabs(normal.z)));
 		normal = largest > 0 && isfinite(largest) ? vec3_normalize(vec3_scale(1 / largest, normal))
@@ -65,8 +66,8 @@ static uint64_t drop_flat(struct mesh *m)
 	return dropped;
 }
 
-/* If a file's normals and winding contradict each other, the normals are used, as by Mitsuba's emitters and
- * materials. */
+/* Reverses triangles whose winding contradicts their normals. The normals take precedence, as for Mitsuba's emitters
+ * and materials. */
 static void wind_by_normals(struct mesh *m)
 {
 	for (uint32_t i = 0; i < m->triangle_count; i++) {
@@ -93,7 +94,8 @@ static void add_corner_normals(struct mesh *m, const uint32_t t[3], const double
 	}
 }
 
-/* Opposite triangles may cancel; then any of their normals is used. */
+/* Normalises sums of normals. Those of opposite triangles may cancel; then the normal of one of these triangles is
+ * used. */
 static void fill_cancelled(struct mesh *m)
 {
 	for (uint32_t i = 0; i < m->triangle_count; i++)

@@ -8,15 +8,15 @@
 struct mesh_finish {
 	mat4 to_world;
 	bool flip_normals, face_normals;
-	double smooth_angle; /* degrees: new normals across edges that are less sharp (smooth.h); negative: keep normals
-			      */
+	double smooth_angle; /* degrees; normals are recomputed across edges less sharp than this (smooth.h); negative:
+				normals are kept */
 };
 
 /*
- * Transforms from object to world space. Drops triangles without area. Normals that are not unit vectors count as
- * missing and are computed from the adjacent triangles, weighted by angle; face_normals removes all. Mirrors do not
- * swap inside and outside. Triangles are wound counter-clockwise as seen from outside, which is the side of their
- * vertices' normals.
+ * Transforms m from object to world space and drops triangles without area; *dropped: their number. Normals that are 0
+ * or not finite count as missing and are computed from the adjacent triangles, weighted by angle; face_normals removes
+ * all normals. A transform that mirrors does not swap inside and outside. Triangles are wound counter-clockwise seen
+ * from outside, which is the side of their vertices' normals. Returns 0 or a negative error code; errors name n.
  */
 int mesh_finish(struct mesh *m, const struct mesh_finish *f, struct arena *arena, uint64_t *dropped,
 		const struct scene_node *n, struct error *e);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Wavefront OBJ: all faces, or those of one material. */
+/* Wavefront OBJ files: all faces, or those of one material. */
 #include "common/base/liveness.h"
 #include "common/base/mem.h"
 #include "worker/render/shape/declare.h"
@@ -26,7 +26,7 @@ static bool same_vertex(const struct obj_corner *a, const struct obj_corner *b)
 	return a->v == b->v && a->vt == b->vt && a->vn == b->vn;
 }
 
-/* Colours that only some of the vertices have are not used. */
+/* Returns whether all vertices have colours; otherwise colours are not used. */
 static bool has_colours(const struct obj_file *o)
 {
 	return o->colours.count > 0 && o->colours.count == o->positions.count;
@@ -46,15 +46,15 @@ static void set_vertex(const struct obj_file *o, struct mesh *m, uint32_t i, con
 		mesh_set_attribute(m->attributes, i, k, ((const double *)o->colours.items)[3 * (c->v - 1) + k]);
 }
 
-/* Faces of a file, in arrays of their own or in the file's: sorting changes the corners. */
+/* The faces of a mesh, in arrays of their own or in those of the file; sorting changes the order of the corners. */
 struct faces {
 	struct obj_corner *corners;
 	uint32_t (*triangles)[3];
 	size_t corner_count, triangle_count;
 };
 
-/* Corners that agree in all three indices share a vertex. Sorting takes a bounded time for any file. False: out of
- * memory. */
+/* Makes a mesh in which corners with the same three indices share a vertex. They are found by sorting, which takes
+ * bounded time for any file. Returns false if out of memory. */
 static bool make_mesh(const struct obj_file *o, struct faces *f, struct arena *arena, struct mesh *m, bool flip)
 {
 	struct obj_corner *c = f->corners;
@@ -62,7 +62,7 @@ static bool make_mesh(const struct obj_file *o, struct faces *f, struct arena *a
 	uint32_t *vertex_of = mem_alloc(n, sizeof *vertex_of);
 	if (!vertex_of)
 		return false;
-	if (n > 0) /* a file of vertices alone has no array to sort */
+	if (n > 0) /* a file without faces has no array to sort */
 		qsort(c, n, sizeof *c, compare_corners);
 	uint32_t vertices = 0;
 	bool normals = false, uv = false;
@@ -84,7 +84,7 @@ static bool make_mesh(const struct obj_file *o, struct faces *f, struct arena *a
 	return ok;
 }
 
-/* Where a run ends. */
+/* Returns the end of a run, as the beginning of the next one. */
 static struct obj_run end_of(const struct obj_file *o, size_t run)
 {
 	const struct obj_run *runs = o->runs.items;
@@ -119,7 +119,7 @@ static int out_of_memory(const struct scene_node *n, struct error *e)
 	return node_error(n, e, ENOMEM, "%s: out of memory", node_string(n, "filename", ""));
 }
 
-/* The faces of one material, copied: the file is kept for the other materials. */
+/* Builds the faces of one material from copies, since the file is kept for the other materials. */
 static int build_material(const struct scene_node *n, const struct obj_file *o, const char *material,
 			  struct arena *arena, struct shape_geometry *out, struct error *e)
 {
@@ -169,7 +169,8 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 }
 
 SHAPE_OPS(obj, {"filename", UNDERSTOOD(VALUE_STRING)},
-	  {"material", UNDERSTOOD(VALUE_STRING)}, /* only the faces after `usemtl` of that name; "": those before any */
+	  {"material", UNDERSTOOD(VALUE_STRING)}, /* only the faces after `usemtl` with this name; "": those before the
+						     first `usemtl` */
 	  {"face_normals", UNDERSTOOD(VALUE_BOOL)}, {"flip_tex_coords", UNDERSTOOD(VALUE_BOOL)}, {"collapse", IGNORED},
 	  {"load_materials", UNDERSTOOD(VALUE_BOOL)}, /* .mtl files are never read: false says that none is wanted */
 	  MESH_SMOOTH_PARAM, {"shape_index", REFUSED}, SHAPE_PARAMS);

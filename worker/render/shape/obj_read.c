@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Reads OBJ files.
  *
- * obj_read opens the file and reads it line by line in one pass. Numbers, corners and triangles go to lists that grow
- * by doubling; polygons are cut into triangles (polygon.h); `usemtl` begins a run of faces with one material. The cache
- * keeps the file that was read last.
+ * obj_read opens an OBJ file and reads it line by line in one pass. Numbers, corners and triangles are added to lists
+ * that grow by doubling; polygons are cut into triangles (polygon.h); `usemtl` begins a run of faces with one material.
+ * The cache keeps the file that was read last.
  *
- * An error names the file and the line: a number that cannot be read, an index of something that the file has not
- * defined yet. A file without faces or above 4 GB is refused. After an error nothing is left allocated.
+ * Reading fails, with the file and the line, if a number is invalid, or if an index refers to an element that the file
+ * has not defined yet. It also fails if the file has neither vertices nor faces, or is larger than 4 GB. After an error
+ * nothing is left allocated.
  */
 #include "worker/render/shape/obj_read.h"
 
@@ -33,7 +33,7 @@ static int out_of_memory(const struct reader *o)
 	return node_error(o->node, o->error, ENOMEM, "%s:%d: out of memory", o->name, o->line);
 }
 
-/* Blanks, and the backslash that joins two lines. */
+/* Skips blanks, and the backslash that joins two lines. */
 static void skip_blanks(struct reader *o)
 {
 	while (o->p < o->end) {
@@ -79,7 +79,8 @@ static int read_numbers(struct reader *o, const char *what, struct list *l, size
 	return 0;
 }
 
-/* Three numbers after a position, to the end of the line, are an sRGB colour; anything else there is skipped. */
+/* Reads the colour of a vertex: exactly three numbers between its position and the end of the line, in sRGB. Anything
+ * else there is skipped. */
 static int read_colour(struct reader *o)
 {
 	double rgb[3];
@@ -115,7 +116,7 @@ static int read_normal(struct reader *o)
 	return 0;
 }
 
-/* Indices count from 1, or backwards from the last with -1. */
+/* Reads an index. Indices count from 1, or backwards from -1 for the last element. */
 static int read_index(struct reader *o, const char *what, size_t count, uint32_t *out)
 {
 	int64_t i;
@@ -167,7 +168,8 @@ static int read_corner(struct reader *o)
 	return 0;
 }
 
-/* The fan that was read becomes the polygon's triangles. Larger ones stay fans. */
+/* Replaces the fan of triangles of the last face by those of the polygon. Polygons of more than POLYGON_MOST corners
+ * stay fans. */
 static void cut_face(struct reader *o, uint32_t first, uint32_t n)
 {
 	const double(*position)[3] = o->file->positions.items;
@@ -210,7 +212,7 @@ static int read_face(struct reader *o)
 	}
 	if (n == 0)
 		return node_error(o->node, o->error, EINVAL, "%s:%d: a face without corners", o->name, o->line);
-	/* One or two corners, as exporters write points and lines: a triangle without area. */
+	/* Exporters write points and lines as faces of one or two corners: they become triangles without area. */
 	if (n < 3)
 		return add_triangle(o, first, first + n - 1, first + n - 1);
 	if (n > 3)
@@ -218,7 +220,7 @@ static int read_face(struct reader *o)
 	return 0;
 }
 
-/* A run without faces is dropped. */
+/* Begins a run of faces; replaces the last run if that has no faces. */
 static int begin_run(struct reader *o, const char *name, size_t length)
 {
 	struct obj_file *f = o->file;
@@ -237,7 +239,7 @@ static int begin_run(struct reader *o, const char *name, size_t length)
 	return 0;
 }
 
-/* The name is the rest of the line, with blanks inside. */
+/* The name of a material is the rest of the line, including blanks. */
 static int read_material(struct reader *o)
 {
 	size_t length;
@@ -274,7 +276,7 @@ static int read_lines(struct reader *o)
 		const char *newline = memchr(o->p, '\n', (size_t)(o->end - o->p));
 		o->p = newline ? newline + 1 : o->end;
 	}
-	/* Vertices alone are a mesh, an empty one; without them it is some other file. */
+	/* A file with vertices but without faces is an empty mesh; one without either is not an OBJ file. */
 	if (o->file->triangles.count == 0 && o->file->positions.count == 0)
 		return node_error(o->node, o->error, EINVAL, "%s: has no vertices and no faces", o->name);
 	return 0;
@@ -289,7 +291,7 @@ static void obj_free(struct obj_file *o)
 	*o = (struct obj_file){0};
 }
 
-/* Reads the file that the node names. After 0, release it with obj_free. */
+/* Reads the file that the node names. If it returns 0, *o has to be released with obj_free. */
 static int obj_read(struct obj_file *o, const struct scene_node *n, const struct asset_source *assets, struct error *e)
 {
 	*o = (struct obj_file){0};

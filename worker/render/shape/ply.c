@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Stanford PLY: ascii and both byte orders, with any order of elements and properties.
+ * Stanford PLY files: ascii and both byte orders, with elements and properties in any order.
  *
- * The header describes the data. A first pass over the faces counts triangles, so that memory is allocated once; a
- * second pass reads, and a third where faces come before the vertices, because concave polygons are cut by their
- * corners' positions (polygon.h). Vertices have x y z, nx ny nz and u v (or s t), faces vertex_indices (or
- * vertex_index). All other numbers of vertices and faces are attributes: integers represent 0 to 1 and are
- * decoded from sRGB, as in Mitsuba. Lists and other elements are skipped.
+ * The header describes the data. A first pass counts the triangles, so that memory is allocated once, and a second pass
+ * stores the data. If faces come before vertices, there is a third pass, because concave polygons are cut by the
+ * positions of their corners (polygon.h). Vertices have x y z, nx ny nz and u v (or s t), faces vertex_indices (or
+ * vertex_index). All other numbers of vertices and faces are attributes: integers stand for 0 to 1 and are decoded from
+ * sRGB, as in Mitsuba. Lists and other elements are skipped.
  *
- * Failures: an invalid header, a file that ends too early, indices out of range, numbers that are not finite. Counts in
- * the header are checked against the file's size before anything is allocated.
+ * Reading fails if the header is invalid, if the file is truncated, if an index is out of range, or if a number is not
+ * finite. Counts in the header are checked against the size of the file before anything is allocated.
  */
 #include "common/base/liveness.h"
 #include "worker/render/text/number.h"
@@ -22,7 +22,8 @@
 #include <string.h>
 
 enum { PROPERTIES_MAX = 64, ELEMENTS_MAX = 16, WORD_MAX = 64, TICK_INTERVAL = 4096 };
-/* A polygon's numbers apply to each of its triangles: at most this many per byte of the file. */
+/* The attributes of a polygon are copied to each of its triangles. They may have up to ATTRIBUTE_VALUES_PER_BYTE
+ * numbers per byte of the file, and up to ATTRIBUTE_VALUES_ALWAYS in any file. */
 enum { ATTRIBUTE_VALUES_PER_BYTE = 8, ATTRIBUTE_VALUES_ALWAYS = 1 << 20 };
 
 enum scalar { SCALAR_NONE, INT8, UINT8, INT16, UINT16, INT32, UINT32, FLOAT32, FLOAT64 };
@@ -30,11 +31,11 @@ static const uint8_t scalar_size[] = {0, 1, 1, 2, 2, 4, 4, 4, 8};
 
 enum format { FORMAT_ASCII, FORMAT_LITTLE, FORMAT_BIG };
 
-/* What a number is for. */
+/* The meaning of a number. */
 enum role { ROLE_NONE = -1, ROLE_X, ROLE_Y, ROLE_Z, ROLE_NX, ROLE_NY, ROLE_NZ, ROLE_U, ROLE_V, ROLES, ROLE_INDICES };
 
 struct ply_property {
-	enum scalar type, count_type; /* type of a list's length; SCALAR_NONE: not a list */
+	enum scalar type, count_type; /* count_type: of a list's length; SCALAR_NONE: not a list */
 	enum role role;
 	bool in_attribute;
 	uint32_t group, channel; /* of the attribute */
@@ -49,8 +50,8 @@ struct element {
 	uint32_t property_count;
 	struct ply_property properties[PROPERTIES_MAX];
 	struct attribute_groups groups;
-	bool integers[ATTRIBUTE_GROUPS_MAX];		    /* by group: the attribute it is stored in */
-	struct attribute *attributes[ATTRIBUTE_GROUPS_MAX]; /* by group; NULL: none is stored */
+	bool integers[ATTRIBUTE_GROUPS_MAX];		    /* by group: its numbers are integers */
+	struct attribute *attributes[ATTRIBUTE_GROUPS_MAX]; /* by group; NULL: the group is not stored */
 };
 
 struct ply {
@@ -58,8 +59,8 @@ struct ply {
 	const char *name;
 	struct error *error;
 	const char *p, *end;
-	char newline; /* ends a line of the header: \n, also after \r, or \r alone, as Rhino writes */
-	int line;     /* of the header */
+	char newline; /* ends a line of the header: \n, possibly after \r, or \r alone, as Rhino writes */
+	int line;     /* current line of the header */
 	enum format format;
 	uint32_t element_count;
 	struct element elements[ELEMENTS_MAX];
@@ -67,10 +68,10 @@ struct ply {
 	uint64_t triangles;
 	struct mesh *mesh;
 	bool flip;
-	const bool *srgb; /* the shape's `srgb`; NULL: not given */
+	const bool *srgb; /* the parameter `srgb`; NULL: not given */
 };
 
-/* A word of the header's line; false: end of the line. */
+/* Reads the next word of a line of the header. Returns false at the end of the line. */
 static bool next_word(struct ply *f, char word[WORD_MAX])
 {
 	while (f->p < f->end && (*f->p == ' ' || *f->p == '\t' || (*f->p == '\r' && f->newline == '\n')))
@@ -188,7 +189,7 @@ static int read_property(struct ply *f)
 		return header_error(f, "indices must be whole numbers");
 	for (uint32_t i = 0; i < el->property_count && p.role != ROLE_NONE; i++)
 		if (el->properties[i].role == p.role)
-			p.role = ROLE_NONE; /* u and s may both be present */
+			p.role = ROLE_NONE; /* u and s may both be present: the first one counts */
 	if (p.role >= 0 && p.role < ROLES)
 		f->has[p.role] = true;
 	if (p.role == ROLE_NONE && !list && el->kind != ELEMENT_OTHER)
@@ -261,7 +262,7 @@ static double decode(const char *at, enum scalar type, bool big)
 	}
 }
 
-/* The next number; false: there is none. */
+/* Reads the next number. Returns false if there is none. */
 static bool next_number(struct ply *f, enum scalar type, double *x)
 {
 	if (f->format != FORMAT_ASCII) {
@@ -285,7 +286,8 @@ static int item_error(const struct ply *f, const struct element *el, uint64_t i,
 	return node_error(f->node, f->error, EINVAL, "%s: %s %llu: %s", f->name, el->name, (unsigned long long)i, what);
 }
 
-/* The fan from triangle `first` on becomes the polygon's triangles. Larger ones stay fans. */
+/* Replaces the fan that begins with triangle `first` by the triangles of the polygon. Polygons of more than
+ * POLYGON_MOST corners stay fans. */
 static void cut_face(struct mesh *m, uint32_t first, uint32_t n)
 {
 	uint32_t index[POLYGON_MOST];
@@ -319,7 +321,8 @@ static int read_list(struct ply *f, const struct element *el, uint64_t item, con
 		corner[k < 2 ? (int)k : 2] = x;
 		if (k < 2 && k < n - 1)
 			continue;
-		/* One or two corners, as exporters write points and lines: a triangle without area. */
+		/* Exporters write points and lines as faces of one or two corners: they become triangles without
+		 * area. */
 		for (int i = (int)k + 1; i < 3; i++)
 			corner[i] = x;
 		if (f->mesh->index)
@@ -354,18 +357,18 @@ static int store_vertex(struct ply *f, const struct element *el, uint64_t i, con
 	return 0;
 }
 
-/* Integers represent 0 to 1. */
+/* Returns the value of a number of an attribute: integers stand for 0 to 1. */
 static double attribute_number(const struct ply *f, enum scalar type, double x)
 {
 	static const double largest[] = {[INT8] = 0x7f,	    [UINT8] = 0xff,	  [INT16] = 0x7fff,
 					 [UINT16] = 0xffff, [INT32] = 0x7fffffff, [UINT32] = 0xffffffff};
 	bool whole = type < FLOAT32, encoded = f->srgb ? *f->srgb : whole;
 	x = whole ? x / largest[type] : x;
-	/* Out of range stays out of range: no power of it is finite. */
+	/* Numbers out of range are not decoded, since their powers may overflow; they stay out of range. */
 	return encoded && fabs(x) <= MESH_ATTRIBUTE_MAX ? srgb_to_linear(x) : x;
 }
 
-/* The numbers of item i; a face's triangles are those from `first` on. */
+/* Stores the attributes of item i; the triangles of a face begin with `first`. */
 static void store_attributes(const struct ply *f, const struct element *el, uint64_t i, uint64_t first,
 			     const double x[PROPERTIES_MAX])
 {
@@ -405,7 +408,7 @@ static int read_item(struct ply *f, const struct element *el, uint64_t i)
 	return el->kind == ELEMENT_VERTEX && f->mesh->position ? store_vertex(f, el, i, v) : 0;
 }
 
-/* The minimum size of an item: in ascii a digit and a blank per number. */
+/* Returns the minimum size of an item in bytes; in ascii, a number takes at least one. */
 static uint64_t least_bytes(const struct ply *f, const struct element *el)
 {
 	uint64_t n = 0;
@@ -417,7 +420,7 @@ static uint64_t least_bytes(const struct ply *f, const struct element *el)
 	return n;
 }
 
-/* Everything after the header: once without arrays, to count and to check, and once with them. */
+/* Reads everything after the header: at first without arrays, to count triangles and check the data, then with them. */
 static int read_body(struct ply *f)
 {
 	f->triangles = 0;
@@ -443,7 +446,7 @@ static int read_body(struct ply *f)
 static int check_header(struct ply *f)
 {
 	uint64_t vertices = 0;
-	bool faces = false, others = false; /* others: strips of triangles, for instance */
+	bool faces = false, others = false; /* others: for instance strips of triangles */
 	for (uint32_t i = 0; i < f->element_count; i++) {
 		const struct element *el = &f->elements[i];
 		if (el->kind == ELEMENT_VERTEX)
@@ -464,7 +467,7 @@ static int check_header(struct ply *f)
 	return 0;
 }
 
-/* Room for the attributes of an element, whose count is checked against the file's size. */
+/* Allocates the attributes of an element, after checking their size against that of the file. */
 static int add_attributes(struct ply *f, struct element *el, uint64_t bytes, struct arena *arena)
 {
 	uint64_t items = el->kind == ELEMENT_FACE ? f->triangles : f->mesh->vertex_count, values = 0;
@@ -542,5 +545,5 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 
 SHAPE_OPS(ply, {"filename", UNDERSTOOD(VALUE_STRING)}, {"face_normals", UNDERSTOOD(VALUE_BOOL)},
 	  {"flip_tex_coords", UNDERSTOOD(VALUE_BOOL)}, {"collapse", IGNORED},
-	  {"srgb", UNDERSTOOD(VALUE_BOOL)}, /* of colours */
+	  {"srgb", UNDERSTOOD(VALUE_BOOL)}, /* whether colours are in sRGB */
 	  MESH_SMOOTH_PARAM, SHAPE_PARAMS);

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Most polygons are convex, and files mean a fan around their first corner, which is kept wherever all of its triangles
- * have the polygon's sense. Others lose one ear after the other (Meisters 1975, "Polygons have ears"): a corner with an
- * angle below 180 degrees, whose triangle with its neighbours holds no other corner. All of it happens in the plane
- * along the axis nearest to the polygon's normal (Newell's: the sum of the cross products around it).
+ * Most polygons are convex and are meant as fans around their first corner. A fan is kept if all of its triangles have
+ * the orientation of the polygon. Other polygons are cut by removing one ear after the other (Meisters 1975, "Polygons
+ * have ears"): an ear is a corner with an angle below 180 degrees, whose triangle with its neighbours contains no other
+ * corner. Ears are searched for in the projection along the axis nearest to the polygon's normal (Newell's: the sum of
+ * the cross products around it).
  *
- * No ear is left where the outline crosses itself, and looking for them may take the cube of the number of corners:
- * beyond CHECKS comparisons for each corner, and where a round finds no ear, corners are cut off as they come. So the
- * time is linear in the size of a file, whatever is in it.
+ * An outline that crosses itself may have no ear, and the search for ears may take time cubic in the number of corners.
+ * After CHECKS comparisons per corner, or if no corner is an ear, corners are therefore cut off in order. The time is
+ * thus linear in the size of a file, whatever it contains.
  */
 #include "worker/render/shape/polygon.h"
 
@@ -18,10 +19,11 @@
 
 enum { CHECKS = 4096 };
 
-/* A triangle of the fan may be turned over by this share of the polygon's area: corners are rounded. */
+/* Because corners are rounded, a triangle of the fan may have the opposite orientation by this share of the polygon's
+ * area. */
 #define TURNED_MOST 1e-5
 
-/* Twice the area of a triangle of the fan, as a vector. */
+/* Returns twice the area of a triangle of the fan, as a vector. */
 static vec3 fan_area(const struct polygon *p, uint32_t i)
 {
 	return vec3_cross(vec3_sub(p->corner[i - 1], p->corner[0]), vec3_sub(p->corner[i], p->corner[0]));
@@ -51,7 +53,7 @@ struct flat {
 struct outline {
 	struct flat p[POLYGON_MOST]; /* counter-clockwise */
 	uint32_t before[POLYGON_MOST], after[POLYGON_MOST];
-	uint64_t checks; /* that are left */
+	uint64_t checks; /* remaining comparisons */
 };
 
 static void flatten(struct outline *o, const struct polygon *p, vec3 normal)
@@ -70,7 +72,7 @@ static void flatten(struct outline *o, const struct polygon *p, vec3 normal)
 	}
 }
 
-/* Twice the area of a triangle, positive if it is counter-clockwise. */
+/* Returns twice the area of a triangle, positive if it is counter-clockwise. */
 static double area(struct flat a, struct flat b, struct flat c)
 {
 	return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);

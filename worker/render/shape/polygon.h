@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Polygons of mesh files as triangles. Any thread; allocates nothing; ticks (common/base/liveness.h). */
+/* Cuts the polygons of mesh files into triangles. Any thread; allocates nothing; calls tick()
+ * (common/base/liveness.h). */
 #ifndef WORKER_RENDER_SHAPE_POLYGON_H
 #define WORKER_RENDER_SHAPE_POLYGON_H
 
@@ -14,9 +15,9 @@ struct polygon {
 	vec3 corner[POLYGON_MOST];
 };
 
-/* Of at least three corners: n - 2 triangles t of corners, each with the polygon's sense. It may be concave, slightly
- * bent, and have corners in common places; what crosses itself gives n - 2 triangles as well. A fan around the first
- * corner where that covers it. */
+/* Cuts a polygon of n >= 3 corners into n - 2 triangles t of corner numbers, with the orientation of the polygon: a fan
+ * around the first corner if that covers it. The polygon may be concave, slightly bent, and have coinciding corners;
+ * one that crosses itself gives n - 2 triangles, too. */
 void polygon_cut(const struct polygon *p, uint32_t (*t)[3]);
 
 #endif

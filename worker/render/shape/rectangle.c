@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A square from -1 to 1 in x and y, facing z. */
+/* A square from -1 to 1 in x and y, facing +z. */
 #include "worker/render/shape/declare.h"
 #include "worker/render/shape/mesh.h"
 

@@ -3,7 +3,7 @@
 
 vec3 round_direction(uint32_t i)
 {
-	/* Exact on the axes, and the last corner equals the first to the bit. */
+	/* Corners on the axes are exact, and the last corner equals the first to the bit. */
 	uint32_t quarter = ROUND_SEGMENTS / 4, k = i % quarter;
 	double angle = 0.5 * M_PI * k / quarter, c = k ? cos(angle) : 1, s = k ? sin(angle) : 0;
 	switch (i / quarter % 4) {

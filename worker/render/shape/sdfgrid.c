@@ -1,19 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The surface where a grid of numbers over the unit cube, interpolated linearly in x, y and z, is 0; outside it is
- * positive. Where it leaves the cube it is open. It has no texture coordinates.
+ * The surface on which a trilinearly interpolated grid of values over the unit cube is 0; values outside the surface
+ * are positive. The surface is open where it leaves the cube, and has no texture coordinates.
  *
- * Each voxel is cut into SPLIT^3 cells, and each of these into six tetrahedra around its diagonal, one for each order
- * in which its three sides can be walked from corner (0,0,0) to (1,1,1); neighbours meet without gaps. Where the field
- * changes its sign along an edge there is a vertex, exactly on the surface, shared by all tetrahedra around the edge. A
- * tetrahedron with one corner on a side has one triangle, one with two has two. Cells are visited in layers along z,
- * and only vertices of two layers are looked up.
+ * Each voxel is cut into SPLIT^3 cells, and each cell into six tetrahedra around its diagonal, one for each order of
+ * walking along x, y and z from corner (0,0,0) to (1,1,1); neighbouring cells meet without gaps. If the field changes
+ * sign along an edge, there is a vertex exactly on the surface, shared by all tetrahedra around the edge. A tetrahedron
+ * with one corner on either side of the surface yields one triangle, one with two corners on each side yields two.
+ * Cells are visited in layers along z, so that only the vertices of two layers have to be stored for look-up.
  *
- * With `normals` "smooth" a vertex has a normal, interpolated linearly between those that the eight nearest voxels have
- * for it (Hansson-Soderlund, Evans and Akenine-Moller 2022, Ray Tracing of Signed Distance Function Grids, section
- * 5); with "analytic" triangles are flat, where Mitsuba has the normal of the point.
+ * With `normals` "smooth", the normal of a vertex is interpolated linearly between those of the eight nearest voxels at
+ * that point (Hansson-Soderlund, Evans and Akenine-Moller 2022, Ray Tracing of Signed Distance Function Grids, section
+ * 5). With "analytic", triangles are flat, where Mitsuba uses the exact normal at each point.
  *
- * Failures: those of the file (grid_file.h), no surface, more triangles than a mesh may have.
+ * Creation fails if the file cannot be read (grid_file.h), if there is no surface, or if there are more triangles than
+ * a mesh may have.
  */
 #include "worker/render/shape/declare.h"
 #include "worker/render/shape/shape.h"
@@ -30,8 +31,8 @@ enum { SPLIT = 2, DIRECTIONS = 7, ROOT_STEPS = 24 };
 struct surface {
 	struct grid_file grid;
 	uint32_t cells[3];
-	/* Of two layers of corners, by parity of z: the field, and one more than the vertex on the edge from a corner
-	 * in each direction (1 .. 7: bits of x, y, z), 0: none. */
+	/* For two layers of corners, by parity of z: the field, and 1 + the vertex on the edge from a corner in each
+	 * direction (1 .. 7: bits of x, y, z), 0 if there is none yet. */
 	double *field[2];
 	uint32_t (*edge[2])[DIRECTIONS];
 	struct list positions, triangles; /* double[3], in voxels; uint32_t[3] */
@@ -45,7 +46,7 @@ static double sample(const struct grid_file *g, const uint32_t at[3], int corner
 	return (double)g->value[((size_t)z * g->size[1] + y) * g->size[0] + x];
 }
 
-/* Interpolates between the corners of a voxel; x may lie outside it. gradient: NULL: not wanted. */
+/* Interpolates between the corners of a voxel; x may lie outside it. Also computes the gradient, unless NULL. */
 static double interpolate(const struct grid_file *g, const uint32_t at[3], const double x[3], double gradient[3])
 {
 	double w[3][2], sum = 0;
@@ -75,7 +76,8 @@ static double field_at(const struct grid_file *g, const double x[3])
 	return interpolate(g, at, x, NULL);
 }
 
-/* In object space: the mean over the eight voxels whose centers surround x, of their normals at x. */
+/* Returns the normal at x in object space: the mean of the normals at x of the eight voxels whose centres surround
+ * x. */
 static vec3 normal_at(const struct grid_file *g, const double x[3])
 {
 	double w[3][2], sum[3] = {0, 0, 0};
@@ -101,8 +103,8 @@ static vec3 normal_at(const struct grid_file *g, const double x[3])
 
 /* ---- vertices ---- */
 
-/* The zero between a, where the field is fa, and b, where its sign is another, by regula falsi with Illinois weights.
- */
+/* Finds the zero of the field between a, with the value fa, and b, with the value fb of opposite sign, by regula falsi
+ * with Illinois weights. */
 static void root(const struct grid_file *g, const double a[3], double fa, const double b[3], double fb, double out[3])
 {
 	double low = 0, high = 1;
@@ -141,7 +143,8 @@ static void place_corner(const struct cell *c, unsigned corner, double out[3])
 		out[i] = (c->at[i] + (corner >> i & 1)) / (double)SPLIT;
 }
 
-/* The vertex between corner `from` and another that is further along all sides in which they differ. 0: no memory. */
+/* Returns 1 + the vertex between corner `from` and corner `to`, which is further along all axes in which they differ; 0
+ * if out of memory. */
 static uint32_t vertex_between(struct surface *s, const struct cell *c, unsigned from, unsigned to)
 {
 	uint32_t z = c->at[2] + (from >> 2);
@@ -158,7 +161,8 @@ static uint32_t vertex_between(struct surface *s, const struct cell *c, unsigned
 
 /* ---- triangles ---- */
 
-/* Turned so that its front is where the field grows, away from the corner `inside`. */
+/* Adds a triangle, oriented such that it faces away from the point `inside`, in the direction in which the field grows.
+ * v: 1 + vertices. -EFBIG or -ENOMEM. */
 static int add_triangle(struct surface *s, const uint32_t v[3], const double inside[3])
 {
 	const double(*p)[3] = s->positions.items;
@@ -176,7 +180,7 @@ static int add_triangle(struct surface *s, const uint32_t v[3], const double ins
 	return 0;
 }
 
-/* corner: of a tetrahedron, each further along than the one before. */
+/* corner: those of a tetrahedron, each further along than the one before. */
 static int cut_tetrahedron(struct surface *s, const struct cell *c, const unsigned corner[4])
 {
 	uint32_t between[4] = {0};
@@ -188,7 +192,8 @@ static int cut_tetrahedron(struct surface *s, const struct cell *c, const unsign
 			out[outs++] = corner[i];
 	if (ins == 0 || outs == 0)
 		return 0;
-	/* In order around the cut: with two corners on each side, every second one shares its corner inside. */
+	/* The crossings have to be in order around the cut. With two corners on each side, the order of the outer
+	 * corners is therefore reversed for the second inner corner. */
 	for (unsigned i = 0; i < ins; i++)
 		for (unsigned k = 0; k < outs; k++) {
 			unsigned a = in[i], b = out[ins == 2 && i == 1 ? outs - 1 - k : k];

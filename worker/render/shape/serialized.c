@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Mitsuba's own binary meshes (.serialized, versions 3 to 5): any number of meshes in one file, each compressed by
- * itself, found through a table of offsets at the file's end; `shape_index` selects one.
+ * Mitsuba's binary meshes (.serialized, versions 3 to 5). A file contains any number of meshes, each compressed
+ * separately, and a table of their offsets at its end; `shape_index` selects a mesh.
  *
- * A mesh is a magic number, a version, and a zlib stream: flags, a name (from version 4 on), counts, positions, then
- * normals, texture coordinates and colours by the flags, and triangles. Version 5 has a record of eight floats for each
- * vertex instead, one of four integers for each triangle, two maps from vertices to places and to normals that only an
- * editor needs, and named attributes. Everything is little endian.
+ * A mesh is a magic number, a version, and a zlib stream with flags, a name (from version 4), counts, positions, then
+ * normals, texture coordinates and colours if the flags say so, and triangles. Version 5 instead has a record of eight
+ * floats per vertex, one of four integers per triangle, two maps from vertices to positions and to normals, which only
+ * editors need, and named attributes. Everything is little-endian.
  *
- * Failures: a table that exceeds the file, a stream that is damaged or ends too early, indices out of range, numbers
- * that are not finite, tangents (of version 5, which hide the normals), several BSDFs in one mesh. Counts are checked
- * against what the compressed bytes could hold.
+ * Reading fails if the table exceeds the file, if a stream is damaged or truncated, if an index is out of range, if a
+ * number is not finite, or if a mesh has tangents (in version 5, where they replace the normals) or several BSDFs.
+ * Counts are checked against the most bytes that the stream can decompress to.
  */
 #include "common/base/bytes.h"
 #include "common/base/liveness.h"
@@ -23,10 +23,10 @@
 #include <zlib.h>
 
 enum { MAGIC = 0x041c, VERSION_3 = 3, VERSION_4 = 4, VERSION_5 = 5, NAME_MAX_BYTES = 1 << 16, CHUNK_ITEMS = 1024 };
-enum { ZLIB_RATIO = 1032 /* a byte of deflate represents at most this many */ };
+enum { ZLIB_RATIO = 1032 /* the most bytes that one byte of deflate can represent */ };
 enum { HAS_NORMALS = 1, HAS_UV = 2, HAS_COLOURS = 8, HAS_FACE_NORMALS = 16, DOUBLES = 0x2000 };
 
-/* Constants of version 5. */
+/* Flags and sizes of version 5. */
 enum { HAS_TANGENTS_5 = 2, HAS_UV_5 = 4, FLOATS = 0x1000, RECORD = 32, FACE_RECORD = 16, ATTRIBUTES_MAX = 64 };
 
 struct stream {
@@ -34,7 +34,7 @@ struct stream {
 	const char *name;
 	struct error *error;
 	z_stream z;
-	uint64_t most; /* bytes that it can represent */
+	uint64_t most; /* the most bytes that the stream can decompress to */
 };
 
 static int file_error(const struct stream *s, const char *what)
@@ -86,7 +86,7 @@ static int skip_name(struct stream *s)
 	return file_error(s, "the mesh's name does not end");
 }
 
-/* count x width numbers. */
+/* Reads count x width numbers. */
 static int take_reals(struct stream *s, bool doubles, bool must_be_finite, uint32_t count, int width, double *out)
 {
 	unsigned char raw[CHUNK_ITEMS * 8];
@@ -131,7 +131,7 @@ static int take_values(struct stream *s, bool doubles, uint32_t items, struct at
 	return 0;
 }
 
-/* Linear, with Mitsuba 3's name. */
+/* Reads colours, which are linear, as the attribute that Mitsuba 3 calls vertex_color. */
 static int take_colours(struct stream *s, bool doubles, struct mesh *m, struct arena *arena)
 {
 	struct attribute *a = mesh_add_attribute(m, "vertex_color", false, 3, 1, arena);
@@ -140,7 +140,7 @@ static int take_colours(struct stream *s, bool doubles, struct mesh *m, struct a
 	return take_values(s, doubles, m->vertex_count, a);
 }
 
-/* Three indices each, and in version 5 that of a BSDF. */
+/* Reads triangles: three indices each, and in version 5 the index of a BSDF. */
 static int take_triangles(struct stream *s, int version, struct mesh *m)
 {
 	size_t size = version == VERSION_5 ? FACE_RECORD : 12;
@@ -164,7 +164,7 @@ static int take_triangles(struct stream *s, int version, struct mesh *m)
 	return 0;
 }
 
-/* The stream's checksum is at its end. Undamaged data after the triangles is ignored. */
+/* Reads to the end of the stream, where its checksum is. Undamaged data after the triangles is ignored. */
 static int check_end(struct stream *s)
 {
 	unsigned char beyond;
@@ -173,7 +173,8 @@ static int check_end(struct stream *s)
 	return inflate(&s->z, Z_SYNC_FLUSH) == Z_DATA_ERROR ? file_error(s, "the compressed mesh is damaged") : 0;
 }
 
-/* Allocates that many vertices and triangles, if the stream can hold so many of their sizes in bytes. */
+/* Allocates count[0] vertices and count[1] triangles, after checking that the stream can contain them. Sizes are in
+ * bytes. */
 static int make_room(const struct stream *s, const uint64_t count[2], uint64_t vertex_size, uint64_t triangle_size,
 		     bool normals, bool uv, struct arena *arena, struct mesh *m)
 {
@@ -187,7 +188,7 @@ static int make_room(const struct stream *s, const uint64_t count[2], uint64_t v
 	return 0;
 }
 
-/* Reads a length and that many bytes, terminated by 0 in out. */
+/* Reads a length and a text of that length into out, terminated by 0. */
 static int take_text(struct stream *s, char *out, size_t room)
 {
 	uint64_t length = 0;
@@ -200,7 +201,7 @@ static int take_text(struct stream *s, char *out, size_t room)
 	return r;
 }
 
-/* Position, normal, texture coordinates; what a mesh has not is 0 and not looked at. */
+/* Reads records of position, normal and texture coordinates; the numbers that a mesh does not use are ignored. */
 static int take_records(struct stream *s, struct mesh *m)
 {
 	for (uint32_t i = 0; i < m->vertex_count; i++) {
@@ -220,7 +221,7 @@ static int take_records(struct stream *s, struct mesh *m)
 	return 0;
 }
 
-/* Coefficients of a spectral variant are no colours: such an attribute is left out. */
+/* Reads an attribute. Those with coefficients of a spectral variant are not colours and are left out. */
 static int take_attribute(struct stream *s, struct mesh *m, uint32_t room, struct arena *arena)
 {
 	char name[ATTRIBUTE_NAME_MAX];
@@ -259,7 +260,7 @@ static int take_attributes(struct stream *s, struct mesh *m, struct arena *arena
 
 static int take_mesh_5(struct stream *s, uint64_t flags, struct arena *arena, struct mesh *m)
 {
-	uint64_t length = 0, count[4] = {0}; /* of vertices, triangles, places, normals */
+	uint64_t length = 0, count[4] = {0}; /* of vertices, triangles, positions, normals */
 	int r = take_number(s, 4, &length);
 	if (!r)
 		r = length > NAME_MAX_BYTES ? file_error(s, "a name that is too long") : skip(s, length);
@@ -323,7 +324,8 @@ static int take_mesh(struct stream *s, int version, struct arena *arena, struct 
 	return r;
 }
 
-/* Where mesh `index` begins and ends. The last four bytes are the number of meshes; their offsets precede it. */
+/* Finds the beginning and the end of mesh `index`. The last four bytes of the file are the number of meshes; their
+ * offsets precede it. */
 static int find_mesh(const struct stream *s, const struct asset *a, uint64_t index, size_t *begin, size_t *end)
 {
 	enum { HEAD = 4 };

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* One line per shape: its const struct shape_ops is shape_ops_NAME. */
+/* One line per shape: SHAPE(NAME) stands for its const struct shape_ops shape_ops_NAME. */
 SHAPE(obj)
 SHAPE(ply)
 SHAPE(serialized)

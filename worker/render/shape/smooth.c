@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Limits of pairs: this many, and as many as there are if 64 triangles without a common direction meet in each
- * place. */
+/* Limit of the comparisons between corners: 2^28, plus the number needed if 64 triangles with different directions meet
+ * at every place. */
 #define COMPARED_MAX(corners) (((uint64_t)1 << 28) + 64 * (uint64_t)(corners))
 enum { TICK_EVERY = 1 << 16 };
 
@@ -19,11 +19,11 @@ struct corner {
 
 struct smoothing {
 	struct mesh *m;
-	struct corner *corners; /* sorted; those that already have a vertex are moved to the front of their place */
-	double (*normal)[3];	/* of each triangle */
-	double least;		/* cosine */
+	struct corner *corners; /* sorted; those without a new vertex come first in their place */
+	double (*normal)[3];	/* unit normal of each triangle */
+	double least;		/* cosine of the largest angle between normals that share a vertex */
 	struct mesh out;
-	uint32_t *origin; /* by vertex of `out`: the one in m with its attributes */
+	uint32_t *origin; /* for each vertex of `out`, the vertex of m with its attributes */
 	uint64_t compared;
 };
 
@@ -52,7 +52,7 @@ static void gather_normals(struct smoothing *s)
 		for (uint32_t k = 0; k < 3; k++) {
 			struct corner *c = &s->corners[3 * (size_t)i + k];
 			for (int x = 0; x < 3; x++)
-				c->key[x] = m->position[t[k]][x] + 0.0; /* -0 is 0 */
+				c->key[x] = m->position[t[k]][x] + 0.0; /* turns -0 into 0 */
 			for (int x = 0; x < 2; x++)
 				c->key[3 + x] = m->uv ? m->uv[t[k]][x] + 0.0 : 0;
 			c->at = 3 * i + k;
@@ -87,7 +87,7 @@ static bool same_attributes(const struct mesh *m, uint32_t v, uint32_t w)
 	return true;
 }
 
-/* Attributes of faces are kept: triangles keep their numbers. */
+/* Copies the attributes of vertices. Those of faces stay, since triangles keep their numbers. */
 static bool take_attributes(struct smoothing *s, struct arena *arena)
 {
 	s->out.attribute_count = s->m->attribute_count;
@@ -114,7 +114,7 @@ static bool smooth_across(const struct smoothing *s, const struct corner *a, con
 	       same_attributes(s->m, old_vertex(s, a), old_vertex(s, b));
 }
 
-/* The corners of one place; false: too many. */
+/* Assigns vertices to the corners of one place. Returns false if there are too many comparisons. */
 static bool share_vertices(struct smoothing *s, struct corner *c, size_t count)
 {
 	while (count > 0) {

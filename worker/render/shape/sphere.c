@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * An exact sphere. Scaled unevenly by to_world it is an ellipsoid: a mesh of 8 * 4^ELLIPSOID_LEVEL triangles with exact
- * normals.
+ * An exact sphere. If to_world scales it unevenly, it is an ellipsoid: a mesh of 8 * 4^ELLIPSOID_LEVEL triangles with
+ * exact normals.
  */
 #include "worker/render/shape/declare.h"
 #include "worker/render/shape/mesh.h"
 
 #include <float.h>
 
-/* Matrices in files have six digits: this much unevenness counts as a similarity. */
+/* A transform with at most this relative unevenness counts as a similarity, since matrices in files have six digits. */
 #define SIMILARITY_TOLERANCE 1e-4
 
 enum { ELLIPSOID_LEVEL = 6 };
@@ -27,7 +27,7 @@ static int check_extent(const struct sphere *s, const struct scene_node *n, stru
 			  s->center.y, s->center.z);
 }
 
-/* In object space: shape_build places the mesh. */
+/* Makes the mesh in object space; shape_build applies to_world. */
 static int make_ellipsoid(const struct scene_node *n, struct arena *arena, struct shape_geometry *out, struct error *e)
 {
 	const struct displacement flat = {

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * To each four control points in a row belongs a part of the curve,
+ * Every four successive control points define a piece of the curve,
  *
  *   c(u) = ((1-u)^3 p0 + (3u^3 - 6u^2 + 4) p1 + (-3u^3 + 3u^2 + 3u + 1) p2 + u^3 p3) / 6,  0 <= u <= 1.
  *
- * With n pieces, chords are off by at most max |c''| / (8 n^2), and c'' is linear in u, between p0 - 2 p1 + p2 and
- * p1 - 2 p2 + p3; the radius is a fourth coordinate. Normals at rings are exact.
+ * With n chords per piece, chords deviate by at most max |c''| / (8 n^2), where c'' is linear in u, from p0 - 2 p1 + p2
+ * to p1 - 2 p2 + p3. The radius is treated as a fourth coordinate. Normals at rings are exact.
  *
- * Failures: those of tube_add.
+ * Fails if tube_add does.
  */
 #include "worker/render/shape/spline.h"
 
@@ -15,7 +15,7 @@
 
 enum { PIECES_MAX = 64 };
 
-/* Weighted sums of the control points, of position and radius. */
+/* Computes the weighted sums of the positions and of the radii of four control points. */
 static void combine(const double (*p)[4], const double w[SPLINE_POINTS], vec3 *c, double *r)
 {
 	*c = (vec3){0, 0, 0};
@@ -26,7 +26,7 @@ static void combine(const double (*p)[4], const double w[SPLINE_POINTS], vec3 *c
 	}
 }
 
-/* tolerance: in radii. */
+/* Returns the number of chords of a piece. tolerance: in units of the largest radius. */
 static unsigned pieces_of(const double (*p)[4], double tolerance)
 {
 	double most = 0, widest = 0;
@@ -44,7 +44,7 @@ static unsigned pieces_of(const double (*p)[4], double tolerance)
 	return n >= 1 && n <= PIECES_MAX ? (unsigned)n : n < 1 ? 1 : PIECES_MAX;
 }
 
-/* At u on the piece; axis: the last ring's, for where the curve stands still. */
+/* Returns the ring at u of a piece. axis: that of the previous ring, used if the curve has no derivative here. */
 static struct tube_ring ring_at(const double (*p)[4], double u, vec3 axis)
 {
 	double t = 1 - u;
@@ -70,7 +70,8 @@ static struct tube_ring ring_at(const double (*p)[4], double u, vec3 axis)
 	return r;
 }
 
-/* Where the curve stands still at its start: the direction that it takes. */
+/* Returns the direction of the first control point that differs from the start, in case the curve has no derivative at
+ * its start. */
 static vec3 first_axis(const double (*p)[4], uint32_t count)
 {
 	for (uint32_t i = 1; i < count; i++) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Uniform cubic B-splines of positions and radii, as rings of a tube. One thread. */
+/* Makes rings of a tube from uniform cubic B-splines of positions and radii. One thread. */
 #ifndef WORKER_RENDER_SHAPE_SPLINE_H
 #define WORKER_RENDER_SHAPE_SPLINE_H
 
@@ -7,9 +7,9 @@
 
 enum { SPLINE_POINTS = 4 };
 
-/* Rings of one curve of at least SPLINE_POINTS control points, so many that chords between them are off by at most
- * `tolerance` times the largest radius of the four points around, but at most 64 for each; v grows by v_step from one
- * control point to the next. */
+/* Adds the rings of one curve of at least SPLINE_POINTS control points. Chords between rings deviate by at most
+ * `tolerance` times the largest radius of the four control points around, unless that takes more than 64 chords per
+ * piece. v grows by v_step from one control point to the next. Returns 0, -EFBIG or -ENOMEM. */
 int spline_add(struct list *rings, const double (*points)[4], uint32_t count, double tolerance, double v,
 	       double v_step);
 

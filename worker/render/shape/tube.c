@@ -1,16 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * tube_add collects rings, and tube_mesh makes a mesh of them: two triangles between each two neighbours of a ring and
- * the next.
+ * tube_add collects rings, and tube_mesh connects each ring with the next by two triangles per side.
  *
- * The rings of tube_add_chain all lie on the spheres around its points. With the axis t of a segment of length L
- * between radii r0 and r1, the cone touches both spheres at the angle a from their equators, sin a = (r0 - r1) / L, so
- * the ring on a sphere of radius r is at r sin a along t and has the radius r cos a; its normals are those of the
- * sphere. At a joint both t and a go from those of one segment to those of the next in steps, which sweeps the part of
- * the sphere that is seen; ends go from the pole. Where one sphere contains the next, a is 90 degrees, and nothing of
- * the cone is left.
+ * All rings of tube_add_chain lie on the spheres around its points. For a segment with axis t, length L and radii r0
+ * and r1, the cone touches both spheres at the angle a from their equators, sin a = (r0 - r1) / L. The ring on a sphere
+ * of radius r is therefore at r sin a along t and has the radius r cos a; its normals are those of the sphere. At a
+ * joint, t and a change in steps from those of one segment to those of the next, which covers the visible part of the
+ * sphere; at an end, a changes from or to the pole. If one sphere contains the next, a is 90 degrees, and the cone
+ * vanishes.
  *
- * Failures: no memory, more triangles than a mesh may have.
+ * Fails if memory is out, or if there are more triangles than a mesh may have.
  */
 #include "worker/render/shape/tube.h"
 
@@ -37,7 +36,7 @@ struct sphere_at {
 	double radius, v;
 };
 
-/* A ring on the sphere at the angle a from the equator, towards the axis. */
+/* Adds a ring on the sphere at the angle a from the equator, in the direction of the axis. */
 static int add_circle(struct list *rings, const struct sphere_at *s, vec3 axis, double a, bool first)
 {
 	bool pole = fabs(a) >= pi / 2;
@@ -56,7 +55,8 @@ static unsigned steps_for(double angle)
 	return (unsigned)fmax(1, ceil(fabs(angle) / (2 * pi / TUBE_SIDES)));
 }
 
-/* From one pole or ring to another around the same axis; without the one at `from` unless it is the first. */
+/* Adds rings from one angle to another around the same axis, without the one at `from` unless it is the first of the
+ * tube. */
 static int add_cap(struct list *rings, const struct sphere_at *s, vec3 axis, double from, double to, bool first)
 {
 	unsigned n = steps_for(to - from);
@@ -66,7 +66,7 @@ static int add_cap(struct list *rings, const struct sphere_at *s, vec3 axis, dou
 	return rc;
 }
 
-/* After the ring on s where the segment before it ends. */
+/* Adds the rings of the joint on s, after the ring at which the segment before it ends. */
 static int add_joint(struct list *rings, const struct sphere_at *s, vec3 from, double a, vec3 to, double b)
 {
 	vec3 across = mesh_unit(vec3_madd(to, -vec3_dot(from, to), from));
@@ -76,7 +76,7 @@ static int add_joint(struct list *rings, const struct sphere_at *s, vec3 from, d
 	double way = fmax(turn, fabs(b - a));
 	unsigned n = steps_for(way);
 	int rc = 0;
-	if (way < pi / TUBE_SIDES) { /* one ring does for both segments */
+	if (way < pi / TUBE_SIDES) { /* one ring suffices for both segments */
 		rings->count--;
 		return add_circle(rings, s, mesh_unit(vec3_add(from, to)), 0.5 * (a + b), false);
 	}
@@ -100,7 +100,7 @@ int tube_add_chain(struct list *rings, const double (*points)[4], uint32_t count
 		struct sphere_at next = {mesh_load(points[i]), points[i][3], v + v_step * i};
 		vec3 way = vec3_sub(next.center, s.center), to = mesh_unit(way);
 		double length = vec3_length(way);
-		if (!(length > 0)) { /* in the same place: the larger one */
+		if (!(length > 0)) { /* at the same position: keep the larger radius */
 			s.radius = fmax(s.radius, next.radius);
 			continue;
 		}
@@ -120,7 +120,7 @@ int tube_add_chain(struct list *rings, const double (*points)[4], uint32_t count
 
 /* ---- the mesh ---- */
 
-/* Where u is 0: Mitsuba's direction at the start of a tube. */
+/* Returns the direction in which u is 0 at the start of a tube, as in Mitsuba. */
 static vec3 direction_at_start(vec3 axis)
 {
 	vec3 up = mesh_unit((vec3){-axis.z * axis.x, -axis.z * axis.y, 1 - axis.z * axis.z});
@@ -129,11 +129,11 @@ static vec3 direction_at_start(vec3 axis)
 	return vec3_cross(up, axis);
 }
 
-/* By the smallest rotation that turns one axis into the other. */
+/* Rotates a direction by the smallest rotation that turns one axis into the other. */
 static vec3 transport_direction(vec3 direction, vec3 from, vec3 to)
 {
 	double sum = 1 + vec3_dot(from, to);
-	if (!(sum > 0x1p-40)) /* turned around: it stays perpendicular */
+	if (!(sum > 0x1p-40)) /* opposite axes: the direction stays perpendicular */
 		return direction;
 	return mesh_unit(vec3_madd(direction, -vec3_dot(to, direction) / sum, vec3_add(from, to)));
 }
@@ -146,7 +146,7 @@ static void set_ring(struct mesh *m, uint32_t first, const struct tube_ring *r, 
 		double angle = 2 * pi * (i % TUBE_SIDES) / TUBE_SIDES;
 		vec3 e = vec3_madd(vec3_scale(cos(angle), start), sin(angle), side);
 		vec3 offset = vec3_scale(scale * r->radius, e);
-		/* On the inside of a bend narrower than the tube, which no ray reaches, the sign is kept. */
+		/* On the inside of a bend narrower than the tube, which no ray reaches, the factor is kept positive. */
 		double outwards = fmax(1 - vec3_dot(offset, r->bend), 0.125) * r->cos;
 		vec3 n = mesh_unit(vec3_madd(vec3_scale(outwards, e), r->sin, r->axis));
 		mesh_set_vertex(m, first + i, vec3_add(r->center, offset), n, (double)i / TUBE_SIDES, r->v);
