@@ -41,9 +41,9 @@ struct bsdf_sample {
 	vec3 wi;
 	unsigned mode; /* bits of enum bsdf_mode */
 	double pdf;    /* solid angle of all non-delta lobes together, or the probability of the delta lobe */
-	spectrum f;    /* eval(wo, wi), or for a delta lobe f such that f / pdf is the weight of the path:
-			  the cosine |wi.z| is already divided out: weight = f |wi.z| / pdf in both cases */
-	double eta;    /* index on wi's side over the one on wo's side; 1 when reflected */
+	spectrum f; /* eval(wo, wi), or for a delta lobe its weight over |wi.z|, so that the weight of the sample is f
+		       |wi.z| / pdf in both cases */
+	double eta; /* index on wi's side over the one on wo's side; 1 when reflected */
 };
 
 struct bsdf;

@@ -58,7 +58,7 @@ struct hair {
 	struct color eumelanin, pheomelanin; /* coefficients times concentrations */
 	struct texture sigma_a;
 	double scale;	 /* factor of sigma_a */
-	spectrum probes; /* absorption at `probed`, unless sigma_a is textured */
+	spectrum probes; /* absorption at the wavelengths `probed`; unused if sigma_a is textured */
 };
 
 /* The wavelengths at which lobes are weighted. They are fixed: a density that depended on the wavelengths of the path

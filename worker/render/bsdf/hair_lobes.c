@@ -113,7 +113,8 @@ static struct hair_angle tilted(const struct hair_fibre *f, int p, struct hair_a
 
 /*
  * d'Eon 2011, eq. 7: M = exp(-sin sin / v) I0(cos cos / v) / (2 v sinh(1 / v)). The exponents of the three factors add
- * up to (cos(theta_i + theta_o) - 1) / v, half the squared distance between two points of the unit circle.
+ * up to (cos(theta_i + theta_o) - 1) / v, where cos - 1 is minus half the squared distance between two points of the
+ * unit circle, which is computed without cancellation.
  */
 double hair_along(const struct hair_fibre *f, int p, struct hair_angle from, struct hair_angle to)
 {

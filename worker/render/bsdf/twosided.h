@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* An opaque BSDF on both sides. */
+/* Opaque BSDFs that scatter on both sides. */
 #ifndef WORKER_RENDER_BSDF_TWOSIDED_H
 #define WORKER_RENDER_BSDF_TWOSIDED_H
 

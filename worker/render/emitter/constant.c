@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The same radiance from all directions. */
+/* An environment with the same radiance from all directions. */
 #include "worker/render/emitter/emitter.h"
 #include "worker/render/emitter/uniform.h"
 

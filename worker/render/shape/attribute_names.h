@@ -27,8 +27,8 @@ struct attribute_groups {
 /* Returns an empty set of groups. kind: "vertex_" or "face_". */
 struct attribute_groups attribute_groups_none(const char *kind);
 
-/* Adds a property; *group and *channel: its attribute and its channel of that. Returns false if there are too many
- * groups. */
+/* Adds a property; *group: the attribute that it belongs to; *channel: its channel of the attribute. Returns false if
+ * there are too many groups. */
 bool attribute_groups_add(struct attribute_groups *g, const char *property, uint32_t *group, uint32_t *channel);
 
 /* Returns the number of channels, or 0 if the group is not an attribute, such as a colour with two channels. */
