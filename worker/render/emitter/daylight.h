@@ -10,9 +10,8 @@
 
 #include "worker/render/math/vec3.h"
 
-#define DAYLIGHT_SUN_RADIUS                                                                       \
-	0.0046757 /* angular radius of the sun's disk seen from the earth: half of 0.5358 degrees \
-		   */
+/* Angular radius of the sun's disk seen from the earth, in radians: half of 0.5358 degrees. */
+#define DAYLIGHT_SUN_RADIUS 0.0046757
 
 /* Parameters of the sky for one position of the sun, for each of X, Y and Z. */
 struct daylight {
