@@ -131,7 +131,7 @@ int blend_join(struct bsdf *b, const struct bsdf *part, const char *type, const 
 		if (part->dispersive || other)
 			return node_error(n, e, ENOTSUP, "its part \"%s\" %s", type,
 					  part->dispersive
-						  ? "is dispersive, which parts of a blend may not be"
+						  ? "is dispersive, which is not supported in a blend"
 						  : "has a different index of refraction than an earlier part");
 		b->eta = part->eta;
 		b->only_straight = false;

@@ -278,8 +278,9 @@ static int read_absorption(struct hair *h, struct bsdf *b, const struct scene_no
 	if (!h->pigments) {
 		const struct texture_build inner = bsdf_texture_build(build);
 		if (node_find(n, "eumelanin") || node_find(n, "pheomelanin"))
-			return node_error(n, e, EINVAL,
-					  "sigma_a and eumelanin or pheomelanin say the same thing; give one");
+			return node_error(
+				n, e, EINVAL,
+				"sigma_a and the pigments eumelanin and pheomelanin exclude each other; give one or the other");
 		int code = texture_from_node(&h->sigma_a, n, "sigma_a", 0, COLOR_UNBOUNDED, &inner, e);
 		if (code)
 			return code;

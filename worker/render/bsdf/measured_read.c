@@ -22,7 +22,7 @@ static int read_plane(const struct tensor_input *in, const char *name, struct me
 	double *value = NULL;
 	int rc = tensor_input_find(in, name, TENSOR_FLOATS, 2, &t);
 	if (!rc && (t.shape[0] < 2 || t.shape[1] < 2))
-		rc = tensor_fault(in, EINVAL, name, "needs two numbers a side");
+		rc = tensor_fault(in, EINVAL, name, "needs at least two numbers per side");
 	if (!rc)
 		rc = tensor_numbers(in, &t, name, &value);
 	for (uint64_t i = 0; !rc && i < t.count; i++)
@@ -41,7 +41,7 @@ static int check_slices(const struct tensor_input *in, const struct measured *m,
 	if (t->shape[0] != m->axes.count[0] || t->shape[1] != m->axes.count[1])
 		return tensor_fault(in, EINVAL, name, "has other sizes than phi_i and theta_i");
 	if (t->shape[t->dimensions - 1] < 2 || t->shape[t->dimensions - 2] < 2)
-		return tensor_fault(in, EINVAL, name, "needs two numbers a side");
+		return tensor_fault(in, EINVAL, name, "needs at least two numbers per side");
 	return 0;
 }
 
@@ -104,7 +104,7 @@ static int read_spectra(const struct tensor_input *in, struct measured *m, const
 	double(*weight)[3] = NULL;
 	int rc = tensor_axis(in, "wavelengths", TENSOR_FLOATS, 1, &all, &nm);
 	if (!rc && t->shape[2] != all)
-		rc = tensor_fault(in, EINVAL, "spectra", "has another number of wavelengths than there are");
+		rc = tensor_fault(in, EINVAL, "spectra", "needs one entry for each of the wavelengths");
 	if (!rc)
 		rc = tensor_rgb_weights(in, nm, all, &weight);
 	if (rc)

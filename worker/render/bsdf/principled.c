@@ -433,7 +433,7 @@ static int read_index(struct principled *p, const struct scene_node *n, struct e
 {
 	double specular = node_float(n, "specular", 0.5);
 	if (node_find(n, "eta") && node_find(n, "specular"))
-		return node_error(n, e, EINVAL, "eta and specular say the same thing; give one");
+		return node_error(n, e, EINVAL, "eta and specular exclude each other; give one of them");
 	if (p->most[TRANSMISSION] > 0 && specular == 0)
 		specular = 1e-3; /* Mitsuba's minimum, for the same reason as that of eta below */
 	/* Burley 2012, section 5.5: 0.08 times `specular` is reflected at normal incidence. */

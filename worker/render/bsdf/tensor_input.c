@@ -21,13 +21,13 @@ int tensor_input_find(const struct tensor_input *in, const char *name, enum tens
 {
 	int rc = tensor_find(in->bytes, in->size, name, out);
 	if (rc == -ENOENT)
-		return tensor_fault(in, EINVAL, name, "is missing: this is no measured material");
+		return tensor_fault(in, EINVAL, name, "is missing: this is not a measured material");
 	if (rc)
 		return tensor_fault(in, -rc, "",
-				    rc == -ENOTSUP ? "this version of a file of arrays is not supported"
-						   : "this is no file of arrays (.bsdf), or it is cut off");
+				    rc == -ENOTSUP ? "this version of a tensor file is not supported"
+						   : "this is not a tensor file (.bsdf), or it is truncated");
 	if (out->type != (unsigned)type || out->dimensions != dimensions)
-		return tensor_fault(in, EINVAL, name, "has another type or number of dimensions than it should");
+		return tensor_fault(in, EINVAL, name, "has the wrong type or number of dimensions");
 	for (unsigned i = 0; i < dimensions; i++)
 		if (out->shape[i] < 1 || out->shape[i] > SIDE_MAX)
 			return tensor_fault(in, EINVAL, name, "has a side of 0 or of more than 65,536");

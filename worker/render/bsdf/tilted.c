@@ -120,7 +120,7 @@ int bsdf_share_relief(struct bsdf *b, struct bsdf *part, uint32_t count, const s
 			continue;
 		if (part[k].has_delta)
 			return node_error(n, e, ENOTSUP,
-					  "two of its BSDFs that have specular lobes or are masked bend normals "
+					  "two of its BSDFs, with specular lobes or masked, bend normals "
 					  "differently");
 		int code = bsdf_wrap(&part[k], &tilted_ops, n, build, e);
 		if (code)

@@ -74,8 +74,8 @@ int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_cen
 		return error_set(e, ERANGE, "the camera is %g scene radii away from the scene, more than %g", away,
 				 PARAM_REACH_MAX);
 	if (!(c->aperture >= 0) || (c->aperture > 0 && !(c->focus > 0)))
-		return error_set(e, EINVAL, "an aperture of radius %g, focused at a distance of %g", s->aperture_radius,
-				 s->focus_distance);
+		return error_set(e, EINVAL, "an aperture of radius %g cannot be focused at a distance of %g",
+				 s->aperture_radius, s->focus_distance);
 	return c->projection && c->projection->init ? c->projection->init(c, s, e) : 0;
 }
 

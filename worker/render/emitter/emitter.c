@@ -38,7 +38,7 @@ int emitter_create(struct emitter *em, const struct scene_node *n, const struct 
 {
 	const struct emitter_ops *ops = find_ops(n);
 	if (!ops)
-		return node_error(n, e, ENOTSUP, "\"%s\" is not an emitter that is supported", n->type);
+		return node_error(n, e, ENOTSUP, "\"%s\" is not a supported emitter", n->type);
 	if (ops->needs_surface && !build->surface)
 		return node_error(n, e, EINVAL, "\"%s\" must be inside a shape", n->type);
 	if (!ops->needs_surface && build->surface)

@@ -159,7 +159,7 @@ int sunsky_albedo(const struct scene_node *n, const struct emitter_build *build,
 	if (code)
 		return code;
 	if (!texture_is_constant(&t))
-		return node_error(n, e, ENOTSUP, "an albedo that depends on the place is not supported");
+		return node_error(n, e, ENOTSUP, "a textured albedo is not supported");
 	double whole[3] = {0, 0, 0}, reflected[3] = {0, 0, 0};
 	for (int i = 0; i < CIE_COUNT; i++) {
 		double nm = CIE_FIRST_NM + i,

@@ -148,7 +148,7 @@ int surface_light_create(struct emitter *em, const struct scene_node *n, const s
 	if (em->moves)
 		l->area = mean_area(l);
 	if (!(l->area > 0))
-		return node_error(n, e, EINVAL, "an area emitter needs a shape of area above 0");
+		return node_error(n, e, EINVAL, "an area emitter needs a shape whose area is above 0");
 	em->textured = !texture_is_constant(&l->radiance);
 	em->shape = texture_shape(&l->radiance);
 	em->brightest = texture_max(&l->radiance);

@@ -105,7 +105,7 @@ static int read_together(struct medium *m, const struct scene_node *n, const str
 	int rc = volume_from_node(&m->first, n, "sigma_t", default_sigma_t, COLOR_UNBOUNDED, uneven && build->dialect_3,
 				  build, e);
 	if (!rc && !uneven && volume_varies(&m->first))
-		rc = node_error(n, e, EINVAL, "sigma_t is the same everywhere in a homogeneous medium");
+		rc = node_error(n, e, EINVAL, "sigma_t must not vary in space in a homogeneous medium");
 	if (!rc)
 		rc = volume_from_node(&m->second, n, "albedo", default_albedo, COLOR_REFLECTANCE, false, build, e);
 	return rc || uneven || build->dialect_3 ? rc : fill_in(m, n);
@@ -119,7 +119,7 @@ static int read_forward(struct medium *m, const struct scene_node *n, const stru
 	if (build->dialect_3)
 		return node_error(n, e, EINVAL, "g is a parameter of the phase function in 3.x");
 	if (volume_varies(&m->second))
-		return node_error(n, e, ENOTSUP, "g with an albedo that varies from place to place");
+		return node_error(n, e, ENOTSUP, "g is not supported with an albedo that varies in space");
 	m->forward = node_float(n, "g", 0);
 	return 0;
 }

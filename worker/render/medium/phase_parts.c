@@ -19,10 +19,10 @@ int phase_parts_create(struct phase *p, struct phase_parts **parts, const struct
 		int rc = phase_create(&made->part[k], inner, build, e);
 		if (!rc && made->part[k].absorbed > 0)
 			rc = node_error(inner, e, ENOTSUP,
-					"its weights must add up to 1 inside of another phase function");
+					"its weights must add up to 1 inside another phase function");
 		if (!rc && made->part[k].ops->area)
 			rc = node_error(inner, e, ENOTSUP,
-					"microflakes are not supported inside of another phase function");
+					"microflakes are not supported inside another phase function");
 		if (rc)
 			return rc;
 	}

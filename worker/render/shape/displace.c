@@ -429,7 +429,7 @@ int displace(struct shape_geometry *g, const struct displacement *d, struct aren
 {
 	if (g->kind == SHAPE_MESH && !g->mesh.uv && !d->is_constant)
 		return node_error(n, e, EINVAL,
-				  "displacement by a texture needs texture coordinates, and the mesh has none");
+				  "displacement by a texture needs texture coordinates, but the mesh has none");
 	struct displacer w = {.d = d};
 	struct arena scratch = {0};
 	int rc = displace_triangles(&w, g, arena, &scratch, n, e);

@@ -48,8 +48,10 @@ static int read_accessor(struct accessor *a, const struct scene_node *n, const c
 	while (p && t < TYPES && strcmp(p, types[t].name) != 0)
 		t++;
 	if (!p || t == TYPES || !(allowed >> t & 1))
-		return node_error(n, e, EINVAL, "`%s` is \"first stride count type\", bytes, elements, and %s", name,
-				  allowed == 1u << F32 ? "f32" : "a type");
+		return node_error(
+			n, e, EINVAL,
+			"`%s` has to be \"first stride count type\": offsets in bytes, a number of elements, and %s",
+			name, allowed == 1u << F32 ? "f32" : "a type");
 	uint64_t size = types[t].size * components, first = (uint64_t)x[0], stride = (uint64_t)x[1],
 		 count = (uint64_t)x[2];
 	if (count > UINT32_MAX || (stride < size && count > 1) || stride > buffer->size || first > buffer->size ||

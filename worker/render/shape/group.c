@@ -65,7 +65,8 @@ static int append(struct listing *l, const struct scene_node *n, const struct sc
 	if (rc)
 		return rc;
 	if (l->count == SHAPES_MAX)
-		return node_error(n, l->e, E2BIG, "with its instances the scene has more than %d shapes", SHAPES_MAX);
+		return node_error(n, l->e, E2BIG, "the scene, including its instances, has more than %d shapes",
+				  SHAPES_MAX);
 	if (l->count == l->room) {
 		uint32_t room = l->room ? 2 * l->room : 64;
 		struct listed_shape *more = arena_alloc(l->arena, room, sizeof *more);

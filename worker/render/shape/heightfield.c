@@ -115,7 +115,8 @@ static int make_mesh(const struct field *f, bool smooth, const struct scene_node
 {
 	uint32_t width = f->picture.width, height = f->picture.height;
 	if (width < 2 || height < 2)
-		return node_error(n, e, EINVAL, "an image of %u x %u pixels; heights need 2 x 2", width, height);
+		return node_error(n, e, EINVAL, "an image of %u x %u pixels is too small; heights need 2 x 2", width,
+				  height);
 	uint64_t triangles = 2 * (uint64_t)(width - 1) * (height - 1);
 	if (triangles > MESH_TRIANGLES_MAX)
 		return node_error(n, e, EFBIG, "an image of %u x %u pixels makes more than %d triangles", width, height,

@@ -474,8 +474,8 @@ static int add_attributes(struct ply *f, struct element *el, uint64_t bytes, str
 	for (uint32_t k = 0; k < el->groups.count; k++)
 		values += items * attribute_group_channels(&el->groups.of[k]);
 	if (values > ATTRIBUTE_VALUES_ALWAYS && values / ATTRIBUTE_VALUES_PER_BYTE > bytes)
-		return node_error(f->node, f->error, E2BIG, "%s: its polygons make %llu numbers of attributes", f->name,
-				  (unsigned long long)values);
+		return node_error(f->node, f->error, E2BIG, "%s: its polygons would make %llu numbers of attributes",
+				  f->name, (unsigned long long)values);
 	for (uint32_t k = 0; k < el->groups.count; k++) {
 		uint32_t channels = attribute_group_channels(&el->groups.of[k]);
 		if (channels == 0)

@@ -158,7 +158,7 @@ static int take_triangles(struct stream *s, int version, struct mesh *m)
 			}
 			if (version == VERSION_5 && get_bytes(face + 12, 4) != 0)
 				return node_error(s->node, s->error, ENOTSUP,
-						  "%s: a mesh of several BSDFs is not supported", s->name);
+						  "%s: a mesh with several BSDFs is not supported", s->name);
 		}
 	}
 	return 0;
@@ -182,7 +182,7 @@ static int make_room(const struct stream *s, const uint64_t count[2], uint64_t v
 		return file_error(s, "the mesh has triangles, but no vertices");
 	if (count[1] > MESH_TRIANGLES_MAX || count[0] >= UINT32_MAX || count[0] > s->most / vertex_size ||
 	    count[1] > s->most / triangle_size)
-		return file_error(s, "more vertices or triangles than there can be");
+		return file_error(s, "more vertices or triangles than the file can contain");
 	if (!mesh_alloc(m, (uint32_t)count[0], (uint32_t)count[1], normals, uv, arena))
 		return node_error(s->node, s->error, ENOMEM, "%s: out of memory", s->name);
 	return 0;
@@ -238,7 +238,7 @@ static int take_attribute(struct stream *s, struct mesh *m, uint32_t room, struc
 	if (!per_face && strncmp(name, "vertex_", 7) != 0)
 		return file_error(s, "an attribute that is neither of vertices nor of faces");
 	if (channels < 1 || channels > ATTRIBUTE_CHANNELS_MAX || items > s->most / (4 * channels))
-		return file_error(s, "an attribute of more numbers than there can be");
+		return file_error(s, "an attribute with more numbers than the file can contain");
 	if (coefficients & 1)
 		return skip(s, 4 * items * channels);
 	struct attribute *a = mesh_add_attribute(m, name, per_face, (uint32_t)channels, room, arena);
@@ -269,7 +269,7 @@ static int take_mesh_5(struct stream *s, uint64_t flags, struct arena *arena, st
 	if (r)
 		return r;
 	if (!(flags & FLOATS) || count[2] > count[0] || count[3] > count[0])
-		return file_error(s, "the head of the mesh is damaged");
+		return file_error(s, "the header of the mesh is damaged");
 	if (flags & HAS_TANGENTS_5)
 		return node_error(s->node, s->error, ENOTSUP, "%s: shading tangents are not supported", s->name);
 	r = make_room(s, count, RECORD, FACE_RECORD, flags & HAS_NORMALS, flags & HAS_UV_5, arena, m);

@@ -50,7 +50,7 @@ int shape_build(const struct scene_node *n, const struct asset_source *assets, s
 	while (*ops && strcmp((*ops)->decl.type, n->type) != 0)
 		ops++;
 	if (!*ops || !(*ops)->build)
-		return node_error(n, e, ENOTSUP, "\"%s\" is not a shape that is supported", n->type);
+		return node_error(n, e, ENOTSUP, "\"%s\" is not a supported shape", n->type);
 	int r = (*ops)->build(n, assets, arena, out, e);
 	return r || out->kind != SHAPE_MESH ? r : finish_shape(out, n, arena, dropped, e);
 }

@@ -166,7 +166,7 @@ int mesh_smooth(struct mesh *m, double degrees, struct arena *arena, const struc
 		if (!share_all(&s))
 			r = node_error(
 				n, e, E2BIG,
-				"max_smooth_angle: too many triangles with different directions meet in one place");
+				"max_smooth_angle: too many triangles with different directions meet at one point");
 		else if (!take_attributes(&s, arena))
 			r = node_error(n, e, ENOMEM, "out of memory");
 		else

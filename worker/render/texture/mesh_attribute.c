@@ -69,7 +69,7 @@ static int make_attribute(struct texture *t, const struct scene_node *n, const c
 	find_bounds(m, v);
 	double most = v->grey ? m->max : m->max / COLOR_UNBOUNDED_OVER;
 	if (role == COLOR_UNBOUNDED && !(most <= PARAM_METAL_MAX))
-		return node_error(n, e, ERANGE, "numbers of the attribute up to %g: must be within [0, %g]", most,
+		return node_error(n, e, ERANGE, "the attribute has numbers up to %g: they must be within [0, %g]", most,
 				  PARAM_METAL_MAX);
 	return 0;
 }

@@ -27,7 +27,7 @@ int texture_create(struct texture *t, const struct scene_node *n, enum color_rol
 				return node_error(n, e, ENOMEM, "out of memory");
 			return (*ops)->create(t, n, role, build, e);
 		}
-	return node_error(n, e, ENOTSUP, "\"%s\" is not a texture that is supported", n->type);
+	return node_error(n, e, ENOTSUP, "\"%s\" is not a supported texture", n->type);
 }
 
 /* Reads a constant for COLOR_HEIGHT or COLOR_RELIEF. The height of a colour is its luminance, as in a coloured

@@ -57,7 +57,7 @@ static int create(struct texture *t, const struct scene_node *n, enum color_role
 		return node_error(n, e, ENOTSUP, "the edges of a mesh cannot %s",
 				  role == COLOR_HEIGHT ? "displace a surface" : "be a bump or normal map");
 	if (!build->attributes)
-		return node_error(n, e, EINVAL, "only a shape's material or light can show its edges");
+		return node_error(n, e, EINVAL, "only the material or the light of a shape can show edges");
 	int code = texture_from_node(&f->edge, n, "edge_color", 0.1, role, build, e);
 	if (!code)
 		code = texture_from_node(&f->interior, n, "interior_color", 0.5, role, build, e);

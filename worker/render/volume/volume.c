@@ -185,7 +185,7 @@ static int read_grid(struct volume *v, const struct scene_node *n, enum color_ro
 		rc = volume_grid(g, n, &f, b, e);
 	v->grid = g;
 	if (!rc && g->turned && role != COLOR_REFLECTANCE && g->outside != GRID_CLAMP)
-		rc = node_error(n, e, ENOTSUP, "a density that is turned cannot repeat itself (wrap_mode)");
+		rc = node_error(n, e, ENOTSUP, "a rotated density cannot repeat itself (wrap_mode)");
 	return rc;
 }
 
@@ -309,7 +309,7 @@ int volume_by_area(struct volume *v, const struct grid area[2], const struct sce
 	if (!g)
 		return node_error(n, e, ENOMEM, "out of memory");
 	if (!v->grid)
-		return node_error(n, e, ENOTSUP, "S differs from place to place: needs a heterogeneous medium");
+		return node_error(n, e, ENOTSUP, "S varies in space: needs a heterogeneous medium");
 	if (cube ? area->outside != GRID_CLAMP : !same_points(v->grid, area))
 		return node_error(n, e, ENOTSUP,
 				  "the grids of sigma_t and of S must have the same size, to_world, filter_type and "

@@ -355,9 +355,9 @@ static void test_sizes(void **state)
 		{"luminance", 3, "spectra has other sizes than luminance"},
 		{"luminance", 2, "spectra has other sizes than luminance"},
 		{"spectra", 1, "spectra has other sizes"},
-		{"spectra", 2, "another number of wavelengths"},
+		{"spectra", 2, "needs one entry for each of the wavelengths"},
 		{"spectra", 4, "no square"},
-		{"wavelengths", 0, "another number of wavelengths"},
+		{"wavelengths", 0, "needs one entry for each of the wavelengths"},
 		{"jacobian", 0, "a side of 0"},
 	};
 	const struct memory_file *f = measured_files();
@@ -385,7 +385,7 @@ static void test_other_files(void **state)
 	unsigned char *copy = malloc(f->size);
 	struct made m;
 	assert_int_equal(try_bytes(&m, "ply\n", 4), -EINVAL);
-	assert_non_null(strstr(m.e.text, "this is no file of arrays (.bsdf)"));
+	assert_non_null(strstr(m.e.text, "this is not a tensor file (.bsdf)"));
 	arena_fini(&m.arena);
 	memcpy(copy, f->bytes, f->size);
 	copy[12] = 2;

@@ -274,8 +274,8 @@ static void test_sizes(void **state)
 		{"phi_d", 11 + 8, 2, "M has other sizes than phi_d, theta_d, theta_h and wvls"},
 		{"theta_h", 11 + 8, 1, "M has other sizes"},
 		{"wvls", 11, 4, "M has other sizes"},
-		{"wvls", 2, 10, "wvls has another type"},
-		{"theta_d", 0, 1, "theta_d has another type or number of dimensions"},
+		{"wvls", 2, 10, "wvls has the wrong type"},
+		{"theta_d", 0, 1, "theta_d has the wrong type or number of dimensions"},
 		{"theta_d", 11, 2, "theta_d has more than one row"},
 		{"theta_d", 11, 0, "theta_d has a side of 0"},
 	};

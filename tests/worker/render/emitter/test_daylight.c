@@ -410,7 +410,7 @@ static void test_refused(void **state)
 	struct scene_node *n = node_make(&a, PLUGIN_EMITTER, "sky");
 	node_add_ref(&a, n, "albedo", node_make(&a, PLUGIN_TEXTURE, "checkerboard"));
 	const struct emitter_build build = {.arena = &a, .scale = 1};
-	assert_true(emitter_create(&em, n, &build, &e) < 0 && strstr(e.text, "depends on the place"));
+	assert_true(emitter_create(&em, n, &build, &e) < 0 && strstr(e.text, "textured albedo"));
 	arena_fini(&a);
 }
 

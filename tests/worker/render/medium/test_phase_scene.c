@@ -120,7 +120,7 @@ static void test_refused(void **state)
 		{MIXTURE("1,x", FORWARDS FORWARDS), "needs 2 weights"},
 		{MIXTURE("1,-1", FORWARDS FORWARDS), "weights=\"1,-1\": must be within [0, 1e6]"},
 		{MIXTURE("0,0", FORWARDS FORWARDS), "weights=\"0,0\": all are 0"},
-		{MIXTURE(".5,.5", FORWARDS MIXTURE(".5", FORWARDS)), "its weights must add up to 1 inside of another"},
+		{MIXTURE(".5,.5", FORWARDS MIXTURE(".5", FORWARDS)), "its weights must add up to 1 inside another"},
 		{"<phase type='tabphase'/>", "values: needs a list of 2 to 65536 numbers"},
 		{"<phase type='tabphase'><string name='values' value='1'/></phase>", "values: needs a list of 2"},
 		{"<phase type='tabphase'><string name='values' value='1,nan'/></phase>", "values: needs a list of 2"},

@@ -248,7 +248,7 @@ static void test_bad_input(void **state)
 		"</texture></texture>",
 		"<texture type=\"scale\">: the heights of a heightfield come from a bitmap");
 	refuses("<texture type='scale'/>", "needs either a filename or a bitmap inside");
-	refuses(FILENAME, "an image of 1 x 5 pixels; heights need 2 x 2");
+	refuses(FILENAME, "an image of 1 x 5 pixels is too small; heights need 2 x 2");
 	refuses("<string name='filename' value='m.obj'/>", "m.obj");
 	refuses("<string name='filename' value='none.png'/>", "none.png: no such file");
 	pictures_fini(&p);

@@ -358,23 +358,23 @@ static void test_bad_serialized_5(void **state)
 		const char *text;
 	} bad[] = {
 		{0, 0x1007, "m: shading tangents are not supported"},
-		{0, 0x0005, "m: the head of the mesh is damaged"},
+		{0, 0x0005, "m: the header of the mesh is damaged"},
 		{4, 1 << 30, "m: a name that is too long"},
-		{15, 0, "m: the head of the mesh is damaged"}, /* no vertices, but places */
-		{19, 1, "m: more vertices or triangles than there can be"},
-		{27, 1, "m: more vertices or triangles than there can be"},
-		{31, 7, "m: the head of the mesh is damaged"},
-		{39, 7, "m: the head of the mesh is damaged"},
+		{15, 0, "m: the header of the mesh is damaged"}, /* no vertices, but places */
+		{19, 1, "m: more vertices or triangles than the file can contain"},
+		{27, 1, "m: more vertices or triangles than the file can contain"},
+		{31, 7, "m: the header of the mesh is damaged"},
+		{39, 7, "m: the header of the mesh is damaged"},
 		{RECORDS, 0x7f800000, "m: a number that is not finite, or beyond 1e60"},
 		{RECORDS + 28, 0x7fc00000, "m: a number that is not finite, or beyond 1e60"},
 		{FACES, SOLID_VERTICES, "m: a triangle's index is out of range"},
-		{FACES + 12, 1, "m: a mesh of several BSDFs is not supported"},
+		{FACES + 12, 1, "m: a mesh with several BSDFs is not supported"},
 		{ATTRIBUTES, 65, "m: more than 64 attributes"},
 		{ATTRIBUTES, 4, "m: the compressed mesh is damaged or ends too early"},
 		{ATTRIBUTES + 4, 200, "m: a name that is too long"},
 		{ATTRIBUTES + 8, 0, "m: an attribute that is neither of vertices nor of faces"},
-		{ATTRIBUTES + 21, 5, "m: an attribute of more numbers than there can be"},
-		{ATTRIBUTES + 21, 0, "m: an attribute of more numbers than there can be"},
+		{ATTRIBUTES + 21, 5, "m: an attribute with more numbers than the file can contain"},
+		{ATTRIBUTES + 21, 0, "m: an attribute with more numbers than the file can contain"},
 	};
 	static struct mesh_file f, good, g;
 	mesh_stream_5(&good, 11, 1);

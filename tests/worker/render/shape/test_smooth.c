@@ -237,7 +237,7 @@ static void test_bad_input(void **state)
 		put("v %.9g %.9g %.9g\n", cos(1e-4 * i), sin(1e-4 * i), 0.3 + 1e-9 * i * i);
 	for (int i = 0; i < 40000; i++)
 		put("f 1 %d %d\n", i + 2, i + 3);
-	expect_refused(ANGLE(0), "too many triangles with different directions meet in one place");
+	expect_refused(ANGLE(0), "too many triangles with different directions meet at one point");
 	struct built_shape b = build_ok(ANGLE(30));
 	built_shape_release(&b);
 }

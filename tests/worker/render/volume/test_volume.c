@@ -393,7 +393,7 @@ static void test_refused(void **state)
 	(void)state;
 	vol_make(&grid, (const uint32_t[3]){4, 3, 5}, 1, linear_field);
 	world_of_files_refused(scene_of("3.0.0", "homogeneous", GRID("sigma_t", "")),
-			       "sigma_t is the same everywhere in a homogeneous medium");
+			       "sigma_t must not vary in space in a homogeneous medium");
 	/* A turn by 90 degrees as exporters write it. */
 	struct world *upright =
 		world_with("3.0.0", GRID("sigma_t", "<string name='wrap_mode' value='mirror'/><transform "
@@ -404,7 +404,7 @@ static void test_refused(void **state)
 	refused("3.0.0",
 		GRID("sigma_t", "<string name='wrap_mode' value='mirror'/><transform name='to_world'><rotate x='1' "
 				"angle='10'/></transform>"),
-		"a density that is turned cannot repeat itself (wrap_mode)");
+		"a rotated density cannot repeat itself (wrap_mode)");
 	grid.value[7] = 1.5f;
 	vol_write(&grid);
 	refused("3.0.0", GRID("albedo", ""), "g.vol: its values go from 0.3 to 1.5; [0, 1] is supported here");

@@ -272,7 +272,7 @@ static void test_refused(void **state)
 	world_refused(CUBE(WIRE("displacement", "") "<integer name='displacement_level' value='1'/>"),
 		      "the edges of a mesh cannot displace a surface");
 	world_refused("<emitter type='projector'>" WIRE("irradiance", "") "</emitter>",
-		      "only a shape's material or light can show its edges");
+		      "only the material or the light of a shape can show edges");
 	world_refused(CUBE(DIFFUSE(NUMBER("step_width", "1.5"))), "step_width");
 	world_refused(CUBE(DIFFUSE(NUMBER("line_width", "-1"))), "line_width");
 	world_refused(CUBE(DIFFUSE("<rgb name='edge_color' value='2,0,0'/>")), "edge_color");
