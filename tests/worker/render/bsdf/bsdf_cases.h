@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The BSDFs that the generic tests run over: several parameter sets each, as text (see node_bsdf in
- * tests/support/nodes.h). A BSDF of the registry without a set here fails the tests.
+ * The BSDFs of the generic tests, each with several sets of parameters, as text (see node_bsdf in
+ * tests/support/nodes.h). The tests fail if a BSDF of the registry has no set here.
  */
 #ifndef TESTS_WORKER_BSDF_BSDF_CASES_H
 #define TESTS_WORKER_BSDF_BSDF_CASES_H
@@ -51,7 +51,7 @@ static const char *const bsdf_cases[] = {
 	"dielectric int_cauchy_b=0.01 ext_cauchy_b=-0.002 ext_ior=1.2 specular_reflectance=0.9",
 	"roughdielectric int_ior=diamond ext_ior=water dispersion=true alpha=0.3",
 	"roughdielectric int_ior=1 ext_sellmeier=1.0396,0.2318,1.0105,0.006,0.02,103.56 alpha=0.2 distribution=ggx",
-	"roughdielectric int_ior=1.5 ext_ior=1.5 int_cauchy_b=0.02 alpha=0.4", /* eta is 1 at IOR_NM alone */
+	"roughdielectric int_ior=1.5 ext_ior=1.5 int_cauchy_b=0.02 alpha=0.4", /* eta is 1 only at IOR_NM */
 	"roughdiffuse reflectance=0.9",
 	"roughdiffuse alpha=1 reflectance=rgb(1,0.3,0.1)",
 	"roughdiffuse alpha=0.7 use_fast_approx=true",
@@ -113,7 +113,8 @@ static const char *const bsdf_cases[] = {
 	"blendbsdf weight=0.4 | thindielectric | dielectric int_ior=1.5 ext_ior=1",
 	"blendbsdf weight=0.3 | diffuse reflectance=0.8 | roughconductor alpha=0.2 material=Au",
 	"blendbsdf weight=0.6 | plastic | conductor material=Ag",
-	"blendbsdf weight=0.4 | diffuse | roughplastic alpha=0.3", /* chooses with what is left of the same number */
+	"blendbsdf weight=0.4 | diffuse | roughplastic alpha=0.3", /* reuses the rest of the random number that chose
+								      the part */
 	"blendbsdf weight=0 | phong | diffuse",
 	"blendbsdf weight=0.7 | diffuse reflectance=0.8 | difftrans transmittance=rgb(0.9,0.5,0.2)",
 	"blendbsdf weight=0.5 | thindielectric | difftrans",
@@ -169,7 +170,7 @@ static const char *const bsdf_cases[] = {
 	"blendbsdf weight=0.4 | measured filename=anisotropic.bsdf | roughconductor alpha=0.2",
 	"mask opacity=0.7 | hair sigma_a=0.3",
 	"blendbsdf weight=0.4 | hair azimuthal_roughness=0.5 | difftrans",
-	/* Parts with other normals: they tilt on a surface alone. */
+	/* Parts with different normals, which differ only if there is a surface. */
 	"blendbsdf weight=0.4 | normalmap / roughplastic alpha=0.2 / texture checkerboard color0=rgb(0.7,0.5,0.9) "
 	"color1=rgb(0.4,0.35,0.9) | roughconductor alpha=0.1",
 	"blendbsdf weight=0.7 | conductor | normalmap / difftrans / texture checkerboard color0=rgb(0.7,0.5,0.9)",

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * plastic, roughplastic, coating, roughcoating and thindielectric. Light that goes in and out of the layer is followed
+ * plastic, roughplastic, coating, roughcoating and thindielectric. Light that enters and leaves the layer is followed
  * bounce by bounce and compared with the closed forms: energy over a white base, absorption by Beer's law, total
- * reflection inside, rough layers that become smooth ones, layers without a boundary, on both sides, and textured.
+ * internal reflection, rough layers in the limit of smooth ones, layers without a boundary, two-sided layers, and
+ * textured ones.
  */
 #include "tests/worker/render/bsdf/bsdf_cases.h"
 #include "worker/render/bsdf/fresnel.h"
@@ -22,8 +23,8 @@ static vec3 direction(double z)
 	return (vec3){sqrt((1 - z) * (1 + z)), 0, z};
 }
 
-/* All that comes back of light from wo: the specular lobe, and by the midpoint rule the others (cosine^2 times
- * azimuth). */
+/* Returns the share of light from wo that is reflected: the specular lobe, plus the other lobes integrated by the
+ * midpoint rule over cosine^2 and azimuth. */
 static double albedo(const struct bsdf *b, vec3 wo)
 {
 	enum { POLAR = 400, AZIMUTH = 200 };
@@ -37,7 +38,7 @@ static double albedo(const struct bsdf *b, vec3 wo)
 	return sum * PI / (POLAR * AZIMUTH) + bsdf_eval_delta(b, &point, wo, BSDF_REFLECT, &wi, &chance).v[0];
 }
 
-/* Over a base that absorbs nothing a smooth coating gives back everything. */
+/* Over a base that absorbs nothing, a smooth coating reflects all light. */
 static void test_nothing_is_lost_under_a_smooth_coating(void **state)
 {
 	(void)state;
@@ -56,8 +57,8 @@ static void test_nothing_is_lost_under_a_smooth_coating(void **state)
 	}
 }
 
-/* Light that stays inside meets a base of reflectance 0.5 again and again: linear, as if that base gave all of it back
- * from the second time on; nonlinear, each time half of it. */
+/* Light that stays inside meets a base of reflectance 0.5 repeatedly: if linear, the base reflects all of it from the
+ * second time on; if nonlinear, half of it each time. */
 static void test_nonlinear_loses_light_at_each_bounce(void **state)
 {
 	(void)state;
@@ -68,7 +69,7 @@ static void test_nonlinear_loses_light_at_each_bounce(void **state)
 	vec3 straight = {0, 0, 1};
 	double t = fresnel_dielectric(1, 1.7).transmitted,
 	       once = linear.ops->eval(&linear, &point, straight, straight).v[0];
-	double out = 0.5 * t * t / PI / once / (1.7 * 1.7); /* the part of diffuse light that leaves at a time */
+	double out = 0.5 * t * t / PI / once / (1.7 * 1.7); /* the share of diffuse light that leaves at each bounce */
 	double series = 0.5 * out / (1 - 0.5 * (1 - out));  /* 0.5 out + 0.5 (1 - out) 0.5 out + ... */
 	double want = once * series / 0.5;
 	assert_true(out > 0.2 && out < 0.5);
@@ -76,7 +77,8 @@ static void test_nonlinear_loses_light_at_each_bounce(void **state)
 	arena_fini(&a);
 }
 
-/* What comes out again of the light that is in, from Fresnel's factors inside: total reflection included. */
+/* The share of diffuse light from inside that leaves agrees with Fresnel's factors inside, including total
+ * reflection. */
 static void test_escape_is_what_fresnel_says_inside(void **state)
 {
 	(void)state;
@@ -93,7 +95,7 @@ static void test_escape_is_what_fresnel_says_inside(void **state)
 	arena_fini(&a);
 }
 
-/* A rough coating gives back what it lets in, too; and it becomes the smooth one. */
+/* A rough coating reflects all light that it lets in, too, and converges to the smooth one. */
 static void test_rough_and_smooth_coatings_meet(void **state)
 {
 	(void)state;
@@ -107,7 +109,7 @@ static void test_rough_and_smooth_coatings_meet(void **state)
 	}
 	bsdf_make(&a, "roughplastic alpha=0.001 diffuse_reflectance=rgb(0.6,0.3,0.9) nonlinear=true", &rough);
 	bsdf_make(&a, "plastic diffuse_reflectance=rgb(0.6,0.3,0.9) nonlinear=true", &smooth);
-	vec3 wo = direction(0.8), wi = {-0.3, 0.5, sqrt(1 - 0.09 - 0.25)}; /* far from the mirror's direction */
+	vec3 wo = direction(0.8), wi = {-0.3, 0.5, sqrt(1 - 0.09 - 0.25)}; /* far from the mirror direction */
 	for (int l = 0; l < SPECTRUM_LANES; l++) {
 		double r = rough.ops->eval(&rough, &point, wo, wi).v[l],
 		       s = smooth.ops->eval(&smooth, &point, wo, wi).v[l];
@@ -134,7 +136,7 @@ static void test_the_coating_is_a_dielectric(void **state)
 	arena_fini(&a);
 }
 
-/* Reflected and transmitted again and again between the two sides of a sheet, term by term. */
+/* Sums the reflections between the two sides of a sheet term by term. */
 static void test_a_sheet_is_a_series(void **state)
 {
 	(void)state;
@@ -158,7 +160,7 @@ static void test_a_sheet_is_a_series(void **state)
 	arena_fini(&a);
 }
 
-/* A layer of the same index as what is outside is not there; one that absorbs takes what Beer's law says. */
+/* A layer with the index of its surroundings has no effect; an absorbing one follows Beer's law. */
 static void test_a_layer_without_boundary(void **state)
 {
 	(void)state;
@@ -183,7 +185,8 @@ static void test_a_layer_without_boundary(void **state)
 	}
 }
 
-/* One bounce of a diffuse base, by refraction worked out here; and the mirrors of layer and metal as one lobe. */
+/* One bounce off a diffuse base, with the refraction computed here; and the specular reflections of layer and metal,
+ * which are one lobe. */
 static void test_a_layer_is_what_goes_in_and_out(void **state)
 {
 	(void)state;
@@ -209,8 +212,8 @@ static void test_a_layer_is_what_goes_in_and_out(void **state)
 	arena_fini(&a);
 }
 
-/* A roughness from a texture is that of a number, at the place where the texture says it: here that of
- * an end of the table. */
+/* Where a textured roughness has some value, the BSDF is that with this value as a number; here, one at the end of the
+ * table. */
 static void test_textured_coatings(void **state)
 {
 	(void)state;
@@ -230,7 +233,7 @@ static void test_textured_coatings(void **state)
 				 rough[place]);
 			bsdf_make(&a, text, &number);
 			p.where.u = place ? 0.75
-					  : 0.25; /* color0 where u and v differ in their halves, of numbers in 3.x */
+					  : 0.25; /* for numbers in 3.x, color0 where u and v are in different halves */
 			p.where.v = 0.25;
 			assert_true(map.textured && map.alpha == 0.05);
 			double m = map.ops->eval(&map, &p, wo, wi).v[0], n = number.ops->eval(&number, &p, wo, wi).v[0];
@@ -240,7 +243,7 @@ static void test_textured_coatings(void **state)
 		}
 }
 
-/* A layer over something with two sides has two sides. */
+/* A layer over a two-sided BSDF is two-sided. */
 static void test_a_layer_on_both_sides(void **state)
 {
 	(void)state;
@@ -269,14 +272,14 @@ static void test_a_layer_on_both_sides(void **state)
 	arena_fini(&a);
 }
 
-/* Boundaries of a scene share a table if they are equal, and only then. */
+/* Boundaries of a scene share a table if and only if they are equal. */
 static void test_equal_boundaries_share_a_table(void **state)
 {
 	(void)state;
 	static const struct {
 		const char *text;
 		double eta;
-		int same_as; /* of those before; -1: none */
+		int same_as; /* index of an earlier case; -1: none */
 	} all[] = {
 		{"roughplastic alpha=0.2", 1.5, -1},
 		{"roughplastic alpha=0.2 diffuse_reflectance=0.1", 1.5, 0},

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Exactly specular lobes. Their directions and shares, asked for by name, are those that sample() finds by chance;
- * nothing passes beyond the critical angle; masks and polarization filters let light straight through; and the mean
+ * Exactly specular lobes. eval_delta gives the directions and probabilities that sample() finds at random; no light
+ * passes beyond the critical angle; masks and polarization filters let light pass straight through; and the mean
  * roughness that mutations use is that of all lobes.
  */
 #include "tests/support/dice.h"
@@ -13,7 +13,7 @@
 
 static const struct wavelengths wavelengths = {.nm = {550, 500, 600, 700}};
 
-/* Cases of their own for what twosided makes of mirrors. */
+/* Further cases: mirrors inside twosided. */
 static const char *const mirrors[] = {
 	"twosided | conductor material=Au | conductor material=Ag specular_reflectance=0.5",
 	"twosided | conductor material=Cr | diffuse",
@@ -49,7 +49,7 @@ static void check_lobe(const char *text, const struct bsdf *b, const struct bsdf
 	}
 }
 
-/* The probabilities of the specular lobes that there are. */
+/* Sums the probabilities of all specular lobes. */
 static double sum_of_probabilities(const struct bsdf *b, const struct bsdf_point *p, vec3 wo)
 {
 	double sum = 0;
@@ -96,7 +96,7 @@ static void test_specular_lobes_are_those_of_sample(void **state)
 				lobes[(s.mode & BSDF_TRANSMIT) != 0]++;
 				mirrored += wo.z < 0 && b.ops->decl.type[0] == 't';
 			}
-			/* Where specular and other lobes lie on one side, only frequencies can be compared. */
+			/* If specular and other lobes lie on the same side, only frequencies can be compared. */
 			double chance = sum_of_probabilities(&b, &p, wo);
 			bool mixed = b.has_smooth && chance > 0 && chance < 1;
 			if (!mixed && !(fabs(chance - specular) < 1e-12))
@@ -104,7 +104,7 @@ static void test_specular_lobes_are_those_of_sample(void **state)
 			excess += mixed ? specular - chance : 0;
 			variance += mixed ? chance * (1 - chance) : 0;
 		}
-		/* Six standard deviations: level 2e-9 a case. */
+		/* Six standard deviations: level 2e-9 per case. */
 		if (fabs(excess) > 6 * sqrt(variance))
 			fail_msg("%s: %g specular samples more than their chances say, +- %g", case_text(k), excess,
 				 sqrt(variance));
@@ -151,7 +151,7 @@ static void test_nothing_passes_beyond_the_critical_angle(void **state)
 	arena_fini(&a);
 }
 
-/* Filters of polarization, for light that has none, are holes in a black sheet. */
+/* For unpolarised light, polarization filters are like a black sheet with holes. */
 static void test_filters_are_holes(void **state)
 {
 	(void)state;
@@ -187,8 +187,8 @@ static void test_filters_are_holes(void **state)
 	}
 }
 
-/* Glass with holes has three specular lobes: the two of the glass, weaker by its share, and what the holes let through.
- * No lobe answers for another. */
+/* Glass with holes has three specular lobes: the two of the glass, scaled by its share, and the straight one of the
+ * holes. A query for one lobe is not answered with another. */
 static void test_masked_glass_has_three_lobes(void **state)
 {
 	(void)state;

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Indices of refraction as functions of the wavelength: against the makers' catalogues and handbooks, through a prism
- * against Snell's law worked out here, and what a BSDF says of itself. Deterministic.
+ * Indices of refraction as functions of the wavelength, compared with manufacturers' catalogues and handbooks;
+ * refraction by a prism, compared with Snell's law computed here; and the properties that a BSDF reports.
+ * Deterministic.
  */
 #include "tests/support/dice.h"
 #include "tests/worker/render/bsdf/bsdf_cases.h"
@@ -12,7 +13,7 @@ static const double line_f = 486.1327, line_d = 587.5618, line_c = 656.2725;
 
 static struct wavelengths wavelength_of(double nm)
 {
-	/* The others are not to be looked at. */
+	/* The other wavelengths must not be used. */
 	return (struct wavelengths){.nm = {nm, NAN, NAN, NAN}};
 }
 
@@ -27,9 +28,8 @@ static double index_of(const char *text, double nm)
 	return eta;
 }
 
-/* Catalogues (Schott N-BK7, N-SF11) and handbooks print five or six digits; those of water are
- * against air. Diamond: Peter's 2.4175 at d, and its dispersion
- * n(430.8) - n(686.7) = 0.044 as gemmology tables have it. */
+/* Catalogues (Schott N-BK7, N-SF11) and handbooks print five or six digits; those of water are relative to air.
+ * Diamond: Peter's 2.4175 at d, and the dispersion n(430.8) - n(686.7) = 0.044 of gemmological tables. */
 static void test_glasses_have_their_catalogue_values(void **state)
 {
 	(void)state;
@@ -60,7 +60,7 @@ static void test_glasses_have_their_catalogue_values(void **state)
 	assert_true(fabs(index_of(diamond, 430.8) - index_of(diamond, 686.7) - 0.044) < 0.001);
 }
 
-/* A plain name means what it does in Mitsuba, and with dispersion what its law says at 587.6 nm. */
+/* A name alone gives Mitsuba's index; with dispersion, it gives that of the law at 587.6 nm. */
 static void test_names_and_laws(void **state)
 {
 	(void)state;
@@ -127,14 +127,14 @@ static void test_cauchy(void **state)
 			    1e-15);
 }
 
-/* v in the frame whose z is at `angle` from the world's z, in the plane y = 0; and back with -angle. */
+/* Converts v to the frame whose z axis is at `angle` from the world's z in the plane y = 0, and back with -angle. */
 static vec3 turned_by(vec3 v, double angle)
 {
 	return (vec3){cos(angle) * v.x - sin(angle) * v.z, v.y, sin(angle) * v.x + cos(angle) * v.z};
 }
 
-/* Light through a prism of 60 degrees in its plane, by two specular refractions; deviation against the closed form
- * delta = i + asin(n sin(A - asin(sin i / n))) - A. */
+/* Light passes a prism of 60 degrees, in its plane, by two specular refractions. The deviation is compared with the
+ * closed form delta = i + asin(n sin(A - asin(sin i / n))) - A. */
 static void test_a_prism_spreads_light(void **state)
 {
 	(void)state;
@@ -149,7 +149,7 @@ static void test_a_prism_spreads_light(void **state)
 		vec3 in = {-sin(incidence), 0, cos(incidence)}, inside, out;
 		double chance, n = 0, l2 = nm * nm * 1e-6;
 		spectrum first = bsdf_eval_delta(&b, &p, in, BSDF_TRANSMIT, &inside, &chance);
-		/* The second face's outward normal is turned by pi - apex; light comes to it from inside. */
+		/* The outward normal of the second face is rotated by pi - apex; light arrives from inside. */
 		vec3 from = turned_by(vec3_neg(inside), PI - apex);
 		if (from.z > 0)
 			from = turned_by(vec3_neg(inside), -(PI - apex));
@@ -174,7 +174,7 @@ static void test_a_prism_spreads_light(void **state)
 	arena_fini(&a);
 }
 
-/* With no coefficient left every bit is that of the plain glass; and only nm[0] says anything. */
+/* With coefficients of 0, the values are those of plain glass to the bit; and only nm[0] is used. */
 static void test_lanes_and_nothing_left(void **state)
 {
 	(void)state;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Nothing but finite numbers, at grazing angles, with roughness from 0 to 2, indices next to 1 and far from it, and
- * random numbers at the ends of their range; the cases of the other tests likewise. Invalid operations trap.
+ * All results are finite: at grazing angles, with roughness from 0 to 2, indices next to 1 and far from it, and random
+ * numbers at the ends of their range; likewise for the cases of the other tests. Invalid operations trap.
  */
 #include "tests/support/stats.h"
 #include "tests/worker/render/bsdf/bsdf_cases.h"
@@ -78,7 +78,7 @@ static const char *const extremes[] = {
 	"hk sigma_s=1e9 sigma_a=0 thickness=1e9",
 	"hk sigma_t=1e-9 albedo=1 thickness=1e-9",
 };
-/* Where a text ends in "=", each of these follows. */
+/* Each of these is appended to a text that ends in "=". */
 static const double alphas[] = {0, 1e-5, 1e-3, 0.1, 1, 2};
 
 static vec3 corner(uint64_t i, const double u[4])

@@ -18,7 +18,7 @@ static double by_complex_numbers(double c, double eta, double k)
 	return 0.5 * (creal(s) * creal(s) + cimag(s) * cimag(s) + creal(p) * creal(p) + cimag(p) * cimag(p));
 }
 
-/* Aluminium, gold, copper in green; silver in blue; a weak absorber; next to glass. */
+/* Aluminium, gold, copper at green wavelengths; silver at blue ones; a weak absorber; an index close to glass. */
 static void test_conductors(void **state)
 {
 	(void)state;
@@ -28,7 +28,7 @@ static void test_conductors(void **state)
 			double c = i / 200.0, r = fresnel_conductor(c, metals[m][0], metals[m][1]);
 			assert_true(fabs(r - by_complex_numbers(c, metals[m][0], metals[m][1])) < 1e-12);
 		}
-	/* Off normal incidence it is not the value there. */
+	/* Away from normal incidence the value differs from that at normal incidence. */
 	assert_true(fabs(fresnel_conductor(0.3, 0.36, 2.5) - fresnel_conductor(1, 0.36, 2.5)) > 0.005);
 }
 
@@ -40,7 +40,7 @@ static void test_dielectrics_are_conductors_that_absorb_nothing(void **state)
 			    1e-12);
 }
 
-/* A mirror, nothing at all, and the largest numbers that scenes may give. */
+/* A mirror, no boundary at all, and the largest numbers that scenes may give. */
 static void test_conductors_at_the_ends(void **state)
 {
 	(void)state;

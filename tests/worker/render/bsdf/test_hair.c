@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * `hair`: each function of hair_lobes.h against an integral, or against rays that are followed through a cylinder of
- * glass by Snell's law in space; the whole BSDF against its parts, and against what may leave a fibre.
+ * `hair`: each function of hair_lobes.h is compared with an integral, or with rays traced through a glass cylinder by
+ * Snell's law in space; the whole BSDF is compared with its parts, and with the energy that may leave a fibre.
  *
- * Statistical tests: level 1e-6 each; a share or a density that is 3 % off where it is tested is found. Seeds: the
- * tests' names.
+ * Statistical tests: level 1e-6 each; an error of 3 % in a tested share or density is found. Seeds: the names of the
+ * tests.
  */
 #include "tests/support/dice.h"
 #include "tests/support/stats.h"
@@ -42,7 +42,7 @@ static struct hair_fibre fibre_of(double eta, double along, double around, doubl
 	return f;
 }
 
-/* I0(x) is the mean of exp(x cos t) over a turn; the trapezoidal rule converges exponentially. */
+/* I0(x) is the mean of exp(x cos t) over a period, for which the trapezoidal rule converges exponentially. */
 static void test_bessel(void **state)
 {
 	(void)state;
@@ -85,8 +85,9 @@ static void test_along_is_a_density(void **state)
 	}
 }
 
-/* Where each lobe is brightest: turned by twice the tilt of the scales to one side, once and four times to the other
- * (the last by nothing). Sampled angles lie around the same one, with the variance. */
+/* The angle at which each lobe is brightest: turned by twice the tilt of the scales to one side, by once and four times
+ * to the other, and by 0 for the last lobe. Sampled angles are distributed around the same angle with the lobe's
+ * variance. */
 static void test_along_has_its_place_and_width(void **state)
 {
 	(void)state;
@@ -98,7 +99,7 @@ static void test_along_has_its_place_and_width(void **state)
 	for (int p = 0; p < HAIR_LOBES; p++) {
 		double ideal = -theta + turns[p] * tilt, sum = 0, square = 0;
 		double there = hair_along(&f, p, at_angle(theta), at_angle(ideal)), s = sqrt(times[p] * v);
-		/* A narrow lobe is a normal distribution, but for the curvature. */
+		/* A narrow lobe is a normal distribution, except for the curvature. */
 		assert_near(there * cos(ideal), 1 / (sqrt(2 * PI) * s), 0.02, "height");
 		double left = hair_along(&f, p, at_angle(theta), at_angle(ideal - s)),
 		       right = hair_along(&f, p, at_angle(theta), at_angle(ideal + s));
@@ -128,7 +129,7 @@ static void test_around_is_a_density(void **state)
 		for (int k = 0; k < N; k++) {
 			double x = PI * (2 * (k + 0.5) / N - 1);
 			sum += hair_around(&f, x) * 2 * PI / N;
-			if (sum > next && next < 0.95) { /* its inverse */
+			if (sum > next && next < 0.95) { /* hair_around_sample is its inverse */
 				double s = hair_around_sample(&f, next);
 				assert_true(fabs(s - x) < 4 * PI / N);
 				next += 0.1;
@@ -141,7 +142,7 @@ static void test_around_is_a_density(void **state)
 
 /* ---- rays through a cylinder ---- */
 
-/* Around the y axis, of radius 1. */
+/* A ray in a cylinder of radius 1 around the y axis. */
 struct ray {
 	vec3 p, d; /* on the surface */
 };
@@ -156,14 +157,14 @@ static vec3 reflected(vec3 d, vec3 n)
 	return vec3_madd(d, -2 * vec3_dot(d, n), n);
 }
 
-/* n against d; eta: index beyond over here. */
+/* n points against d; eta: index beyond over index here. */
 static vec3 refracted(vec3 d, vec3 n, double eta)
 {
 	double c = -vec3_dot(d, n), t = sqrt(1 - (1 - c * c) / (eta * eta));
 	return vec3_normalize(vec3_madd(vec3_scale(1 / eta, d), c / eta - t, n));
 }
 
-/* To the other side, inside. Returns the length. */
+/* Moves the ray to the other side, inside the cylinder. Returns the length. */
 static double cross(struct ray *r)
 {
 	double t = -2 * (r->p.x * r->d.x + r->p.z * r->d.z) / (r->d.x * r->d.x + r->d.z * r->d.z);
@@ -199,7 +200,8 @@ static void test_ideal_rays(void **state)
 	}
 }
 
-/* How often a photon crosses the fibre before it gets out, at most HAIR_LOBES - 1; HAIR_LOBES: it is absorbed. */
+/* Returns how often a photon crosses the fibre before it leaves, at most HAIR_LOBES - 1; HAIR_LOBES if it is
+ * absorbed. */
 static int count_passages(vec3 camera, double eta, double sigma, struct dice *d)
 {
 	struct ray r = {{0, 0, 1}, vec3_neg(camera)};
@@ -250,7 +252,7 @@ static void test_shares(void **state)
 
 /* ---- the BSDF ---- */
 
-/* In the direction of an ideal ray, nothing but its own lobe, at its height. */
+/* In the direction of an ideal ray, only its own lobe contributes, with its maximum. */
 static void test_lobes_lie_along_ideal_rays(void **state)
 {
 	(void)state;
@@ -282,7 +284,8 @@ static void test_lobes_lie_along_ideal_rays(void **state)
 	arena_fini(&a);
 }
 
-/* Sampled, what leaves is the closed form, at each offset from the axis and whatever the roughness is. */
+/* The energy that leaves, estimated by sampling, is the closed form, at each offset from the axis and for any
+ * roughness. */
 static void test_energy(void **state)
 {
 	(void)state;
@@ -318,14 +321,14 @@ static void test_energy(void **state)
 			struct stats_mean mean = stats_mean_test(means, GROUPS, all);
 			if (!(fabs(mean.mean - all) < 8 * mean.error + 1e-9))
 				fail_msg("%s: %g +- %g leaves of %g", texts[k], mean.mean, mean.error, all);
-			if (k == 0) /* the same in every sample */
+			if (k == 0) /* each sample has the same value */
 				assert_near(least, 1, 1e-9, "white");
 		}
 		arena_fini(&a);
 	}
 }
 
-/* Over the sphere without sampling: white is 1. */
+/* Integrates over the sphere without sampling: without absorption, the result is 1. */
 static void test_furnace_by_quadrature(void **state)
 {
 	(void)state;
@@ -348,8 +351,8 @@ static void test_furnace_by_quadrature(void **state)
 	arena_fini(&a);
 }
 
-/* Importance: drawn as its density says, never to the inside, and from outside straight on with half the probability,
- * unless the back is culled: then nothing goes straight on, and no light comes from inside. */
+/* Importance is sampled with its density, never towards the inside, and from outside passes straight on with
+ * probability 1/2. If the back is culled, nothing passes straight on, and no light arrives from inside. */
 static void test_importance(void **state)
 {
 	(void)state;
@@ -433,14 +436,14 @@ static void test_colours(void **state)
 				assert_near(value(same[k][0], w, wo, wi).v[l], value(same[k][1], w, wo, wi).v[l], 1e-9,
 					    same[k][0]);
 			}
-	/* Melanin is brown: what passes is red, then green, then blue. */
+	/* Melanin is brown: most red light passes, then green, then blue. */
 	spectrum f = value("hair", &rgb, wo, wi);
 	assert_true(f.v[0] > 1.2 * f.v[1] && f.v[1] > 1.2 * f.v[2]);
 	f = value("hair", &wavelengths, wo, wi);
 	assert_true(f.v[3] > f.v[2] && f.v[2] > f.v[1] && f.v[1] > f.v[0]);
 }
 
-/* Mirrored in the plane of normal and fibre, all is the same. */
+/* Mirroring in the plane of normal and fibre changes nothing. */
 static void test_sides_are_equal(void **state)
 {
 	(void)state;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * eval_halfvec: against the product of f, cosine and Jacobian (which bsdf.c forms where a BSDF has no eval_halfvec of
- * its own); that Jacobian against finite differences of the map from half vectors to directions; and microfacets
- * against the same product worked out here, in long double, in the textbook's form. Deterministic. Where formulas are
- * ill-conditioned the bound is in units of what rounding directions and index to double does.
+ * eval_halfvec is compared with the product of f, cosine and Jacobian (which bsdf.c computes for BSDFs without an
+ * eval_halfvec of their own); that Jacobian with finite differences of the map from half vectors to directions; and
+ * microfacets with the same product computed here, in long double and in textbook form. Deterministic. Where formulas
+ * are ill-conditioned, the bound is in units of the effect of rounding directions and index to double.
  */
 #include "tests/support/dice.h"
 #include "tests/worker/render/bsdf/bsdf_cases.h"
@@ -48,7 +48,8 @@ static wide slope_normal(long double x, long double y)
 	return (wide){x / l, y / l, 1 / l};
 }
 
-/* wi for half vector h with wo held; eta: index beyond over index on wo's side. false: there is none. */
+/* Finds wi for half vector h with wo held fixed; eta: index beyond over index on wo's side. Returns false if there is
+ * none. */
 static bool direction_of_halfvec(wide wo, wide h, bool reflect, long double eta, wide *wi)
 {
 	long double c = dot(wo, h);
@@ -75,7 +76,8 @@ static spectrum eval_one(const struct bsdf *b, const struct bsdf_point *p, vec3 
 	return spectrum_of(1);
 }
 
-/* Central differences of the slope: truncation and rounding of long double (next to eta = 1) below 1e-5 together. */
+/* Central differences of the slope: together, truncation and rounding of long double (next to eta = 1) are below
+ * 1e-5. */
 static void test_the_jacobian_is_the_derivative(void **state)
 {
 	(void)state;
@@ -147,7 +149,7 @@ static void test_the_jacobian_between_equal_indices(void **state)
 	assert_true(done > 1500);
 }
 
-/* Of those who cancel by hand, the outer product instead. */
+/* For BSDFs that cancel factors themselves, the product with the outer cosine is used instead. */
 static double product(const struct bsdf *b, vec3 wo, vec3 wi, int lane)
 {
 	struct bsdf_ops ops = *b->ops;
@@ -189,8 +191,8 @@ static void test_every_bsdf_against_its_product(void **state)
 /* One configuration of the microfacet test. */
 struct setting {
 	bool ggx, metal;
-	double alpha, eta; /* index below over above */
-	double ratio;	   /* of the roughness along v to the one along u */
+	double alpha, eta; /* eta: index below over index above */
+	double ratio;	   /* roughness along v over that along u */
 };
 
 static long double g1(const struct setting *s, wide v)
@@ -212,7 +214,7 @@ static long double distribution(const struct setting *s, wide h)
 	return p22 / (PI * a2 * (long double)s->ratio * c2 * c2);
 }
 
-/* Walter's f times cosine times the Jacobian, term by term. 0: no facet. */
+/* Returns Walter's f times cosine times the Jacobian, term by term; 0 if there is no facet. */
 static long double textbook_value(const struct setting *s, wide wo, wide wi)
 {
 	bool reflect = wo.z * wi.z > 0;
@@ -232,15 +234,15 @@ static long double textbook_value(const struct setting *s, wide wo, wide wi)
 	long double outer = fabsl(wi.z) * fabsl(h.z * h.z * h.z), root = co + eta * ci;
 	if (reflect)
 		return common * f / 4 * outer * 4 * ci;
-	/* Walter's eq. 21 for importance, over eta^2 for radiance; the (1 - F) from two cosines. */
+	/* Walter's eq. 21 for importance, over eta^2 for radiance; 1 - F is computed from both cosines. */
 	long double transmitted =
 		2 * co * eta * t * (1 / ((co + eta * t) * (co + eta * t)) + 1 / ((eta * co + t) * (eta * co + t)));
 	long double btdf = common * transmitted * co * -ci * eta * eta / (root * root) / (eta * eta);
 	return btdf * outer * root * root / (eta * eta * -ci);
 }
 
-/* How much the value moves when each coordinate does by half a unit in its last place, both lengths with them, and the
- * index: the inverse of one that is next to 1 is not the one that was meant. */
+/* Returns the change of the value if each coordinate, both lengths and the index change by half a unit in the last
+ * place. The index counts because the inverse of an index next to 1 is itself rounded. */
 static long double rounding_error(const struct setting *s, wide wo, wide wi)
 {
 	long double here = textbook_value(s, wo, wi), sum = 0;
@@ -256,7 +258,7 @@ static long double rounding_error(const struct setting *s, wide wo, wide wi)
 	return sum + fabsl(textbook_value(&up, wo, wi) - here) + fabsl(textbook_value(&down, wo, wi) - here);
 }
 
-/* A pair around corners: grazing wo, steep half vectors, next to total reflection. */
+/* Chooses a pair of directions near corner cases: grazing wo, steep half vectors, close to total reflection. */
 static bool corner(struct dice *d, const struct setting *s, vec3 *from, vec3 *to)
 {
 	wide wo = widen(dice_direction(d)), wi;
@@ -274,7 +276,7 @@ static bool corner(struct dice *d, const struct setting *s, vec3 *from, vec3 *to
 		slope = pow(10, dice_between(d, 0, 5));
 	wide h = slope_normal(slope * cos(phi), slope * sin(phi));
 	if (kind == 3 && eta < 1) {
-		/* Facets that wo meets just inside the critical angle, wherever that puts them. */
+		/* Facets that wo meets just inside the critical angle, wherever these facets are. */
 		long double c = sqrtl(1 - eta * eta) * (1 + powl(10, -dice_between(d, 1, 12)));
 		wide x = widen(dice_direction(d));
 		long double along = dot(x, wo), l = sqrtl(1 - along * along), r = sqrtl(1 - c * c);

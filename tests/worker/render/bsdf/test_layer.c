@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * hk against what it stands for: the integral over the depth at which light is scattered, by Gauss's rule; a plate of
- * the medium itself, in which paths have one event; and limits that are known.
+ * hk is compared with its definition, the integral over the depth at which light is scattered, by Gauss's rule; with a
+ * plate of the medium itself, in which paths scatter once; and with known limits.
  */
 #include "tests/support/agree.h"
 #include "tests/support/dice.h"
@@ -23,8 +23,8 @@ static double henyey_greenstein(double g, double cosine)
 	return (1 - g * g) / (4 * PI * pow(1 + g * g - 2 * g * cosine, 1.5));
 }
 
-/* Light that is scattered at depth z has come z / c deep, and leaves through z / a, or what is left of the layer. The
- * event's density per depth is sigma_s over the two cosines of the reflectance's definition. */
+/* Light that is scattered at depth z has travelled z / c, and leaves through z / a, or through the rest of the layer.
+ * The density of the event per depth is sigma_s over the two cosines in the definition of reflectance. */
 static double by_depth(double sigma_s, double sigma_t, double thickness, double g, vec3 wo, vec3 wi)
 {
 	static const double node[] = {0.1834346424956498, 0.5255324099163290, 0.7966664774136267, 0.9602898564975363},
@@ -79,7 +79,7 @@ static void test_the_integral_over_the_depth(void **state)
 	}
 }
 
-/* Both cosines equal or nearly so, where the closed form is 0 / 0. */
+/* Both cosines are equal or nearly so, where the closed form is 0 / 0. */
 static void test_equal_cosines(void **state)
 {
 	(void)state;
@@ -99,8 +99,8 @@ static void test_equal_cosines(void **state)
 	arena_fini(&a);
 }
 
-/* A layer of nothing is not there; a thick one lets nothing through, and reflects like a half space that scatters once,
- * A p / (a + c). */
+/* A layer of thickness 0 has no effect; a thick one transmits nothing, and reflects like a half space that scatters
+ * once, A p / (a + c). */
 static void test_limits(void **state)
 {
 	(void)state;
@@ -121,7 +121,7 @@ static void test_limits(void **state)
 	arena_fini(&a);
 }
 
-/* 0.6's measured materials, for which coefficients that the file states are replaced one by one. */
+/* The measured materials of 0.6, whose coefficients are replaced one by one by those that the file gives. */
 static void test_materials(void **state)
 {
 	(void)state;
@@ -173,8 +173,8 @@ static void test_refused(void **state)
 	"<emitter type='constant'><rgb name='radiance' value='0.3'/></emitter><emitter type='directional'><vector " \
 	"name='direction' x='0.3' y='-0.5' z='-0.6'/><rgb name='irradiance' value='2,3,4'/></emitter>"
 
-/* A plate of the medium, 1 thick and so large that its rim is not seen, with paths of two edges, that is one event: its
- * faces of null, which connections look through, are none. */
+/* A plate of the medium of thickness 1, so large that its rim is not seen, with paths of two edges, that is with one
+ * scattering event: its faces, which are `null`, are no events, since connections look through them. */
 static void test_a_plate_of_the_medium(void **state)
 {
 	(void)state;

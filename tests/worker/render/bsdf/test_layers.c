@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * roughplastic against what it stands for: light followed through a rough boundary (roughdielectric) to a diffuse base
- * and back, again and again, one reflection at a time. The model counts what facets hide from each other as let
- * through. With facets of roughness 0.05 that is below 1.5 %, but for cosines below 1/8, which are left out.
+ * roughplastic is compared with a simulation: light is followed through a rough boundary (roughdielectric) to a diffuse
+ * base and back, one reflection at a time. The model counts light that facets hide from each other as transmitted. With
+ * facets of roughness 0.05 this is below 1.5 %, except for cosines below 1/8, which are left out.
  *
- * Level: five standard errors a bin, 21 bins: below 1e-4. Power: a base 5 % brighter, 10 % of light, is found, which
- * the test itself shows.
+ * Level: five standard errors per bin, 21 bins: below 1e-4. Power: the test itself shows that a base that is 5 %
+ * brighter, 10 % of the light, is found.
  */
 #include "tests/support/dice.h"
 #include "tests/worker/render/bsdf/bsdf_cases.h"
@@ -30,7 +30,7 @@ static vec3 cosine_upwards(struct dice *d)
 	return (vec3){r * cos(phi), r * sin(phi), sqrt(fmax(0, 1 - r * r))};
 }
 
-/* By the boundary, from wherever v is. false: hidden by other facets. */
+/* Scatters v at the boundary, from either side. Returns false if other facets hide it. */
 static bool pass_on(const struct bsdf *boundary, struct dice *d, vec3 v, vec3 *next, double *weight)
 {
 	struct bsdf_sample s;
@@ -47,18 +47,18 @@ static void trace_photon(const struct bsdf *boundary, double base, vec3 wo, stru
 	double weight = 1;
 	vec3 v = wo;
 	while (pass_on(boundary, d, v, &v, &weight)) {
-		if (v.z > 0) { /* out */
+		if (v.z > 0) { /* the light leaves */
 			int i = (int)fmin(v.z * BINS, BINS - 1);
 			b->sum[i] += weight;
 			b->square[i] += weight * weight;
 			return;
 		}
 		weight *= base;
-		v = vec3_neg(cosine_upwards(d)); /* seen from the boundary, where it came from */
+		v = vec3_neg(cosine_upwards(d)); /* the direction from the boundary back to the base */
 	}
 }
 
-/* What f sends into a bin of cosines: the midpoint rule. */
+/* Integrates f over a bin of cosines by the midpoint rule. */
 static double integral_over_bin(const struct bsdf *plastic, vec3 wo, int bin)
 {
 	enum { POLAR = 300, AZIMUTH = 600 };
@@ -72,7 +72,7 @@ static double integral_over_bin(const struct bsdf *plastic, vec3 wo, int bin)
 	return sum * 2 * PI / (BINS * POLAR * AZIMUTH);
 }
 
-/* The largest difference beyond what is allowed, in standard errors. */
+/* Returns the largest difference, beyond the allowed one, in standard errors. */
 static double compare(const struct bsdf *plastic, const struct bins *b, vec3 wo, double *off)
 {
 	double worst = 0;

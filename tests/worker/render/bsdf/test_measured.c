@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Measured materials (measured, after Dupuy and Jakob 2018). Files made of a known microfacet formula must give that
- * formula's values, symmetries, sampling and roughness back, spectrally and in RGB. Truncated and damaged files,
- * impossible sizes and numbers, and other files are refused with a sentence.
+ * Measured materials (measured, after Dupuy and Jakob 2018). Files made from a known microfacet formula must reproduce
+ * its values, symmetries, sampling and roughness, spectrally and in RGB. Truncated and damaged files, impossible sizes
+ * and numbers, and other files are refused with a sentence.
  */
 #include "tests/support/measured_file.h"
 #include "tests/support/nodes.h"
@@ -44,7 +44,7 @@ struct made {
 	struct error e;
 };
 
-/* The bytes stay the caller's. */
+/* The caller keeps the bytes. */
 static int try_bytes(struct made *m, const void *bytes, size_t size)
 {
 	*m = (struct made){.files = {{"m.bsdf", bytes, size}, {0}}};
@@ -67,7 +67,7 @@ static vec3 spherical(double theta, double phi)
 	return (vec3){sin(theta) * cos(phi), sin(theta) * sin(phi), cos(theta)};
 }
 
-/* Pairs for which the file has what comes to wo: at its elevations and azimuths. Half vectors as samples find them. */
+/* Pairs with wo at elevations and azimuths of the file, and half vectors as samples find them. */
 static double root_mean_square(const struct made *m, const struct measured_kind *k, double phi, double least,
 			       const struct wavelengths *w, const double tint[SPECTRUM_LANES])
 {
@@ -100,7 +100,8 @@ static void tints_of(const struct wavelengths *w, double tint[SPECTRUM_LANES])
 		tint[l] = measured_tint(w->nm[l]);
 }
 
-/* Tables of normals are bilinear, and so are colours by what the warp makes of them: a fine file has few errors. */
+/* Tables of normals are bilinear, and so are colours as functions of the warped numbers: a fine file has small
+ * errors. */
 static void test_agrees_with_its_formula(void **state)
 {
 	(void)state;
@@ -114,7 +115,7 @@ static void test_agrees_with_its_formula(void **state)
 	arena_fini(&m.arena);
 }
 
-/* What the file says for a quarter or a half of the azimuths holds for the others. */
+/* The values of a quarter or a half of the azimuths are repeated for the others. */
 static void test_anisotropic_symmetries(void **state)
 {
 	(void)state;
@@ -129,7 +130,7 @@ static void test_anisotropic_symmetries(void **state)
 		k.alpha_v = 0.5;
 		k.azimuths = ways[i].azimuths;
 		k.symmetry = ways[i].symmetry;
-		k.turn = k.symmetry == 4 ? 0 : 0.4; /* so that a half is no mirror image of the other */
+		k.turn = k.symmetry == 4 ? 0 : 0.4; /* so that one half is not the mirror image of the other */
 		k.elevations = 4;
 		k.fine = 64;
 		k.side = 16;
@@ -144,7 +145,7 @@ static void test_anisotropic_symmetries(void **state)
 	}
 }
 
-/* An isotropic one looks the same from everywhere, and turned by any angle. */
+/* An isotropic material looks the same from all azimuths, and if rotated by any angle. */
 static void test_isotropic_turns(void **state)
 {
 	(void)state;
@@ -160,8 +161,8 @@ static void test_isotropic_turns(void **state)
 	arena_fini(&m.arena);
 }
 
-/* Where all is reflected, a sample's weight is the colour over the luminance that it was chosen by, whatever the
- * distribution of facets: that is what the warps are for. */
+/* If all light is reflected, the weight of a sample is the colour over the luminance with which it was chosen, whatever
+ * the distribution of facets: this is the purpose of the warps. */
 static void test_samples_follow_the_facets(void **state)
 {
 	(void)state;
@@ -195,7 +196,7 @@ static void test_samples_follow_the_facets(void **state)
 	arena_fini(&m.arena);
 }
 
-/* Files of three channels, and colours that are not spectra. */
+/* Files with three channels, and paths that carry RGB. */
 static void test_rgb(void **state)
 {
 	(void)state;
@@ -209,7 +210,7 @@ static void test_rgb(void **state)
 	const double tint[SPECTRUM_LANES] = {measured_tint(600), measured_tint(550), measured_tint(450),
 					     measured_tint(550)};
 	assert_true(root_mean_square(&three, &k, 0, 0.2, &rgb, tint) < 0.03);
-	/* Spectra as colours: what color_of_table makes of the formula's values. */
+	/* Spectra as RGB: as color_of_table() converts the formula's values. */
 	const struct bsdf_point p = {.w = &rgb}, q = {.w = &nm};
 	vec3 wo = spherical(measured_kind_theta(&k, 1), 0), wi = spherical(0.5, 3);
 	double at[SAMPLES], value[SAMPLES];
@@ -223,7 +224,7 @@ static void test_rgb(void **state)
 	for (int l = 0; l < SPECTRUM_LANES; l++)
 		if (!(fabs(a.v[l] / d.v[l] - 1) < 0.02))
 			fail_msg("lane %d: %g, wanted %g", l, a.v[l], d.v[l]);
-	/* Colours as spectra: what images are made. */
+	/* RGB as spectra: upsampled like images. */
 	double largest = fmax(1, fmax(b.v[0], fmax(b.v[1], b.v[2])));
 	const double unit[3] = {b.v[0] / largest, b.v[1] / largest, b.v[2] / largest};
 	d = color_eval_rgb_reflectance(unit, &nm);
@@ -234,7 +235,7 @@ static void test_rgb(void **state)
 	arena_fini(&three.arena);
 }
 
-/* A constant spectrum is white, whatever the wavelengths that it is given at. */
+/* A constant spectrum is white, whatever its wavelengths are. */
 static void test_white_is_white(void **state)
 {
 	(void)state;
@@ -253,7 +254,7 @@ static void test_white_is_white(void **state)
 	arena_fini(&m.arena);
 }
 
-/* The roughness by which chains take their steps: that of GGX is met exactly but for the grid. */
+/* The roughness that determines the step sizes of chains is that of GGX, up to the resolution of the grid. */
 static void test_roughness(void **state)
 {
 	(void)state;
@@ -265,7 +266,7 @@ static void test_roughness(void **state)
 
 /* ---- broken files ---- */
 
-/* Every file that ends early is refused, or is as it was. */
+/* Every truncated file is refused, unless nothing that is used is missing. */
 static void test_truncated(void **state)
 {
 	(void)state;
@@ -273,9 +274,9 @@ static void test_truncated(void **state)
 	size_t step = 1;
 	for (size_t size = 0; size < f->size; size += step) {
 		struct made m;
-		unsigned char *copy = malloc(size ? size : 1); /* so that a sanitizer sees its end */
+		unsigned char *copy = malloc(size ? size : 1); /* so that a sanitizer detects reads beyond its end */
 		memcpy(copy, f->bytes, size);
-		struct tensor t; /* the last one */
+		struct tensor t; /* the last array */
 		assert_int_equal(tensor_find(copy, size, "spectra", &t), -EINVAL);
 		assert_int_equal(try_bytes(&m, copy, size), -EINVAL);
 		arena_fini(&m.arena);
@@ -284,7 +285,7 @@ static void test_truncated(void **state)
 	}
 }
 
-/* Each byte of the head with each bit turned: refused with a reason, or read. */
+/* Flips each bit of the header: the file is refused with a reason, or read. */
 static void test_mangled(void **state)
 {
 	(void)state;
@@ -340,7 +341,7 @@ static void test_numbers(void **state)
 	replace("wavelengths", 3, minus, "ascend");
 }
 
-/* One less along a side: the arrays disagree, which is said. All of them are still within the file. */
+/* Makes a side shorter by one: the arrays disagree, which the error says, although all of them are within the file. */
 static void test_sizes(void **state)
 {
 	(void)state;
@@ -377,7 +378,7 @@ static void test_sizes(void **state)
 	free(copy);
 }
 
-/* Not a file of arrays, one of another version, and one without an array. */
+/* A file that is not a tensor file, one of another version, and one without an array. */
 static void test_other_files(void **state)
 {
 	(void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What `scale` makes of a normal map: against the same map without it. A map of one colour: against a texture that has
- * it everywhere. And that parts of a material may bend normals if they do it alike. */
+/* A normal map with `scale` is compared with an equivalent map without it, and a map of one colour with a texture that
+ * has this colour everywhere. Parts of a material may bend normals in the same way. */
 #include "tests/support/pictures.h"
 #include "tests/worker/render/bsdf/bsdf_cases.h"
 
@@ -83,7 +83,7 @@ static int blend_of(const struct scene_node *first, const struct scene_node *sec
 		    struct error *e)
 {
 	struct bend *bends = NULL;
-	/* Bumps of 0.6, without the shadowing that depends on other frames as well. */
+	/* Bump maps of 0.6, which have no shadowing function, because that depends on further frames. */
 	const struct bsdf_build build = {.arena = a, .bends = &bends};
 	struct scene_node *n = node_make(a, PLUGIN_BSDF, "blendbsdf weight=0.3");
 	node_add_child(a, n, first);
@@ -135,7 +135,8 @@ static void test_parts_that_bend_alike(void **state)
 	assert_true(b.uses_place);
 	assert_int_equal(blend_of(even[0], bent(&a, "normalmap scale=0.5", tiles, "phong"), &a, &b, &e), 0);
 	assert_true(b.uses_place);
-	/* The surface has the normal of the narrowest; what passes straight on needs none. */
+	/* The surface has the normal of the part with the narrowest lobe; a part that lets light pass straight on needs
+	 * no normal. */
 	assert_int_equal(blend_of(first, specular, &a, &b, &e), 0);
 	assert_false(b.uses_place);
 	assert_int_equal(blend_of(node_make(&a, PLUGIN_BSDF, "phong"), specular, &a, &b, &e), 0);

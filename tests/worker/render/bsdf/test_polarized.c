@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Materials of Mueller matrices: a constant table is Lambert's reflectance; one of angles against Rusinkiewicz's, which
- * are found here by rotations; wavelengths, colours, what was not measured, and files that are broken.
+ * Materials with Mueller matrices: a constant table is a Lambertian reflectance; tables of angles are compared with
+ * Rusinkiewicz's angles, computed here by rotations; wavelengths, colours, values that were not measured, and damaged
+ * files.
  */
 #include "tests/support/dice.h"
 #include "tests/support/memory_assets.h"
@@ -88,7 +89,7 @@ static void test_lambert(void **state)
 		b.z = -b.z;
 		assert_true(spectrum_is_zero(value_of(&m, a, b, &nm)));
 	}
-	/* What is reflected in all. */
+	/* The reflected share of all light. */
 	for (size_t i = 0; i < samples; i++) {
 		const double u[] = {dice_throw(&d), dice_throw(&d), dice_throw(&d)};
 		struct bsdf_sample s;
@@ -102,7 +103,7 @@ static void test_lambert(void **state)
 	arena_fini(&m.arena);
 }
 
-/* Each linear along its axis: the table is exact. */
+/* The values are linear along each axis, so the table is exact. */
 static double by_theta_h(double phi_d, double theta_d, double theta_h, double at)
 {
 	(void)phi_d, (void)theta_d, (void)at;
@@ -128,7 +129,7 @@ static double by_wavelength(double phi_d, double theta_d, double theta_h, double
 }
 
 /* Rusinkiewicz 1998: h is turned about z to azimuth 0, then about y to the pole; the direction to the light with it.
- * There, +x is the way down along the meridian. */
+ * There, +x is the tangent that points down along the meridian. */
 static void rusinkiewicz(vec3 light, vec3 camera, double angle[3])
 {
 	vec3 h = vec3_normalize(vec3_add(light, camera));
@@ -156,11 +157,11 @@ static void test_angles(void **state)
 			double wanted = tables[k](angle[0], angle[1], angle[2], 0);
 			spectrum f = value_of(&m, camera, light, &nm);
 			assert_true(fabs(f.v[0] - wanted) < 1e-5);
-			/* From a light, the other way round. */
+			/* From a light, with the directions exchanged. */
 			const struct bsdf_point p = {.w = &nm, .transport = TRANSPORT_IMPORTANCE};
 			assert_true(m.b.ops->eval(&m.b, &p, light, camera).v[0] == f.v[0]);
 		}
-		/* Where angles mean nothing: facets along the normal, and the light beside the camera. */
+		/* Directions for which angles are undefined: h along the normal, and the light at the camera. */
 		vec3 up = {0, 0, 1}, aside = {0.6, 0, 0.8};
 		assert_true(isfinite(value_of(&m, up, up, &nm).v[0]));
 		assert_true(isfinite(value_of(&m, aside, aside, &nm).v[0]));
@@ -197,7 +198,7 @@ static void test_wavelengths(void **state)
 	}
 }
 
-/* Negative numbers between others, and what was not measured. */
+/* Negative values among others, and values that were not measured. */
 static double with_holes(double phi_d, double theta_d, double theta_h, double at)
 {
 	(void)phi_d, (void)theta_d;
@@ -221,7 +222,7 @@ static void test_holes(void **state)
 	assert_true(fabs(f.v[0] - 2) < 1e-6 && fabs(f.v[1] - 1) < 1e-6 && fabs(f.v[2] - 0.2) < 1e-6 && f.v[3] == 0);
 	low = vec3_normalize(low);
 	assert_true(spectrum_is_zero(value_of(&m, low, low, &w)));
-	/* Between a number and none. */
+	/* Between a measured value and one that is not. */
 	assert_true(spectrum_is_zero(value_of(&m, (vec3){sin(1), 0, cos(1)}, (vec3){sin(1), 0, cos(1)}, &w)));
 	arena_fini(&m.arena);
 	make_or_fail(&m, green_value, 3, 3, "");
@@ -239,7 +240,7 @@ static void test_truncated_and_mangled(void **state)
 	unsigned char *bytes = polarized_file_make(chalk_value, 3, 2, &size), *copy = malloc(size);
 	for (size_t end = 0; end < size; end += end < 400 ? 1 : 37) {
 		struct made m;
-		unsigned char *part = malloc(end ? end : 1); /* so that a sanitizer sees its end */
+		unsigned char *part = malloc(end ? end : 1); /* so that a sanitizer detects reads beyond its end */
 		memcpy(part, bytes, end);
 		assert_int_equal(try_bytes(&m, part, end, ""), -EINVAL);
 		arena_fini(&m.arena);
@@ -261,7 +262,7 @@ static void test_truncated_and_mangled(void **state)
 	free(bytes);
 }
 
-/* A byte of what the head says of an array, behind its name, is changed. */
+/* A byte of the description of an array, after its name, is changed. */
 static void test_sizes(void **state)
 {
 	(void)state;
@@ -305,7 +306,7 @@ static void test_sizes(void **state)
 	assert_int_equal(try_bytes(&m, copy, size, ""), -EINVAL);
 	assert_non_null(strstr(m.e.text, "M needs matrices of 4 x 4"));
 	arena_fini(&m.arena);
-	/* Axes that do not ascend, or are not numbers. */
+	/* Axes that are not ascending, or not finite. */
 	static const unsigned char large[4] = {0, 0, 0x80, 0x40}, signals[4] = {1, 0, 0x80, 0x7f};
 	for (int k = 0; k < 2; k++) {
 		memcpy(copy, bytes, size);

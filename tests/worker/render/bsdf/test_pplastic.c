@@ -41,8 +41,8 @@ static void test_facets(void **state)
 		     "roughplastic alpha=0.3 int_ior=1.7 diffuse_reflectance=0 specular_reflectance=0.8", 1);
 }
 
-/* Of a dark base, `plastic` has the light that meets it once: of that eta^2 less, for it knows what total reflection
- * keeps inside. */
+/* With a dark base, `plastic` has only the light that the base reflects once, over eta^2, because it takes total
+ * internal reflection into account. */
 static void test_base(void **state)
 {
 	(void)state;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The principled BSDF where it is another plug-in, and its lobes where only one is there, against their formulas. */
+/* The principled BSDF is compared with other plug-ins where it is equal to them, and each lobe by itself with its
+ * formula. */
 #include "tests/worker/render/bsdf/bsdf_cases.h"
 
 #include <errno.h>
@@ -49,7 +50,8 @@ static void test_glass_is_roughdielectric(void **state)
 		     "roughdielectric alpha=0.25 distribution=ggx int_ior=1.6 ext_ior=1", 1, 1);
 }
 
-/* With index 1 the boundary is gone but for the least that there is; a black metal has only Schlick's rim left. */
+/* With an index of 1 the boundary vanishes, up to the minimum index; a black metal has only Schlick's term at grazing
+ * angles. */
 static void test_metal_is_schlick_over_ggx(void **state)
 {
 	(void)state;
@@ -72,7 +74,7 @@ static void test_metal_is_schlick_over_ggx(void **state)
 	arena_fini(&a);
 }
 
-/* The diffuse lobe of a base of 0.6, over 0.6 / pi: it is what a black one lacks. */
+/* Returns the diffuse lobe of a base of 0.6, over 0.6 / pi, as the difference to a black base. */
 static void check_diffuse(const char *parameters, double (*expected)(vec3 wo, vec3 wi))
 {
 	struct arena a = {0};
@@ -99,8 +101,8 @@ static double burley_factor(vec3 wo, vec3 wi)
 	return (1 + (f90 - 1) * pow(1 - wo.z, 5)) * (1 + (f90 - 1) * pow(1 - wi.z, 5));
 }
 
-/* As glTF says it (B.3.5): what is not reflected at the half vector is scattered evenly. Fresnel's formulas, eta 1.5.
- */
+/* As in the glTF specification (B.3.5): light not reflected at the half vector is scattered evenly. Fresnel's formulas
+ * with eta 1.5. */
 static double lambert_factor(vec3 wo, vec3 wi)
 {
 	double c = sqrt((1 + vec3_dot(wo, wi)) / 2), t = sqrt(1 - (1 - c * c) / (1.5 * 1.5));
@@ -108,7 +110,7 @@ static double lambert_factor(vec3 wo, vec3 wi)
 	return 1 - 0.5 * (s * s + p * p);
 }
 
-/* Where the reflection has a colour, eta 3: Schlick's factor, per wavelength. */
+/* A coloured reflection, with eta 3: Schlick's factor for each wavelength. */
 static double lamberts_below_colour(vec3 wo, vec3 wi)
 {
 	double c = sqrt((1 + vec3_dot(wo, wi)) / 2), f0 = 0.5 * 0.25;
@@ -123,8 +125,8 @@ static void test_diffuse(void **state)
 	check_diffuse("roughness=0.7 eta=3 lambertian=true specular_color=0.5", lamberts_below_colour);
 }
 
-/* The clear coat's half vectors are a distribution: the integral of D cos over the hemisphere is 1; what the coat adds
- * at one pair by hand. */
+/* The half vectors of the clearcoat are a distribution: the integral of D cos over the hemisphere is 1. The value that
+ * the clearcoat adds is computed by hand for one pair. */
 static void test_clearcoat(void **state)
 {
 	(void)state;
@@ -150,8 +152,8 @@ static void test_clearcoat(void **state)
 	arena_fini(&a);
 }
 
-/* The layer over a metal, whose lobe is known from the bare one: what it adds is GGX with Schlick's factor, as of
- * `roughconductor`, and what is below loses as much on both ways. */
+/* A coat over a metal, whose lobe is known without the coat: the coat adds GGX with Schlick's factor, as in
+ * `roughconductor`, and the metal loses the reflected share on the way in and on the way out. */
 static void test_coat(void **state)
 {
 	(void)state;
@@ -175,7 +177,7 @@ static void test_coat(void **state)
 	arena_fini(&a);
 }
 
-/* Light that passes into or out of glass crosses the layer once, above the surface. */
+/* Light that enters or leaves glass crosses the coat once, above the surface. */
 static void test_coat_on_glass(void **state)
 {
 	(void)state;
@@ -205,11 +207,11 @@ static void test_specular_is_an_index(void **state)
 	(void)state;
 	/* 0.08 x 0.5 at normal incidence is an index of 1.5. */
 	expect_equal("principled base_color=0 specular=0.5", "principled base_color=0 eta=1.5", 0, 1);
-	/* Exporters write a little more than 1, and Mitsuba takes any. */
+	/* Exporters write values slightly above 1, and Mitsuba accepts any. */
 	expect_equal("principled base_color=0 specular=2", "principled base_color=0 eta=2.3333333333333335", 0, 1);
 }
 
-/* A colour of the reflection scales Schlick's factor at normal incidence, as that of a metal. */
+/* A coloured reflection scales Schlick's factor at normal incidence, like that of a metal. */
 static void test_specular_color(void **state)
 {
 	(void)state;
@@ -221,14 +223,14 @@ static void test_specular_color(void **state)
 		     "principled base_color=0.7 roughness=0.4 specular_color=0.3", 0, 1);
 }
 
-/* A texture that has one value is the number, and one that varies is it at each point. */
+/* A texture with one value is equivalent to the number, and a varying one to the number at each point. */
 static void test_metallic_texture(void **state)
 {
 	(void)state;
 	expect_equal(
 		"principled base_color=rgb(0.8,0.3,0.1) roughness=0.4 | @metallic checkerboard color0=0.7 color1=0.7",
 		"principled base_color=rgb(0.8,0.3,0.1) roughness=0.4 metallic=0.7", 0, 1);
-	/* each of the shares, and the roughness of facets that goes with them */
+	/* each of the shares, and the roughness of the facets used with it */
 	static const char *const shares[] = {"spec_trans", "spec_tint",	    "sheen",	       "sheen_tint",
 					     "flatness",   "clearcoat",	    "clearcoat_gloss", "anisotropic",
 					     "coat",	   "coat_roughness"};
@@ -261,8 +263,8 @@ static double value(const char *text, vec3 wo, vec3 wi)
 	return f;
 }
 
-/* The thin sheet: reflects as the rough boundary, passes on what its rougher or smoother twin reflects (Fresnel's share
- * the other way), spreads the rest over both sides; the same from below. */
+/* The thin sheet reflects like the rough boundary, transmits like a boundary of another roughness reflects (with
+ * Fresnel's transmittance), and scatters the rest diffusely to both sides; likewise from below. */
 static void test_a_thin_sheet(void **state)
 {
 	(void)state;
@@ -290,7 +292,7 @@ static void test_a_thin_sheet(void **state)
 			 1) < 1e-13);
 }
 
-/* Textures that are the same everywhere are numbers. */
+/* Textures with the same value everywhere are equivalent to numbers. */
 static void test_a_sheet_of_textures(void **state)
 {
 	(void)state;
@@ -298,7 +300,7 @@ static void test_a_sheet_of_textures(void **state)
 		"principledthin roughness=0.6 base_color=rgb(0.8,0.3,0.1) | @spec_trans checkerboard color0=0.3 color1=0.3 | "
 		"@diff_trans checkerboard color0=0.9 color1=0.9",
 		"principledthin roughness=0.6 base_color=rgb(0.8,0.3,0.1) spec_trans=0.3 diff_trans=0.9", 1, 1);
-	/* As the number, up to 2. */
+	/* Up to 2, like the number. */
 	expect_equal("principledthin base_color=rgb(0.8,0.3,0.1) | @diff_trans checkerboard color0=1.7 color1=1.7",
 		     "principledthin base_color=rgb(0.8,0.3,0.1) diff_trans=1.7", 1, 1);
 	struct arena a = {0};
@@ -331,8 +333,8 @@ static double ggx_g1(vec3 v, double ax, double ay)
 	return 2 / (1 + sqrt(1 + (ax * ax * v.x * v.x + ay * ay * v.y * v.y) / (v.z * v.z)));
 }
 
-/* What is reflected above the surface times the cosine of wi, of base_color 0.5 and roughness 0.5, written out from
- * Mitsuba 3's documentation and Burley. wo need not be a unit vector. */
+/* Returns f times the cosine of wi for light reflected above the surface, with base_color 0.5 and roughness 0.5,
+ * written out from Mitsuba 3's documentation and Burley. wo need not be a unit vector. */
 static double written_out(const struct recipe *r, vec3 wo, vec3 wi)
 {
 	double aspect = sqrt(1 - 0.9 * r->anisotropic), ax = 0.25 / aspect, ay = 0.25 * aspect;
@@ -359,15 +361,15 @@ static double written_out(const struct recipe *r, vec3 wo, vec3 wi)
 	return facets + coat + (1 - r->metallic) * ((1 - r->spec_trans) * diffuse + sheen);
 }
 
-/* The formula gives the values that Mitsuba 3's tests of these plug-ins expect, for wo = (1, 0, 1), which is not a unit
- * vector there; the plug-ins give those of the formula. */
+/* The formula gives the values that Mitsuba 3's tests of these plug-ins expect for wo = (1, 0, 1), which is not
+ * normalised there; the plug-ins give the values of the formula. */
 static void test_all_together(void **state)
 {
 	(void)state;
 	const struct {
 		const char *text;
 		struct recipe r;
-		double mitsubas[4]; /* for wi at 0, 6, 12 and 18 nineteenths of a right angle */
+		double mitsubas[4]; /* for wi at 0, 6, 12 and 18 nineteenths of 90 degrees */
 	} cases[] = {
 		{"principled base_color=0.5 metallic=0.3 spec_tint=0.6 specular=0.4 anisotropic=0.3 clearcoat=0.3 "
 		 "clearcoat_gloss=0.5 sheen=0.9 sheen_tint=0.9 spec_trans=0.5 flatness=0.5",

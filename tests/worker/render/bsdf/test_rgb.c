@@ -10,7 +10,7 @@
 static const struct wavelengths rgb_lanes = {.rgb = true};
 static const struct bsdf_point point = {.w = &rgb_lanes, .transport = TRANSPORT_RADIANCE};
 
-/* Of silver, as computed by others with Mitsuba's rules from its tables of n and k. */
+/* n and k of silver, as others computed them by Mitsuba's rules from its tables. */
 static void test_silver(void **state)
 {
 	(void)state;
@@ -33,7 +33,7 @@ static void test_silver(void **state)
 	arena_fini(&a);
 }
 
-/* Tables of the same wavelengths are looked up together where lanes are wavelengths. */
+/* Tables with the same wavelengths are looked up together if lanes are wavelengths. */
 static void test_two_tables(void **state)
 {
 	(void)state;
@@ -45,8 +45,8 @@ static void test_two_tables(void **state)
 	assert_memory_equal(&both[1], &sb, sizeof sb);
 }
 
-/* Indices that vary over the surface: of a pattern, beyond 1 as well, and of an image, whose values end at 1. What
- * varies is relative to the outside as what does not. */
+/* Indices that vary over the surface: from a pattern, with values above 1, and from an image, whose values are limited
+ * to 1. A textured index is relative to the outside like a constant one. */
 static void test_indices_that_vary(void **state)
 {
 	(void)state;
@@ -92,8 +92,8 @@ static void test_indices_that_vary(void **state)
 	}
 }
 
-/* A tint is the base colour over its luminance, here 0.39186. It scales the 0.04 that an index of 1.5 reflects, as a
- * quarter of it does the 0.16 of an index of 7/3. */
+/* A tint is the base colour over its luminance, here 0.39186. It scales the reflectance of 0.04 of an index of 1.5, and
+ * a quarter of it scales the 0.16 of an index of 7/3. */
 static void test_tint(void **state)
 {
 	(void)state;

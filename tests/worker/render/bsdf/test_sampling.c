@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * sample() against pdf_solid(): chi-square over the sphere for every BSDF, from 16 directions each.
+ * sample() is compared with pdf_solid(), by a chi-square test over the sphere for every BSDF, from 16 directions each.
  *
- * Level: 1e-7 a test, about 350 tests, so below 1e-4 for all. Power: a roughness wrong by 10 % is found with certainty,
- * which a test of its own shows. Seeds: the name of the test.
+ * Level: 1e-7 per test, about 350 tests, so below 1e-4 for all. Power: a separate test shows that a roughness wrong by
+ * 10 % is found with certainty. Seeds: the name of the test.
  */
 #include "tests/support/length.h"
 #include "tests/support/stats.h"
@@ -19,7 +19,7 @@ static const struct wavelengths wavelengths = {.nm = {400, 500, 600, 700}};
 static const struct bsdf_point point = {
 	.where = {.u = 0.3, .v = 0.7}, .w = &wavelengths, .transport = TRANSPORT_RADIANCE};
 
-/* From straight on to 1 degree above the plane; half of them from below where light can come from there. */
+/* Directions from the normal to 1 degree above the plane; half of them from below if light can arrive from there. */
 static vec3 direction(int i, bool two_sided)
 {
 	static const double z[] = {1, 0.999, 0.95, 0.8, 0.6, 0.4, 0.2, 0.02};
@@ -29,11 +29,11 @@ static vec3 direction(int i, bool two_sided)
 
 /*
  * Each side of the surface is a disc (by the equal-area map: solid angle = 2 x area), cut into cells by polar
- * coordinates around the direction of the mirror image or of the refracted ray: radius = rho^2 x the distance to the
- * rim, so that cells are small where lobes are narrow and none crosses the horizon.
+ * coordinates around the direction of the reflected or of the refracted ray: radius = rho^2 x the distance to the rim,
+ * so that cells are small where lobes are narrow and no cell crosses the horizon.
  */
 struct chart {
-	double center[2][2]; /* on wo's side, on the other */
+	double center[2][2]; /* on wo's side, on the other side */
 	double side;	     /* sign of wo.z */
 };
 
@@ -111,7 +111,7 @@ static double integrate_adaptively(const struct integrand *f, double r0, double 
 	       integrate_adaptively(f, r, r1, p, p1, q[3], depth - 1);
 }
 
-/* The integral of the density over each cell; returns the sum. */
+/* Computes the integral of the density over each cell; returns the sum. */
 static double integrate(const struct bsdf *b, const struct chart *c, vec3 wo, double *cells)
 {
 	double total = 0;
@@ -151,7 +151,8 @@ static void check_sample(const struct bsdf *b, vec3 wo, const struct bsdf_sample
 		assert_true(close_to(s->f.v[i], f.v[i]));
 }
 
-/* p of the samples of b against the density of `model` (the same BSDF but in the test of the test). */
+/* Returns the p-value of the samples of b for the density of `model`, which is the same BSDF except in the test of the
+ * test. */
 static double chi_square(const struct bsdf *b, const struct bsdf *model, vec3 wo, uint64_t seed, double *integral)
 {
 	static uint64_t observed[CELLS + 1];
@@ -174,7 +175,7 @@ static double chi_square(const struct bsdf *b, const struct bsdf *model, vec3 wo
 		check_sample(b, wo, &s);
 		observed[s.mode & BSDF_DELTA ? CELLS : cell_of(&c, s.wi)]++;
 	}
-	/* Far tails are below the quadrature: never a count without expectation. */
+	/* The quadrature misses far tails: a cell with a count never has an expectation of 0. */
 	for (int i = 0; i <= CELLS; i++)
 		expected[i] += 1e-6;
 	return stats_counts_p(observed, expected, CELLS + 1);

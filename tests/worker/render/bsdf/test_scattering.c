@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Laws that every BSDF obeys, over all of bsdf_cases.h: reciprocity unless it says otherwise, no energy gained, white
- * furnaces, the same values without wavelengths and in any frame. Then closed forms of the simple ones, microfacet
- * values computed by hand, textured roughness, and errors: parameters that make no sense, and memory that runs out.
+ * Laws that every BSDF obeys, for all of bsdf_cases.h: reciprocity unless `directed`, no gain of energy, white
+ * furnaces, the same values without wavelengths and in any frame. Then closed forms of simple BSDFs, microfacet values
+ * computed by hand, textured roughness, and errors: invalid parameters, and lack of memory.
  */
 #include "tests/support/length.h"
 #include "tests/support/stats.h"
@@ -36,8 +36,8 @@ static void assert_near(double a, double b, double tolerance, const char *what)
 		fail_msg("%s: %.17g is not %.17g", what, a, b);
 }
 
-/* Deterministic: f(wo,wi) n_wi^2 = f(wi,wo) n_wo^2 for radiance, unless it is directed, and importance is radiance the
- * other way round. Cosines against a facet that is seen edge-on keep few digits: hence 1e-6. */
+/* Deterministic: f(wo,wi) n_wi^2 = f(wi,wo) n_wo^2 for radiance, unless it is directed, and importance is radiance with
+ * the directions exchanged. Cosines to a facet seen edge-on keep few digits, hence 1e-6. */
 static void test_reciprocity(void **state)
 {
 	(void)state;
@@ -52,7 +52,7 @@ static void test_reciprocity(void **state)
 			struct bsdf_sample s;
 			rng_uniform4(stats_seed(__func__), RNG_TEST, i, 0, 0, u);
 			vec3 wo = uniform_direction(u[0], u[1]), wi = uniform_direction(u[2], u[3]);
-			/* Half of the pairs where the lobes are. */
+			/* Half of the pairs lie within the lobes. */
 			if (i % 2 && b.ops->sample(&b, &r, wo, u, &s))
 				wi = s.wi;
 			spectrum there = b.ops->eval(&b, &r, wo, wi), back = b.ops->eval(&b, &r, wi, wo);
@@ -73,7 +73,7 @@ static void test_reciprocity(void **state)
 	assert_true(positive > BSDF_CASES * 500);
 }
 
-/* The share of light that survives, as importance (which refraction does not scale), by sampling. */
+/* Estimates the share of light that is scattered, as importance (which refraction does not scale), by sampling. */
 static struct stats_mean albedo(const struct bsdf *b, vec3 wo, enum transport t, uint64_t seed)
 {
 	enum { GROUPS = 16, SAMPLES = 1000 };
@@ -91,14 +91,15 @@ static struct stats_mean albedo(const struct bsdf *b, vec3 wo, enum transport t,
 	return stats_mean_test(means, GROUPS, 1);
 }
 
-/* Level: 8 standard errors with 15 degrees of freedom, below 1e-6 a test. A gain of 5 % anywhere would be found. */
+/* Level: 8 standard errors with 15 degrees of freedom, below 1e-6 per test. A gain of 5 % anywhere would be found. */
 static vec3 turned_by(vec3 w, double angle)
 {
 	double c = cos(angle), s = sin(angle);
 	return (vec3){c * w.x - s * w.y, s * w.x + c * w.y, w.z};
 }
 
-/* What does not say that it uses tangents is the same however the frame lies around the normal; so it gets none. */
+/* A BSDF without uses_tangents does not depend on the rotation of the frame about the normal, so it gets no
+ * tangents. */
 static void test_tangents(void **state)
 {
 	(void)state;
@@ -155,7 +156,7 @@ static void test_no_energy_is_gained(void **state)
 	assert_true(8 * widest < 0.05);
 }
 
-/* What is reflected and what is transmitted is all of the light; where both are sampled their probabilities are one. */
+/* Reflected and transmitted light add up to all light; if both lobes are sampled, their probabilities add up to 1. */
 static void test_smooth_boundaries_lose_nothing(void **state)
 {
 	(void)state;
@@ -240,7 +241,7 @@ static void test_closed_forms(void **state)
 {
 	(void)state;
 	const vec3 up = {0, 0, 1}, slant = {0.6, 0, 0.8};
-	/* The data's own check: Au at 550 nm. */
+	/* A check of the data itself: Au at 550 nm. */
 	struct bsdf_sample s = sample_of("conductor material=Au", true, up, 0);
 	assert_near(s.f.v[0], fresnel_at_normal(0.350, 2.714), 1e-3, "Au");
 	/* Others there by laws of their own: diamond's (Peter 1923), rutile's for the extraordinary ray (Devore 1951).
@@ -253,7 +254,7 @@ static void test_closed_forms(void **state)
 	assert_near(s.f.v[0], fresnel_at_normal(sqrt(7.197 + 0.3322 / (l2 - 0.0843)), 0), 2e-3, "TiO2");
 	s = sample_of("conductor material=MgO", true, up, 0);
 	assert_near(s.f.v[0], fresnel_at_normal(1.7405, 0), 2e-4, "MgO");
-	/* Copper is what 0.6 takes where nothing is said, 3.x a perfect mirror. */
+	/* The default is copper in 0.6, and a perfect mirror in 3.x. */
 	s = sample_of("conductor", false, up, 0);
 	assert_true(s.f.v[0] < 0.7 && s.f.v[3] > 0.9);
 	s = sample_of("conductor", true, up, 0);
@@ -263,7 +264,7 @@ static void test_closed_forms(void **state)
 	s = sample_of("dielectric int_ior=1.5 ext_ior=1", true, up, 0);
 	assert_near(s.f.v[0], 0.04, 1e-14, "normal incidence");
 	assert_near(s.pdf, 0.1, 1e-14, "more often than light");
-	/* Snell, and the compression of radiance. */
+	/* Snell's law, and the scaling of radiance. */
 	s = sample_of("dielectric int_ior=1.5 ext_ior=1", true, slant, 0.99);
 	assert_near(s.wi.x, -0.4, 1e-14, "Snell");
 	double below = sqrt(0.84), rs = (0.8 - 1.5 * below) / (0.8 + 1.5 * below), rp = (1.2 - below) / (1.2 + below);
@@ -275,7 +276,7 @@ static void test_closed_forms(void **state)
 	/* Brewster's angle: only half of the light, s-polarised, is reflected. */
 	s = sample_of("dielectric int_ior=1.5 ext_ior=1", true, (vec3){1.5, 0, 1}, 0);
 	assert_near(s.f.v[0] * s.wi.z, 0.5 * pow((2.25 - 1) / (2.25 + 1), 2), 1e-13, "Brewster");
-	/* Equal indices: straight on. */
+	/* With equal indices, light passes straight on. */
 	s = sample_of("roughdielectric int_ior=1.3 ext_ior=1.3", true, slant, 0);
 	assert_near(s.pdf, 1, 1e-15, "straight on");
 	assert_true(s.mode == (BSDF_TRANSMIT | BSDF_DELTA) && s.wi.x == -0.6);
@@ -457,7 +458,7 @@ static void test_refusals_say_why(void **state)
 	}
 }
 
-/* A texture that says the same everywhere is the number; one that does not is the number of the place. */
+/* A texture with the same value everywhere is equivalent to the number; a varying one to the number at each point. */
 static void test_textured_roughness(void **state)
 {
 	(void)state;

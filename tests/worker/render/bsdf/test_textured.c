@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Quantities of materials that textures may give: a texture of one value is the number, and one of two values is at
- * each point the number that it has there. */
+/* Quantities of materials that may be textured: a texture with one value is equivalent to the number, and one with two
+ * values to its number at each point. */
 #include "tests/support/dice.h"
 #include "tests/worker/render/bsdf/bsdf_cases.h"
 
@@ -9,12 +9,11 @@
 
 static const struct wavelengths wavelengths = {.nm = {400, 500, 600, 700}};
 
-/* What is written with %s in the place of the quantity, as text and as texture, for values at which the lobes differ.
- */
+/* BSDFs as text, with %s in place of the quantity, and values as text and as texture for which the lobes differ. */
 static const struct {
 	const char *before, *name, *after;
 	double low, high;
-	bool number; /* not a spectrum: Mitsuba 3 exchanges the colours of its checkerboards */
+	bool number; /* not a spectrum: Mitsuba 3 exchanges the colours of checkerboards */
 } quantities[] = {
 	{"phong specular_reflectance=0.6", "exponent", "", 3, 200, true},
 	{"principledthin spec_trans=0.7 spec_tint=0.3 roughness=0.5", "eta", "", 1.2, 2.5, true},
@@ -75,7 +74,7 @@ static void test_a_texture_is_its_value_at_each_point(void **state)
 			}
 }
 
-/* Steps of chains are as small as the narrowest lobe needs. */
+/* The roughness that determines the steps of chains is that of the narrowest lobe. */
 static void test_the_narrowest_lobe_counts(void **state)
 {
 	(void)state;

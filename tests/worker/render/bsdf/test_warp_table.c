@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Warps by bilinear densities: they are inverted exactly, and their Jacobian is the density. */
+/* Warps of bilinear densities are inverted exactly, and their Jacobian is the density. */
 #include "tests/support/stats.h"
 #include "worker/render/bsdf/warp_table.h"
 #include "worker/render/math/rng.h"
@@ -27,7 +27,7 @@ static int make_table(void **state)
 	for (uint64_t i = 0; i < SLICES * NODES; i++) {
 		double u[4];
 		rng_uniform4(stats_seed("warp"), RNG_TEST, i, 0, 0, u);
-		value[i] = u[0] < 0.3 ? 0 : u[1] * (double)(1 + i / NODES); /* slices of different sums */
+		value[i] = u[0] < 0.3 ? 0 : u[1] * (double)(1 + i / NODES); /* slices with different sums */
 	}
 	return warp_table_make(&table, SLICES, WIDTH, HEIGHT, value, &arena);
 }
@@ -81,7 +81,7 @@ static void test_inverse_and_jacobian(void **state)
 		assert_true(fabs(same - density) <= 1e-9 * (1 + density));
 		assert_true(fabs(warp_table_density(&table, &m, where) - same) <= 1e-12 * (1 + density));
 		assert_true(fabs(back[0] - u[0]) < 1e-9 && fabs(back[1] - u[1]) < 1e-9);
-		/* Inside of a cell, where the inverse is smooth. */
+		/* Inside a cell, where the inverse is smooth. */
 		double x = fmod(where[0] * (WIDTH - 1), 1), y = fmod(where[1] * (HEIGHT - 1), 1);
 		if (fmin(fmin(x, 1 - x), fmin(y, 1 - y)) < 1e-3 || density < 1e-2)
 			continue;
@@ -96,8 +96,8 @@ static void test_inverse_and_jacobian(void **state)
 	assert_true(compared > 1500);
 }
 
-/* The integral over the square is 1 for every mixture, by the midpoints of cells cut in 8 x 8: exact for what is linear
- * in each direction. */
+/* The integral over the square is 1 for every mixture, by the midpoint rule on cells cut into 8 x 8, which is exact for
+ * functions linear in each direction. */
 static void test_integral(void **state)
 {
 	(void)state;
