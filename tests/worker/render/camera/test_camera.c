@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The pinhole and the thin lens. Projection and direction are inverse, derivatives agree with central differences,
- * fov_axis and principal_point_offset mean what Mitsuba says, near and far clip across the axis, rays through the lens
- * meet in the plane of focus, and a lens without a radius is the pinhole bit for bit.
+ * The pinhole and the thin lens. Projection and direction are inverse to each other, derivatives agree with central
+ * differences, fov_axis and principal_point_offset have Mitsuba's meaning, near and far clip along the axis, rays
+ * through the lens meet in the plane of focus, and a lens with radius 0 is the pinhole bit for bit.
  */
 #include "tests/support/dice.h"
 #include "worker/render/camera/camera.h"
@@ -37,7 +37,7 @@ static void test_project_direction(void **state)
 		vec3 w = camera_direction(&c, c.position, x, y);
 		assert_true(fabs(vec3_length(w) - 1) < 1e-15);
 		assert_true(camera_project(&c, c.position, w, 1, &px, &py));
-		/* A rounding of the direction is worth `scale` / cos^2 pixels. */
+		/* Rounding of the direction amounts to `scale` / cos^2 pixels. */
 		double slack = 8e-16 * (c.scale / pow(vec3_dot(c.axes.n, w), 2) + 400);
 		assert_true(fabs(px - x) < slack && fabs(py - y) < slack);
 		assert_false(camera_project(&c, c.position, vec3_neg(w), 1, &px, &py));
@@ -65,7 +65,7 @@ static void test_principal_point(void **state)
 	assert_true(fabs(x - 30) < 1e-12 && fabs(y - 170) < 1e-12);
 }
 
-/* Solid angle of a small square of the film, by its two tangents. */
+/* The solid angle of a small square of the film, from its two tangents. */
 static void test_jacobian(void **state)
 {
 	(void)state;
@@ -79,14 +79,14 @@ static void test_jacobian(void **state)
 		vec3 dy = vec3_sub(camera_direction(&c, c.position, x, y + h),
 				   camera_direction(&c, c.position, x, y - h));
 		double solid_from_film = vec3_length(vec3_cross(dx, dy)) / (4 * h * h);
-		/* Central differences of step h: h^2 and eps / h. */
+		/* Central differences of step h, with errors h^2 and eps / h. */
 		assert_true(
 			fabs(camera_jac_film_from_solid(&c, camera_direction(&c, c.position, x, y)) * solid_from_film -
 			     1) < 1e-6);
 	}
 }
 
-/* The angle between the outermost film points of the side that fov_axis names. */
+/* The angle between the outermost film points along the side that fov_axis names. */
 static void test_fov_axes(void **state)
 {
 	(void)state;
@@ -110,7 +110,7 @@ static void test_fov_axes(void **state)
 		}
 }
 
-/* Mitsuba's camera looks along +z with +x to the LEFT of the picture; pictures count rows from the top. */
+/* Mitsuba's camera looks along +z, with +x to the LEFT of the image; rows are counted from the top. */
 static void test_orientation(void **state)
 {
 	(void)state;
@@ -139,7 +139,7 @@ static void test_orientation(void **state)
 	assert_true(fabs(x - 75) < 1e-12);
 }
 
-/* Near and far are planes across the axis, in the scene's units whatever the world's scale. */
+/* Near and far are planes across the axis, in scene units, whatever the scale of the world. */
 static void test_clip(void **state)
 {
 	(void)state;
@@ -192,7 +192,7 @@ static void test_aperture(void **state)
 		vec3 p;
 		struct camera c = lens_of(&d, &p);
 		double u[2] = {dice_throw(&d), dice_throw(&d)}, back[2], h = 1e-5;
-		/* Not on the diagonals, where the map has a crease. */
+		/* Not near the diagonals, where the map has a crease. */
 		if (fabs(fabs(u[0] - 0.5) - fabs(u[1] - 0.5)) < 2 * h)
 			continue;
 		p = camera_point(&c, u);
@@ -221,8 +221,8 @@ static void test_aperture(void **state)
 	}
 }
 
-/* The plane of focus is where the rays of a film point meet, and a film point is where the rays of a point are
- * projected. */
+/* The rays of a film point meet in the plane of focus, and the rays of a point in that plane are projected to one film
+ * point. */
 static void test_lens(void **state)
 {
 	(void)state;
@@ -249,7 +249,7 @@ static void test_lens(void **state)
 	}
 }
 
-/* Without a radius a lens is the pinhole, bit for bit, wherever it is focused. */
+/* A lens with radius 0 is the pinhole, bit for bit, wherever it is focused. */
 static void test_closed_lens(void **state)
 {
 	(void)state;

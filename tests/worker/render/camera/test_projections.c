@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The cameras of 0.6 beside pinhole and lens, each against what it is: the panorama's axes and density, the distorted
- * pinhole against its polynomial, the telecentric lens's cones. Exact but for rounding; derivatives by central
+ * The other cameras of 0.6, each compared with its definition: the axes and the density of the panorama, the polynomial
+ * of the distorted pinhole, the cones of the telecentric lens. Exact but for rounding; derivatives by central
  * differences, solid angles by quadrature.
  */
 #include "tests/support/dice.h"
@@ -46,7 +46,7 @@ static vec3 direction_seen(const struct camera *c, double x, double y)
 	return camera_direction(c, c->position, x, y);
 }
 
-/* Film points and directions belong together one to one; the density is that of small squares of the film. */
+/* The map between film points and directions is one-to-one; the density is that of small squares of the film. */
 static void check_map(const struct camera *c, const char *name)
 {
 	struct dice d = dice_of(name);
@@ -66,7 +66,7 @@ static void check_map(const struct camera *c, const char *name)
 	}
 }
 
-/* The sum over the film of solid angles of pixels. */
+/* Returns the sum of the solid angles of all pixels. */
 static double film_solid_angle(const struct camera *c)
 {
 	enum { FINE = 20 };
@@ -85,7 +85,7 @@ static void assert_direction(const struct camera *c, double x, double y, vec3 d)
 			 direction_seen(c, x, y).z);
 }
 
-/* +z is in the middle, +x (left) a quarter from the left, +y (up) on top. */
+/* +z is in the middle, +x (left) a quarter from the left, +y (up) at the top. */
 static void test_panorama(void **state)
 {
 	(void)state;
@@ -104,14 +104,14 @@ static void test_panorama(void **state)
 	assert_true(fabs(film_solid_angle(&c) / (4 * M_PI) - 1) < 1e-5);
 	assert_false(camera_has(&c, -0.1, 3) || camera_has(&c, WIDTH, 3) || camera_has(&c, 3, -0.1) ||
 		     camera_has(&c, 3, HEIGHT));
-	/* Nothing is too near or too far. */
+	/* There are no clipping planes. */
 	double low, high, x = 0, y = 0;
 	camera_clip(&c, (vec3){0, 0, -1}, &low, &high);
 	assert_true(low == 0 && high == INFINITY && camera_project(&c, c.position, (vec3){0, 0.6, -0.8}, 1e-9, &x, &y));
 	assert_true(x == 0 && y > 0 && y < 0.5 * HEIGHT);
 }
 
-/* How things at a distance move with the film point, along what they lie on: only across the ray counts. */
+/* The motion of the point seen at a distance as the film point changes; only its component across the ray matters. */
 static void test_pixels(void **state)
 {
 	(void)state;
@@ -135,7 +135,8 @@ static void test_pixels(void **state)
 	}
 }
 
-/* What a plain pinhole sees at a slope r from the axis is at r (1 + a r^2 + b r^4), for barrels and cushions. */
+/* A point that a plain pinhole images at the slope r from the axis is imaged at r (1 + a r^2 + b r^4), for barrel and
+ * pincushion distortion. */
 static void test_distortion(void **state)
 {
 	(void)state;
@@ -157,7 +158,7 @@ static void test_distortion(void **state)
 				    fabs(py - (0.5 * HEIGHT - at * sin(turn))) < 1e-12 * WIDTH);
 		}
 	}
-	/* The image of 1 - r^2 / 3 ends at r = 1, of which the film must not see anything. */
+	/* With the factor 1 - r^2 / 3, the image ends at r = 1, which must be outside the film. */
 	s = settings_of(PROJECTION_DISTORTED, -1.0 / 3, 0);
 	s.fov = 40;
 	struct camera c = camera_of(&s);
@@ -170,8 +171,8 @@ static void test_distortion(void **state)
 	assert_non_null(strstr(e.text, "kc folds the image over at the slope 0.66"));
 }
 
-/* At the distance z from the lens, rays of one film point are spread evenly over a disk of the radius R |1 - z / f|
- * around it: second moments against R^2 / 4, and the farthest. */
+/* At the distance z from the lens, the rays of one film point are distributed evenly over a disk of radius R |1 - z /
+ * f|: second moments are compared with R^2 / 4, and the largest distance with R. */
 static void test_telecentric(void **state)
 {
 	(void)state;
@@ -186,14 +187,14 @@ static void test_telecentric(void **state)
 	for (int k = 0; k < 4; k++) {
 		struct dice d = dice_of("telecentric");
 		double x = 13, y = 29, radius = 0.3 * fabs(1 - at[k] / 4), moments[3] = {0}, most = 0;
-		/* Left on the image is +x; the film is 4 units wide. */
+		/* +x is to the left in the image; the film is 4 units wide. */
 		vec3 middle = {2 - 4 * x / WIDTH, 4 * (0.5 * HEIGHT - y) / WIDTH, at[k]};
 		for (int i = 0; i < RAYS; i++) {
 			vec3 p = camera_point(&c, (double[]){dice_throw(&d), dice_throw(&d)});
 			vec3 w = camera_direction(&c, p, x, y);
 			double t = (at[k] * unit - p.z) / w.z;
 			vec3 q = vec3_scale(1 / unit, vec3_madd(p, t, w));
-			q.x += 0.1; /* the world's centre */
+			q.x += 0.1; /* offset of the centre of the world */
 			vec3 off = vec3_sub(q, middle);
 			moments[0] += off.x * off.x / RAYS;
 			moments[1] += off.y * off.y / RAYS;
@@ -203,14 +204,14 @@ static void test_telecentric(void **state)
 			assert_true(camera_project(&c, p, w, t, &px, &py) || at[k] == 0);
 			assert_true(at[k] == 0 || (fabs(px - x) < 1e-6 && fabs(py - y) < 1e-6));
 		}
-		/* A point 7 units nearer to a pinhole that is 2^20 units away. */
+		/* The point is 7 units nearer to a pinhole at a distance of 2^20 units. */
 		double slack = 1e-5, quarter = radius * radius / 4;
 		assert_true(most < radius + slack && most > 0.99 * radius - slack);
 		assert_true(fabs(moments[0] - quarter) < 0.02 * quarter + slack * slack &&
 			    fabs(moments[1] - quarter) < 0.02 * quarter + slack * slack &&
 			    fabs(moments[2]) < 0.02 * quarter + slack * slack);
 	}
-	/* Pixels per solid angle are those of the plane of focus, seen from there. */
+	/* Pixels per solid angle are those of the plane of focus, seen from the lens. */
 	vec3 axis = {0, 0, 1};
 	double distance = c.focus, per_area = camera_jac_film_from_solid(&c, axis) / (distance * distance);
 	assert_true(fabs(per_area * 4 * 4 * unit * unit / (WIDTH * WIDTH) - 1) < 1e-5);

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Area emitters: what is sampled is distributed as the pdf functions say, and these integrate to one. Chi-square at
+ * Area emitters: samples are distributed as the pdf functions say, and these integrate to one. Chi-square tests at
  * level 1e-6 each, over cells of the (u,v) square of the emitter's surface; seeds are the hash of the test's name. A
- * density wrong by 3 % in a tenth of the cells makes chi-square 0.1 x 0.03^2 x 200000 = 18 above its 96 degrees: found
- * in a few cells, by its integral always.
+ * density wrong by 3 % in a tenth of the cells raises chi-square by 0.1 x 0.03^2 x 200000 = 18 above its 96 degrees of
+ * freedom: chi-square finds it if it is concentrated in few cells, the integral always does.
  */
 #include "tests/support/bodies.h"
 #include "tests/support/memory_assets.h"
@@ -30,7 +30,7 @@ static struct world *sphere_light(const char *flip)
 		flip);
 }
 
-/* Three triangles of areas of about 1 : 18 : 1300, one of them on end. */
+/* Three triangles with areas of about 1 : 18 : 1300, one of them upright. */
 static struct world *mesh_light(void)
 {
 	static const char scene[] = "<scene version='3.0.0'>" SENSOR(
@@ -52,7 +52,7 @@ static void check_counts(const char *what, const uint64_t *counts, const double 
 		fail_msg("%s: p = %g", what, p);
 }
 
-/* A sphere's point as cell of (height, longitude): equal areas. */
+/* Returns the cell of a point of a sphere in (height, longitude); cells have equal areas. */
 static size_t sphere_cell(vec3 w)
 {
 	double u = 0.5 * (1 - w.z), v = atan2(w.y, w.x) / (2 * M_PI) + 0.5;
@@ -66,8 +66,8 @@ static vec3 cell_direction(double i, double j)
 	return (vec3){r * cos(phi), r * sin(phi), z};
 }
 
-/* Expected counts of a density over directions (per solid angle) by the midpoint rule, 16 x 16 points a cell; their
- * sum. */
+/* Computes the expected counts of a density over directions (per solid angle) by the midpoint rule, 16 x 16 points per
+ * cell; returns their sum. */
 static double expect(double (*density)(const void *, vec3), const void *arg, double n, double *expected)
 {
 	enum { SUB = 16 };
@@ -96,7 +96,7 @@ static struct emitter_point on_sphere(const struct seen *s, vec3 w)
 				      .n = vec3_scale(s->shape->normal_sign, w)};
 }
 
-/* Per solid angle of directions from the centre. */
+/* The density per solid angle of directions from the centre. */
 static double toward_density(const void *arg, vec3 w)
 {
 	const struct seen *s = arg;
@@ -137,7 +137,7 @@ static void check_sphere(const char *what, const struct seen *s, bool toward, do
 	assert_true(n - taken <= n / 10000);
 	double sum = expect(toward ? toward_density : point_density, s, (double)taken, expected);
 	print_message("%s: integral %.6f\n", what, sum);
-	/* The midpoint rule cuts the cap's border. */
+	/* The midpoint rule is inexact at the border of the cap. */
 	assert_true(fabs(sum - 1) < tolerance);
 	if (tolerance < 0.001)
 		check_counts(what, counts, expected, CELLS * CELLS);
@@ -160,8 +160,8 @@ static void test_sphere(void **state)
 	}
 }
 
-/* Over the cap that is seen: cells of the sampled cone's own numbers must fill evenly. The cone's cosine is taken from
- * the point found, so that a wrong angle, a wrong side or a wrong density shows. */
+/* Over the visible cap, cells in the numbers of the sampled cone must fill evenly. The cosine in the cone is computed
+ * from the sampled point, so that a wrong angle, a wrong side or a wrong density is found. */
 static void check_cone(const char *what, const struct seen *s)
 {
 	enum { RINGS = 64 };
@@ -181,9 +181,9 @@ static void check_cone(const char *what, const struct seen *s)
 		}
 		double own = emitter_pdf_toward(s->em, s->ref, &x);
 		assert_true(fabs(own - pdf) <= 1e-9 * pdf);
-		/* The point faces ref: r n = x - c, and ref sees it where (ref - x).n > 0. */
+		/* The point faces ref: r n = x - c, and ref sees x if (ref - x).n > 0. */
 		assert_true(vec3_dot(vec3_sub(s->ref, x.p), x.n) > 0);
-		/* Angle at the centre, as share of the cap that is seen, whose height is r - r^2 / d. */
+		/* Angle at the centre, as a share of the visible cap, whose height is r - r^2 / d. */
 		double height = (1 + vec3_dot(x.n, axis)) / (1 - r / distance);
 		assert_true(height < 1 + 1e-6);
 		counts[(size_t)fmin(height * RINGS, RINGS - 1)]++;
@@ -205,7 +205,7 @@ static void check_cone(const char *what, const struct seen *s)
 		expected[i] = (double)(n - refused) * share;
 	}
 	print_message("%s: integral %.9f, %zu of %zu refused\n", what, integral, refused, n);
-	/* Near the surface almost all of the density is in the first ring: the rule is coarser there. */
+	/* Near the surface, almost all of the density is in the first ring, where the rule is coarser. */
 	assert_true(fabs(integral - 1) < 1e-3);
 	assert_true(refused <= n / 1000);
 	for (int i = 0; i < RINGS; i++)
@@ -236,7 +236,7 @@ static double cosine_density(const void *arg, vec3 w)
 	return s->em->ops->pdf_direction(s->em, &x, w);
 }
 
-/* back: the share of directions against the normal, where light leaves as it does along it unless the share is 0. */
+/* back: the share of directions against the normal; unless it is 0, both sides emit alike. */
 static void check_direction(const char *what, struct world *w, double back)
 {
 	static uint64_t counts[CELLS * CELLS];
@@ -272,8 +272,8 @@ static void check_direction(const char *what, struct world *w, double back)
 	"<shape type='" shape "'><emitter type='area'><boolean name='two_sided' value='true'/></emitter></shape>" \
 	"<shape type='sphere'><float name='radius' value='4'/></shape>"
 
-/* Few leave against the normal where the surface encloses a body smaller than the scene, half elsewhere; the power is
- * that of two sides. */
+/* If the surface encloses a body smaller than the scene, few directions are sampled against the normal; otherwise half
+ * of them. The power is that of two sides. */
 static void test_direction(void **state)
 {
 	(void)state;
@@ -299,7 +299,8 @@ static void test_direction(void **state)
 	world_free(w[1]);
 }
 
-/* Triangles by area, and evenly inside each: four equal parts of each triangle (by its midpoints) get the same. */
+/* Triangles are chosen by area, and points evenly within each: the four parts of a triangle, cut at its midpoints, get
+ * equal counts. */
 static void test_mesh(void **state)
 {
 	(void)state;
@@ -348,7 +349,7 @@ static void test_mesh(void **state)
 	world_free(w);
 }
 
-/* The ends of the square of random numbers give points, too. */
+/* Random numbers on the border of the unit square give points, too. */
 static void test_corners(void **state)
 {
 	(void)state;
@@ -371,7 +372,7 @@ static void test_corners(void **state)
 	}
 }
 
-/* A texture on the light is the same however its points are found: drawn from it, drawn towards a point, or hit by a
+/* A texture on the light has the same value whether a point is sampled, sampled towards another point, or hit by a
  * ray. */
 static void test_texture_coordinates(void **state)
 {

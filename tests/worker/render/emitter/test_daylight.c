@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Daylight: figures that are known from elsewhere (where the sun stands, how bright noon is), the picture against the
- * model, and what is refused.
+ * Daylight: figures known from elsewhere (the position of the sun, the brightness of noon), the image compared with the
+ * model, and errors.
  */
 #include "tests/support/nodes.h"
 #include "worker/render/emitter/daylight.h"
@@ -24,7 +24,8 @@ static double luminance(const double rgb[3])
 	return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
 }
 
-/* Solstices and equinoxes: noon stands at 90 - latitude +- 23.4 degrees, in the south; days begin in the east. */
+/* Solstices and equinoxes: at noon the sun is at an elevation of 90 - latitude +- 23.4 degrees, in the south; it rises
+ * in the east. */
 static void test_where_the_sun_stands(void **state)
 {
 	(void)state;
@@ -49,7 +50,7 @@ static void test_where_the_sun_stands(void **state)
 		t.hour = 15;
 		assert_true(daylight_position(&t).x < -0.4);
 	}
-	/* Tokyo, 139.7 degrees east: noon is 19 minutes before the clock's, less the equation of time. */
+	/* Tokyo, 139.7 degrees east: noon is 19 minutes before 12 o'clock, minus the equation of time. */
 	struct daylight_time t = {.latitude = 35.7,
 				  .longitude = 139.7,
 				  .zone = 9,
@@ -60,8 +61,8 @@ static void test_where_the_sun_stands(void **state)
 	assert_true(fabs(daylight_position(&t).x) < 0.02);
 }
 
-/* By the Astronomical Almanac's approximate formulas (section C, "Low precision formulas for the Sun"), whose numbers
- * are others: hour angle from mean longitude, anomaly and Greenwich's sidereal time, all in degrees. */
+/* By the Astronomical Almanac's approximate formulas (section C, "Low precision formulas for the Sun"), whose
+ * coefficients differ: hour angle from mean longitude, anomaly and Greenwich sidereal time, all in degrees. */
 static vec3 by_the_almanac(const struct daylight_time *t, double days)
 {
 	double d = days + (t->hour - t->zone) / 24, r = PI / 180;
@@ -69,7 +70,7 @@ static vec3 by_the_almanac(const struct daylight_time *t, double days)
 	double along = (q + 1.915 * sin(g) + 0.020 * sin(2 * g)) * r, tilt = (23.439 - 0.00000036 * d) * r;
 	double ascension = atan2(cos(tilt) * sin(along), cos(along)), declination = asin(sin(tilt) * sin(along));
 	double turn = (15 * (18.697374558 + 24.06570982441908 * d) + t->longitude) * r - ascension, l = t->latitude * r;
-	/* Eastward, up and southward parts of the direction, by turning about the poles' axis. */
+	/* Components of the direction to the east, up and to the south, by rotating about the earth's axis. */
 	return (vec3){-cos(declination) * sin(turn), sin(declination) * sin(l) + cos(declination) * cos(l) * cos(turn),
 		      cos(declination) * sin(l) * cos(turn) - sin(declination) * cos(l)};
 }
@@ -79,7 +80,7 @@ static void test_the_almanac(void **state)
 	(void)state;
 	static const struct {
 		struct daylight_time t;
-		int days; /* from January 1, 2000 */
+		int days; /* since January 1, 2000 */
 	} cases[] = {
 		{{35.6894, 139.6917, 9, 15, 2010, 7, 10}, 3843}, {{50, 0, 0, 9.5, 2000, 1, 1}, 0},
 		{{-33.9, 151.2, 10, 8, 2023, 12, 21}, 8755},	 {{69.6, 18.9, 1, 23, 2024, 6, 21}, 8938},
@@ -93,7 +94,7 @@ static void test_the_almanac(void **state)
 	}
 }
 
-/* In the open, from the sun and from the sky. */
+/* Illuminance of open ground by the sun and by the sky. */
 static void test_how_bright_it_is(void **state)
 {
 	(void)state;
@@ -101,7 +102,7 @@ static void test_how_bright_it_is(void **state)
 	daylight_sun(3, sun, rgb);
 	double solid = PI * DAYLIGHT_SUN_RADIUS * DAYLIGHT_SUN_RADIUS, lux = 683 * CIE_Y_SUM;
 	double direct = luminance(rgb) * lux * solid;
-	/* A clear noon has 70 to 110 klx from the sun, and 10 to 25 from the sky, which the model makes brighter. */
+	/* At noon on a clear day, the sun gives 70 to 110 klx, and the sky 10 to 25, more in the model. */
 	assert_true(direct > 7e4 && direct < 1.1e5);
 	struct daylight d = daylight_of(3, (const double[3]){0.2, 0.2, 0.2}, sun);
 	double sky = 0;
@@ -115,17 +116,17 @@ static void test_how_bright_it_is(void **state)
 		}
 	print_message("sun %.0f lx, sky %.0f lx\n", direct, sky);
 	assert_true(sky > 8e3 && sky < 4e4);
-	/* Blue far from the sun; below the horizon nothing. */
+	/* Far from the sun the sky is blue; below the horizon it is black. */
 	daylight_sky(&d, 60 * PI / 180, 90 * PI / 180, rgb);
 	assert_true(rgb[2] > 1.3 * rgb[0]);
 	daylight_sky(&d, 1.6, 1, rgb);
 	assert_true(rgb[0] == 0 && rgb[1] == 0 && rgb[2] == 0);
-	/* A red sun low in the haze. */
+	/* A low sun in haze is red. */
 	daylight_sun(8, 85 * PI / 180, rgb);
 	assert_true(rgb[0] > 3 * rgb[2]);
 }
 
-/* X, Y and Z, W / (m^2 sr), as the model's authors' own program computes them. */
+/* X, Y and Z in W / (m^2 sr), as computed by the program of the model's authors. */
 static void test_the_model(void **state)
 {
 	(void)state;
@@ -178,7 +179,7 @@ static int make_emitter(struct arena *a, const char *text, bool dialect_3, struc
 	return emitter_create(em, n, &build, e);
 }
 
-/* The sun's light is all there, whatever the size of its disk, and comes from where it stands. */
+/* The image contains all light of the sun, whatever the size of its disk, in the right direction. */
 static void test_picture(void **state)
 {
 	(void)state;
@@ -206,7 +207,7 @@ static void test_picture(void **state)
 			sum += l;
 			mean = vec3_madd(mean, l, x.p);
 		}
-		/* Grey is the largest of the three by its upsampled colour: within the colour's own tenth. */
+		/* Compares the largest component; the upsampled colour may differ by a tenth of it. */
 		double most = fmax(expected[0], fmax(expected[1], expected[2])) * PI * DAYLIGHT_SUN_RADIUS *
 			      DAYLIGHT_SUN_RADIUS;
 		print_message("%s: %.3g of the sun\n", texts[i], sum / most);
@@ -228,7 +229,7 @@ static double radiance_seen(const struct emitter *em, double angle, double azimu
 	return seen_at(em, angle, azimuth, &(struct wavelengths){.grey = true});
 }
 
-/* A brighter ground brightens the sky, a green one the green in it; the dialects assume different ones. */
+/* A brighter ground makes the sky brighter, and a green one its green; the defaults of the dialects differ. */
 static void test_ground(void **state)
 {
 	(void)state;
@@ -253,8 +254,8 @@ static void test_ground(void **state)
 	arena_fini(&a);
 }
 
-/* `stretch` moves the sky down, `extend` fades it out below the horizon: both by the formula at some angles, which the
- * map interpolates. */
+/* `stretch` moves the sky down, `extend` fades it out below the horizon: both are compared with the formula at some
+ * angles, between which the map interpolates. */
 static void test_below_the_horizon(void **state)
 {
 	(void)state;
@@ -266,7 +267,7 @@ static void test_below_the_horizon(void **state)
 	assert_int_equal(make_emitter(&a, "sky stretch=1.5", false, &stretched, &e), 0);
 	assert_int_equal(make_emitter(&a, "sky extend=true", false, &extended, &e), 0);
 	for (double azimuth = 0; azimuth < 6; azimuth += 0.7) {
-		/* The map's first row below the horizon, whose light the model gives only above it. */
+		/* The first row of the map below the horizon, for which the model is evaluated just above it. */
 		double horizon = radiance_seen(&extended, 0.5 * PI + 0.5 * PI / 256, azimuth);
 		assert_true(fabs(horizon / radiance_seen(&plain, 0.5 * PI - 0.5 * PI / 256, azimuth) - 1) < 0.2);
 		for (double angle = 0.05; angle < 3.1; angle += 0.1) {
@@ -274,7 +275,7 @@ static void test_below_the_horizon(void **state)
 			double above = radiance_seen(&plain, angle / 1.5, azimuth), fade = 2 - 2 * angle / PI;
 			assert_true(radiance_seen(&defaults, angle, azimuth) == l);
 			assert_true((l > 0) == (angle < 0.5 * PI));
-			if (fabs(angle - 0.75 * PI) > 0.05) /* its edge */
+			if (fabs(angle - 0.75 * PI) > 0.05) /* not at its edge */
 				assert_true(fabs(s - above) <= 0.02 * above);
 			double below = horizon * fade * fade * (3 - 2 * fade);
 			double x = radiance_seen(&extended, angle, azimuth), due = angle < 0.5 * PI ? l : below;
@@ -284,7 +285,8 @@ static void test_below_the_horizon(void **state)
 	arena_fini(&a);
 }
 
-/* What scales which part: 0.6's `scale` is a default, and all that sky and sun have; 3.x's multiplies. */
+/* The parameters that scale sky and sun: in 0.6, `scale` is a default, and the only scale of `sky` and `sun`; in 3.x,
+ * it is a further factor. */
 static void test_scales(void **state)
 {
 	(void)state;
@@ -312,13 +314,13 @@ static void test_scales(void **state)
 		const struct wavelengths grey = {.grey = true};
 		double l = one.ops->radiance(&one, &x, vec3_neg(x.p), &grey).v[0];
 		double due = skies[i].factor * l, is = em.ops->radiance(&em, &x, vec3_neg(x.p), &grey).v[0];
-		if (!(l > 0 && fabs(is - due) <= 0.03 * due)) /* the maps have different sizes */
+		if (!(l > 0 && fabs(is - due) <= 0.03 * due)) /* the maps have different resolutions */
 			fail_msg("%s: %g, not %g", skies[i].text, is, due);
 		arena_fini(&a);
 	}
 }
 
-/* The middle of the light. */
+/* Returns the mean direction of the light. */
 static vec3 middle_of(const struct emitter *em)
 {
 	enum { N = 200 };
@@ -333,8 +335,8 @@ static vec3 middle_of(const struct emitter *em)
 	return vec3_normalize(mean);
 }
 
-/* By time and place: south and west are +z and -x in 0.6, +x and +y in 3.x. `stretch` takes the disk down along its
- * meridian. */
+/* If the sun is given by time and place, south and west are +z and -x in 0.6, +x and +y in 3.x. `stretch` moves the
+ * disk down along its meridian. */
 static void test_which_way_is_north(void **state)
 {
 	(void)state;
@@ -355,7 +357,7 @@ static void test_which_way_is_north(void **state)
 	arena_fini(&a);
 }
 
-/* With the sun in that direction. */
+/* Creates an emitter with the sun in the given direction. */
 static int make_under(struct arena *a, const char *type, vec3 sun, struct emitter *em, struct error *e)
 {
 	struct scene_node *n = node_make(a, PLUGIN_EMITTER, type);
@@ -365,7 +367,7 @@ static int make_under(struct arena *a, const char *type, vec3 sun, struct emitte
 	return emitter_create(em, n, &(struct emitter_build){.arena = a, .scale = 1}, e);
 }
 
-/* As in Mitsuba, the sun may stand on the horizon: the sky is light, and the sun's upper half is there. */
+/* As in Mitsuba, the sun may be on the horizon: the sky is bright, and the upper half of the sun is visible. */
 static void test_on_the_horizon(void **state)
 {
 	(void)state;

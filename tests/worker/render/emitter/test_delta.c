@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Emitters that nothing hits: where they are, what they send out in which direction, and that directions are drawn as
- * densities say. Chi-square at level 1e-6; a density wrong by 3 % everywhere in a half of the cells is found with
- * certainty. The rest is exact but for rounding.
+ * Delta emitters: their positions, their intensity by direction, and the densities of sampled directions. Chi-square
+ * tests at level 1e-6; a density wrong by 3 % in half of the cells is found with certainty. Everything else is exact
+ * but for rounding.
  */
 #include "worker/render/render.h"
 #include "tests/support/dice.h"
@@ -20,10 +20,10 @@
 #define LEVEL 1e-6
 
 static const struct wavelengths grey = {.grey = true};
-/* What intensity 1 stands for. */
+/* The spectrum of intensity 1. */
 static const struct color white = {.shape = COLOR_SHAPE_D65, .scale = 1, .d65 = true};
 
-/* A ball at (10, 0, 0) of radius 4: the world is scaled by a power of two and moved. */
+/* A sphere at (10, 0, 0) of radius 4, so that the world is translated and scaled by a power of two. */
 static struct world *world_of(const char *version, const char *emitters)
 {
 	static char text[4096];
@@ -55,8 +55,8 @@ static bool near(vec3 a, vec3 b)
 	return vec3_length(vec3_sub(a, b)) < 1e-12 * (1 + vec3_length(b));
 }
 
-/* Both dialects, both ways of saying where. Light falls off with the square of the distance in the scene's own units.
- */
+/* Both dialects, and both ways of giving the position. Light falls off with the square of the distance in scene
+ * units. */
 static void test_places(void **state)
 {
 	(void)state;
@@ -104,7 +104,7 @@ static void test_places(void **state)
 	}
 }
 
-/* Cones of u[0]: directions in equal parts of the cap, and their density; power by quadrature. */
+/* Directions for intervals of u[0] fall into equal parts of the cap; their density; and the power by quadrature. */
 static void check_directions(const char *name, const struct emitter *em, vec3 axis, double cap, double power)
 {
 	enum { CELLS = 12 };
@@ -122,7 +122,7 @@ static void check_directions(const char *name, const struct emitter *em, vec3 ax
 		vec3 l = frame_to_local(&f, w);
 		double down = (1 - l.z) / cap, turn = atan2(l.y, l.x) / (2 * M_PI);
 		assert_true(down < 1 + 1e-12);
-		/* At the cone's very edge rounding may say that nothing is sent. */
+		/* On the edge of the cone, the intensity may round to 0. */
 		assert_true(em->ops->pdf_direction(em, &x, w) == pdf || down > 1 - 1e-12);
 		size_t row = (size_t)fmin(down * CELLS, CELLS - 1),
 		       column = (size_t)fmin((turn < 0 ? turn + 1 : turn) * CELLS, CELLS - 1);
@@ -144,7 +144,7 @@ static void check_directions(const char *name, const struct emitter *em, vec3 ax
 	double p = stats_counts_p(counts, expected, CELLS * CELLS);
 	print_message("%s: p = %.2g, power %.5g\n", name, p, total);
 	assert_true(fabs(sum - 1) < 1e-9 && p > LEVEL);
-	/* The fall-off begins like a root of the height. */
+	/* The fall-off begins like a square root of the height. */
 	assert_true(fabs(total / power - 1) < 1e-3);
 }
 
@@ -189,7 +189,7 @@ static void test_directions(void **state)
 	world_free(w);
 }
 
-/* One value in place of a picture: Mitsuba 0.6 ignores it. */
+/* A constant instead of an image, which Mitsuba 0.6 ignores. */
 static void test_even_texture(void **state)
 {
 	(void)state;

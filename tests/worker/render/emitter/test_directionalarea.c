@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Beams: each sampled direction carries the same power, densities integrate to one, and next event estimation finds the
- * irradiance that follows from the power per area alone, M on a plane and M r^2 / d^2 at the distance d from the centre
- * of a sphere. tests/worker/render/path/test_closed_form.c has a floor under a beam.
+ * Beams: each sampled direction carries the same power, densities integrate to one, and next event estimation gives the
+ * irradiance that follows from the power per area alone: M from a plane, and M r^2 / d^2 at the distance d from the
+ * centre of a sphere. tests/worker/render/path/test_closed_form.c has a floor under a beam.
  *
- * Irradiance by 40,000 samples, 8 standard errors with 15 degrees of freedom, below 1e-6 a test; the errors are below
- * 0.2 %, so 2 % would be found. Integrals by the midpoint rule are exact to 1e-4.
+ * Irradiance is estimated with 40,000 samples, 8 standard errors with 15 degrees of freedom, below 1e-6 per test;
+ * standard errors are below 0.2 %, so that an error of 2 % would be found. Integrals by the midpoint rule are exact to
+ * 1e-4.
  */
 #include "tests/support/bodies.h"
 #include "tests/support/length.h"
@@ -25,13 +26,13 @@ static const double power = 2.5, half_angle = 1e-3;
 #define EYE SENSOR("0,0,9", "0,0,0")
 static const struct wavelengths grey = {.grey = true};
 
-/* A shape that shines, with what else it has. */
+/* A world with one emitting shape, with the given contents. */
 static struct world *beam(const char *shape, const char *more)
 {
 	return world_of_text(8, 8, EYE "<shape type='%s'>%s" BEAM "</shape>", shape, more);
 }
 
-/* Tilted and far from the origin, so that its corners are rounded. */
+/* A plane that is tilted and far from the origin, so that its corners are rounded. */
 static struct world *plane_beam(const char *shape)
 {
 	return beam(shape, "<transform name='to_world'><scale x='1' y='1.5'/><rotate x='1' y='.5' z='.2' angle='37'/>"
@@ -90,7 +91,7 @@ static void test_directions(void **state)
 	}
 }
 
-/* On a surface at ref that faces the light, n from ref to it. */
+/* Estimates the irradiance of a surface at ref that faces the light; n: from ref towards the light. */
 static struct stats_mean irradiance(const struct emitter *em, vec3 ref, vec3 n, const char *name)
 {
 	enum { GROUPS = 16 };
@@ -121,7 +122,7 @@ static void expect_irradiance(const struct emitter *em, vec3 ref, vec3 n, double
 	assert_true(test_scaled() || m.error <= 0.002 * expected);
 }
 
-/* Normal of a plane, from points that are far apart. */
+/* Returns the normal of a plane, from points that are far apart. */
 static vec3 plane_normal(const struct emitter *em)
 {
 	static const double u[3][2] = {{0.1, 0.3}, {0.45, 0.9}, {0.8, 0.6}};
@@ -142,20 +143,20 @@ static void check_plane(const char *shape)
 	const double distances[] = {1e-3, 0.1, 3, 10};
 	assert_true(em->ops->sample_point(em, (double[]){0.4, 0.7}, &x, &pdf));
 	vec3 n = plane_normal(em);
-	double side = sqrt(1 / pdf); /* of a square of that area, in the rescaled world */
+	double side = sqrt(1 / pdf); /* side of a square of the light's area, in the rescaled world */
 	for (int i = 0; i < 4; i++) {
 		char name[64];
 		snprintf(name, sizeof name, "%s at %g", shape, distances[i]);
 		vec3 ref = vec3_madd(x.p, distances[i] * side, n);
 		expect_irradiance(em, ref, vec3_neg(n), power, name);
 	}
-	/* Behind it, and beside it. */
+	/* Points behind the plane, and beside it. */
 	struct frame f = frame_around(n);
 	struct stats_mean behind = irradiance(em, vec3_madd(x.p, -side, n), n, "behind");
 	struct stats_mean beside =
 		irradiance(em, vec3_madd(vec3_madd(x.p, side, n), 3 * side, f.s), vec3_neg(n), "beside");
 	assert_true(behind.mean == 0 && beside.mean == 0);
-	/* The density integrates to one over what it covers: the disc around the projection. */
+	/* The density integrates to one over the disc around the projection. */
 	enum { RINGS = 4000 };
 	double t = 0.5 * side, sum = 0;
 	vec3 ref = vec3_madd(x.p, t, n);
@@ -193,7 +194,7 @@ static void test_sphere(void **state)
 	world_free(w);
 }
 
-/* Of a surface that is neither, places are not looked for. */
+/* On a surface that is neither a plane nor a sphere, the shining part is not searched for. */
 static void test_bent(void **state)
 {
 	(void)state;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Emitters at infinity: sampling against density, density against radiance, orientation.
+ * Emitters at infinity: sampling compared with the density, the density with the radiance, and the orientation.
  *
- * Level: 1e-7 a test, about 20 tests. Power: an exchange of the density's cells, or half a cell's shift, is found with
- * certainty (a test of its own shifts them).
+ * Level: 1e-7 per test, about 20 tests. Power: exchanging cells of the density, or shifting them by half a cell, is
+ * found with certainty (a separate test shifts them).
  */
 #include "tests/support/nodes.h"
 #include "tests/support/pictures.h"
@@ -25,7 +25,7 @@
 
 enum { WIDTH = 8, HEIGHT = 6, COLUMNS = 2 * WIDTH, CELLS = 2 * HEIGHT * COLUMNS, SAMPLES = 100000 };
 
-/* In 3.x the outer rows are the poles; elsewhere they are half a pixel away. */
+/* In 3.x the outer rows are at the poles; otherwise they are half a pixel away from them. */
 static bool dialect_3;
 static int rows(void)
 {
@@ -46,7 +46,7 @@ struct fixture {
 	struct asset_source source;
 };
 
-/* p0: many levels in colour; p1: black but for one pixel; p2: one pixel; p3: a sun on the upper row; p4: black. */
+/* p0: many colours; p1: black except for one pixel; p2: one pixel; p3: a sun in the upper row; p4: black. */
 static int setup(void **state)
 {
 	static struct fixture f;
@@ -115,7 +115,8 @@ static spectrum radiance_at(const struct emitter *em, vec3 d, const struct wavel
 	return em->ops->radiance(em, &x, vec3_neg(d), w);
 }
 
-/* Half pixels both ways: densities that are constant between pixel centres are constant here. shift: in columns. */
+/* Cells of half a pixel in both directions, in which a density that is constant between pixel centres is constant.
+ * shift: in columns. */
 static double expected_counts(const struct emitter *em, double shift, double *cells)
 {
 	double total = 0;
@@ -173,7 +174,7 @@ static void test_samples_follow_the_density(void **state)
 	assert_true(chi_square(&em, 1, stats_seed(__func__)) < LEVEL);
 }
 
-/* The integral of the radiance two ways; the density is positive wherever there is light. */
+/* Computes the integral of the radiance in two ways; the density is positive wherever there is light. */
 static void test_radiance_over_density(void **state)
 {
 	enum { GROUPS = 16, STEPS = 400 };
@@ -211,7 +212,7 @@ static void test_orientation(void **state)
 	assert_true(radiance_at(&em, vec3_neg(d), &grey).v[0] == 0);
 	assert_int_equal(em.shape, COLOR_SHAPE_D65);
 
-	/* A quarter turn about y takes +z to +x; a scale changes nothing; the density turns along. */
+	/* A rotation by 90 degrees about y moves +z to +x; a scale has no effect; the density rotates with the map. */
 	const mat4 turn = {{{0, 0, 2, 0}, {0, 2, 0, 0}, {-2, 0, 0, 0}, {0, 0, 0, 1}}};
 	struct emitter turned = make_emitter(*state, "envmap filename=p1 scale=3", &turn);
 	vec3 e = {d.z, d.y, -d.x};
@@ -223,7 +224,7 @@ static void test_orientation(void **state)
 	assert_true(fabs(y.p.x - x.p.z) < 1e-14 && fabs(y.p.z + x.p.x) < 1e-14 && fabs(pdf / pdf_turned - 1) < 1e-9);
 }
 
-/* Directions at which the red of p0 is seen. All columns meet at the poles of 3.x, so not exactly there. */
+/* Directions at which the red of p0 is seen; not exactly at the poles of 3.x, where all columns meet. */
 static void test_pixel_centres(void **state)
 {
 	struct emitter em = make_emitter(*state, "envmap filename=p0", NULL);
@@ -256,7 +257,7 @@ static void test_poles_and_ends(void **state)
 	}
 }
 
-/* Uneven scales, sheared and mirrored; an exchange of two axes, stretched along one. */
+/* Uneven scales, with shear and reflection; an exchange of two axes with a stretch along one. */
 static const mat4 stretches[] = {
 	{{{1, 0, 0, 0}, {0, 3, 0, 0}, {0, 0, 0.5, 0}, {0, 0, 0, 1}}},
 	{{{1, 0.5, 0, 9}, {0.25, -2, 0, 0}, {0, 1, 1, 0}, {0, 0, 0, 1}}},
@@ -264,7 +265,7 @@ static const mat4 stretches[] = {
 };
 enum { STRETCHES = sizeof stretches / sizeof *stretches };
 
-/* A direction l of the image is seen along M l. */
+/* A direction l of the image is seen in the direction M l. */
 static void check_places(struct fixture *f, const char *text, const mat4 *m, const struct emitter *em)
 {
 	struct emitter plain = make_emitter(f, text, NULL);
@@ -276,8 +277,8 @@ static void check_places(struct fixture *f, const char *text, const mat4 *m, con
 	}
 }
 
-/* Counts of samples in cells of the world against the integral of the density over them, by quadrature; the mean of
- * radiance over density against the integral of the radiance; and the numbers that give a sample. */
+/* Compares counts of samples in cells of the world with the integral of the density over these, by quadrature; the mean
+ * of radiance over density with the integral of the radiance; and point_inverse with sample_point. */
 static void check_stretched(const struct emitter *em, uint64_t seed)
 {
 	enum { ROWS = 10, SIDES = 20, FINE = 100, GROUPS = 16 };
@@ -288,7 +289,7 @@ static void check_stretched(const struct emitter *em, uint64_t seed)
 	memset(expected, 0, sizeof expected);
 	for (int i = 0; i < ROWS * SIDES * FINE * FINE; i++) {
 		int y = i / (SIDES * FINE), x = i % (SIDES * FINE);
-		/* Shifted from column to column: the density jumps along whole rows. */
+		/* Points are shifted from column to column, because the density jumps along whole rows. */
 		double v = (y + fmod(0.5 + 0.6180339887 * x, 1)) / (ROWS * FINE);
 		vec3 d = direction((x + 0.5) / (SIDES * FINE), v);
 		double angle = sin(PI * v) * 2 * PI * PI / (ROWS * SIDES * FINE * FINE), p = angle * pdf_at(em, d);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * point_inverse against sample_point: there and back, and the density as one over the area that a square of random
- * numbers covers, by central differences of step h (h^2 and eps / h). Deterministic.
+ * point_inverse is the inverse of sample_point, and the density is one over the area that a square of random numbers
+ * covers, by central differences of step h (errors h^2 and eps / h). Deterministic.
  */
 #include "tests/support/dice.h"
 #include "tests/support/memory_assets.h"
@@ -27,7 +27,7 @@ static double slope(const struct emitter *em, const double u[2], double pdf, dou
 {
 	struct emitter_point a[4] = {draw(em, u[0] - h, u[1]), draw(em, u[0] + h, u[1]), draw(em, u[0], u[1] - h),
 				     draw(em, u[0], u[1] + h)};
-	/* Not across the borders of triangles or cells. */
+	/* Differences must not cross the borders of triangles or cells. */
 	for (int i = 0; i < 4; i++)
 		if (a[i].where.prim != a[0].where.prim || fabs(em->ops->pdf_point(em, &a[i]) / pdf - 1) > 1e-9)
 			return NAN;
@@ -52,7 +52,7 @@ static void check(const char *name, const struct emitter *em, double share)
 		worst = fmax(worst, vec3_length(vec3_sub(x.p, y.p)));
 		if (fabs(u[0] - 0.5) > 0.499 || fabs(u[1] - 0.5) > 0.499)
 			continue;
-		/* Only where steps of two lengths agree: roots bend at the corners of triangles. */
+		/* Only where steps of two lengths agree: the map has square roots at the corners of triangles. */
 		double area = slope(em, u, pdf, 1e-6), area2 = slope(em, u, pdf, 2e-6);
 		if (fabs(area / area2 - 1) < 1e-5) {
 			worst_slope = fmax(worst_slope, fabs(area * pdf - 1));
@@ -72,7 +72,7 @@ static void check(const char *name, const struct emitter *em, double share)
 			continue;
 		em->ops->point_inverse(em, &x, u);
 		assert_true(u[0] >= 0 && u[0] < 1 && u[1] >= 0 && u[1] < 1);
-		/* The pole where numbers are coarse: 2^-53 of the area is a circle of 1e-8. */
+		/* At the pole where numbers are coarse, 2^-53 of the area is a circle of radius 1e-8. */
 		struct emitter_point y = draw(em, u[0], u[1]);
 		assert_true(vec3_length(vec3_sub(x.p, y.p)) < 1e-7);
 	}
@@ -91,7 +91,7 @@ static void test_area(void **state)
 	check("rectangle", &w->emitters[0], 0.99);
 	check("sphere", &w->emitters[1], 0.99);
 	world_free(w);
-	/* Areas of about 1 : 18 : 1300, one of them on end, and one a sliver. */
+	/* Triangles with areas of about 1 : 18 : 1300, one of them upright, and one a sliver. */
 	static const char scene[] = "<scene version='3.0.0'>" SENSOR(
 		"0,0,9",
 		"0,0,0") "<shape type='obj'><string name='filename' value='few.obj'/><emitter type='area'/></shape></scene>";
@@ -115,7 +115,7 @@ static void test_infinite(void **state)
 	for (int i = 0; i < WIDTH * HEIGHT * 3; i++)
 		rgb[i] = ldexp(1, i / 3 * 7 % 11 - 5);
 	pictures_add(&pictures, WIDTH, HEIGHT, rgb);
-	/* A pixel in the dark: cells and rows without light. */
+	/* A single bright pixel, so that there are cells and rows without light. */
 	memset(rgb, 0, sizeof rgb);
 	rgb[3 * (3 * WIDTH + 2)] = rgb[3 * (3 * WIDTH + 2) + 1] = rgb[3 * (3 * WIDTH + 2) + 2] = 2;
 	pictures_add(&pictures, WIDTH, HEIGHT, rgb);

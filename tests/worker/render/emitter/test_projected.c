@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Pictures that emitters throw: a projector is the camera at its place the other way round, a plane across its axis is
- * lit evenly by an even picture, and the texture of a spot fills the square around its cone. Exact but for rounding;
- * the powers by 200,000 directions of the sphere, to 5 %, some five standard errors.
+ * Projected pictures: a projector is the inverse of a camera at its position, a plane across its axis is lit evenly by
+ * a constant picture, and the texture of a spot light fills the square around its cone. Exact but for rounding; powers
+ * are estimated with 200,000 directions of the sphere, to 5 %, about five standard errors.
  */
 #include "worker/render/render.h"
 #include "tests/support/dice.h"
@@ -28,7 +28,7 @@ static const double shades[WIDTH * HEIGHT] = {0.125, 0.25, 0.375, 0.5, 0.625, 0.
 	"<string name='filter_type' value='nearest'/></texture>"
 /* clang-format on */
 
-/* A ball at (10, 0, 0) seen by a camera at LOOK, 40 degrees wide, with `emitters` around it; p.hdr has the shades. */
+/* A sphere at (10, 0, 0) seen by a camera at LOOK, 40 degrees wide, with `emitters`; p.hdr is the picture. */
 static struct world *world_of(const char *emitters)
 {
 	static char text[4096];
@@ -60,7 +60,7 @@ static double radiance(const struct world *w, int i, vec3 d)
 	return em->ops->radiance(em, &x, d, &grey).v[0] / (w->scale * w->scale);
 }
 
-/* The camera's film is as wide as the picture, so that a film point sees what the picture has there. */
+/* The film of the camera has the shape of the picture, so that a film point sees the same point of the picture. */
 static void test_camera(void **state)
 {
 	(void)state;
@@ -85,7 +85,7 @@ static void test_camera(void **state)
 	world_free(w);
 }
 
-/* Irradiance of a plane at distance z: intensity times the cosine over the square of the distance. */
+/* The irradiance of a plane at distance z is the intensity times the cosine over the square of the distance. */
 static void test_plane(void **state)
 {
 	(void)state;
@@ -104,7 +104,7 @@ static void test_plane(void **state)
 	world_free(w);
 }
 
-/* Directions are drawn as the density says, and carry all the light. */
+/* Directions are sampled with their density, and carry all the light. */
 static void test_directions(void **state)
 {
 	(void)state;
@@ -123,7 +123,7 @@ static void test_directions(void **state)
 			assert_true(em->ops->sample_direction(em, &x, u, &d, &pdf));
 			assert_true(fabs(vec3_length(d) - 1) < 1e-14);
 			double again = em->ops->pdf_direction(em, &x, d);
-			/* At the very edge rounding may say that nothing is sent. */
+			/* On the edge, the intensity may round to 0. */
 			assert_true(fabs(again - pdf) < 1e-9 * pdf || again == 0);
 			sum += radiance(w, k, d) / pdf / N;
 			d = dice_direction(&dice);
@@ -141,7 +141,7 @@ static void test_directions(void **state)
 	world_free(w);
 }
 
-/* The picture's square touches the cone where it meets a plane across the axis; it multiplies. */
+/* On a plane across the axis, the square of the texture touches the cone; the texture multiplies the intensity. */
 static void test_spot(void **state)
 {
 	(void)state;
@@ -151,7 +151,7 @@ static void test_spot(void **state)
 			   "<emitter type='spot'>" LOOK
 			   "<rgb name='texture' value='0.5'/><float name='cutoff_angle' value='35'/></emitter>");
 	struct dice dice = dice_of("projected_spot");
-	/* The camera's x and y run against those of to_world. */
+	/* The camera's x and y point against those of to_world. */
 	const struct frame *f = &w->camera.axes;
 	double reach = tan(35 * M_PI / 180);
 	for (int i = 0; i < 20000; i++) {

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * `timed_sunsky` against the mean of `sky`, `sun` or `sunsky` at many times: the radiance of the sky in directions, and
- * what sky and sun send to surfaces of different slopes; what the sensor's shutter chooses; what is refused.
+ * `timed_sunsky` is compared with the mean of `sky`, `sun` or `sunsky` at many times: the radiance of the sky by
+ * direction, and the irradiance from sky and sun on surfaces of different slopes. Other cases: the part of the time
+ * that the sensor's shutter selects, and errors.
  */
 #include "tests/support/nodes.h"
 #include "tests/support/worlds.h"
@@ -29,7 +30,7 @@ static int try_emitter(struct arena *a, const char *text, double open, double cl
 	return emitter_create(em, node_make(a, PLUGIN_EMITTER, text), &build, e);
 }
 
-/* Above the horizon, +z, evenly. */
+/* Returns directions above the horizon (up is +z), evenly distributed. */
 static vec3 direction(int i)
 {
 	double z = (i + 0.5) / DIRECTIONS, r = sqrt(1 - z * z), phi = 2.399963 * i;
@@ -40,7 +41,7 @@ struct light {
 	double radiance[DIRECTIONS][3], irradiance[SLOPES][3];
 };
 
-/* Adds share times an emitter's light. Irradiance by its own samples. */
+/* Adds `share` times the light of an emitter; irradiance is estimated by its own samples. */
 static void add_light(struct light *l, const struct emitter *em, double share)
 {
 	enum { N = 128 };
@@ -77,8 +78,8 @@ static void make_light(struct light *l, const char *text, double open, double cl
 	arena_fini(&a);
 }
 
-/* The mean over `steps` times, of days from the first on, with hours from begin to end on each; a sun below the horizon
- * is refused by the others, and dark. Days of 2025, which begins with January. */
+/* Computes the mean over `steps` times, in the hours from begin to end of days from `first` on, counted from January 1,
+ * 2025. The other emitters refuse a sun below the horizon, which is therefore taken as dark. */
 static void by_steps(struct light *l, const char *what, int first, int days, double begin, double end, int steps)
 {
 	static const int length[12] = {31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31};
@@ -150,9 +151,9 @@ static void test_year(void **state)
 	compare("sky of a year", &found, &wanted, 0.03, 0.02);
 }
 
-/* Half of the shutter's time is half of the day; none, as sensors have by default, is its beginning; the emitter's own
- * times are what it is counted in. The sun that `sunsky` puts into pixels is off by a part of one, which counts on
- * slopes that it grazes. */
+/* Half of the shutter's time is half of the day; a closed interval of length 0, the default of sensors, is its
+ * beginning; times are relative to the emitter's own shutter times. The sun that `sunsky` draws is off by a fraction of
+ * a pixel, which matters on slopes at grazing angles. */
 static void test_shutter(void **state)
 {
 	(void)state;
@@ -174,7 +175,7 @@ static void test_shutter(void **state)
 	assert_true(found.irradiance[0][1] == 0);
 }
 
-/* The sensor's shutter is what counts: from dawn on there is more light than at dawn. */
+/* The sensor's shutter is used: a shutter open from dawn on gets more light than one open at dawn only. */
 static void test_in_scene(void **state)
 {
 	(void)state;

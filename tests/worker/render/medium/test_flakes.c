@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Media of SGGX microflakes in scenes: the extinction along a direction, of a matrix that is the same everywhere and of
- * one on a grid, with a density that is the same everywhere and with one on a grid; the optical depth as its integral,
- * by the midpoint rule with 200,000 steps; where the depth reaches a value; what is refused.
+ * Media of SGGX microflakes in scenes: the extinction along a direction, for constant matrices and matrices on a grid,
+ * and for constant densities and densities on a grid; the optical depth as its integral, by the midpoint rule with
+ * 200,000 steps; the distance at which the depth reaches a value; errors.
  */
 #include "tests/support/dice.h"
 #include "tests/support/memory_assets.h"
@@ -20,7 +20,7 @@
 
 static struct vol matrices, density;
 
-/* Turns from x to y along z, and thins out along x. */
+/* A matrix that rotates from x to y along z, and decreases along x. */
 static double matrix_at(double x, double y, double z, uint32_t channel)
 {
 	double c = cos(2 * z), s = sin(2 * z), size = 1 - 0.7 * x, thin = 0.1 + 0.3 * y;
@@ -59,7 +59,7 @@ static vec3 in_world(const struct world *w, vec3 p)
 	return vec3_scale(w->scale, vec3_sub(p, w->center));
 }
 
-/* Along rays through the box from -1, .2, 0 to 1, 1.7, 1. */
+/* Checks rays through the box from (-1, .2, 0) to (1, 1.7, 1). */
 static void check_depths(const struct world *w, const char *name)
 {
 	enum { STEPS = 200000 };
@@ -113,7 +113,7 @@ static void test_grids(void **state)
 		}
 }
 
-/* At the middle of a cell, the matrix is the file's, in the world's axes. */
+/* At the centre of a cell, the matrix is that of the file, in world axes. */
 static void test_values(void **state)
 {
 	(void)state;
@@ -143,7 +143,7 @@ static void test_values(void **state)
 	world_free(w);
 }
 
-/* A matrix that is the same everywhere, of six numbers and of a grid of one point, in both media. */
+/* A constant matrix, given by six numbers and by a grid of one point, in both kinds of media. */
 static void test_even(void **state)
 {
 	(void)state;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What a medium lets through: Beer and Lambert's law as the limit of many thin layers that each take their share, its
- * values at the ends of all ranges, and the units of length. Both ways of giving coefficients, and what is left where
- * an effect is switched off. Media of many shapes have a number each, those that are referred to one.
+ * The transmittance of a medium: the Beer-Lambert law as the limit of many thin layers, its values at the ends of all
+ * ranges, and units of length. Both ways of giving coefficients, and the coefficients that remain if an effect is
+ * switched off. Media of shapes are numbered individually, shared ones once.
  */
 #include "worker/render/medium/medium.h"
 #include "tests/support/memory_assets.h"
@@ -17,7 +17,7 @@
 
 #include <cmocka.h>
 
-static const vec3 nowhere = {0, 0, 0}; /* in particular */
+static const vec3 nowhere = {0, 0, 0}; /* any point */
 static const vec3 along_z = {0, 0, 1};
 
 static spectrum let_through(const struct medium *m, double distance, const struct wavelengths *w)
@@ -65,7 +65,7 @@ static void test_ends(void **state)
 	assert_true(transmittance_through(1e30, 1e30, 1e30) == 0);
 }
 
-/* Coefficients that differ by wavelength, some of them 0, given in both ways. */
+/* Coefficients that depend on the wavelength, some of them 0, given in both ways. */
 static const struct wavelengths four = {.nm = {450, 500, 550, 600}};
 static const double nm[] = {450, 500, 550, 600};
 static const double sigma_a[] = {0.5, 0, 1, 0}, sigma_s[] = {1.5, 0.25, 3, 0};
@@ -105,7 +105,8 @@ static void test_coefficients(void **state)
 	}
 }
 
-/* Whatever stands for a medium in a file of 0.6 or 3.x. -EINVAL: it is refused with this text. */
+/* Makes a world with the given description of a medium in a file of 0.6 or 3.x, or checks that it is refused with the
+ * given text. */
 static struct world *world_with(const char *version, const char *inner)
 {
 	static char xml[1 << 11];
@@ -129,7 +130,7 @@ static void check_rgb(const char *version, const char *inner, double red_s, doub
 	world_free(w);
 }
 
-/* The defaults of both dialects, and 0.6's names of materials. */
+/* The defaults of both dialects, and the names of materials in 0.6. */
 static void test_descriptions(void **state)
 {
 	(void)state;
@@ -137,8 +138,7 @@ static void test_descriptions(void **state)
 	check_rgb("0.6.0", "", 74, 74 + 3.2);
 	check_rgb("0.6.0", "<string name='material' value='Ketchup'/><float name='scale' value='10'/>", 180, 241);
 	check_rgb("0.6.0", "<string name='material' value='Chicken1'/>", 15, 15.15);
-	/* 0.6's mean cosine takes part of what is scattered away, whether the file states it or the material has one.
-	 */
+	/* The mean cosine of 0.6 reduces scattering, whether the file or the material gives it. */
 	check_rgb("0.6.0", "<string name='material' value='Regular Milk'/>", 455.13, 455.13 + 0.153);
 	check_rgb("0.6.0", "<string name='material' value='Regular Milk'/><float name='g' value='0.5'/>", 910.26,
 		  910.26 + 0.153);
@@ -148,7 +148,7 @@ static void test_descriptions(void **state)
 	check_rgb("0.6.0",
 		  "<rgb name='sigmaT' value='4,2,1'/><float name='albedo' value='0.5'/><float name='g' value='-1e-1'/>",
 		  2.2, 4.2);
-	/* What a file of 0.6 leaves out is skin1's. */
+	/* Coefficients that a file of 0.6 omits are those of skin1. */
 	check_rgb("0.6.0", "<rgb name='sigmaA' value='3,2,1'/>", 74, 77);
 	check_rgb("0.6.0", "<rgb name='sigmaS' value='3,2,1'/><float name='scale' value='2'/>", 6, 12.4);
 	check_rgb("0.6.0", "<rgb name='sigmaT' value='4,2,1'/>", 4 * 74 / 77.2, 4);

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Every phase function of the list, over its range of parameters: the integral over the sphere is 1 and that of the
- * cosine g (0 for Rayleigh's; of a table by Simpson's rule, which is exact there; of several their mean), by
- * quadrature; the cosine drawn for a number is where the distribution function, again by quadrature, has that number;
- * directions lie at that angle to the one that light came in, all around it, and have the density that they claim.
+ * Every phase function of the list, over its range of parameters. By quadrature, the integral over the sphere is 1, and
+ * that of the cosine is g (0 for Rayleigh's; for a table by Simpson's rule, which is exact for it; for several
+ * functions their mean). The cosine sampled for a number is that at which the cumulative distribution, again by
+ * quadrature, has this value; directions lie at this angle to the incident direction, all around it, and have the
+ * density that is returned.
  *
- * Of several functions, for equidistant numbers: the share of cosines below each of some bounds is the distribution
- * function there, but for one number in each part.
+ * For mixtures of functions and equidistant numbers, the share of cosines below each of some bounds is the cumulative
+ * distribution there, up to one number per part.
  */
 #include "worker/render/medium/phase.h"
 #include "worker/render/math/frame.h"
@@ -36,12 +37,12 @@ static double density_times_cosine(const struct phase *p, double cosine)
 	return cosine * density(p, cosine);
 }
 
-/* From -1 to `end`, with finer steps near the poles, where narrow functions have their peak: c = sin t. */
+/* Integrates from -1 to `end`, with finer steps near the poles, where narrow functions have their peak: c = sin t. */
 static double integral(const struct phase *p, integrand *f, double end)
 {
 	enum { STEPS = 1 << 17 };
 	double from = -M_PI / 2, to = asin(end), h = (to - from) / STEPS, sum = 0;
-	for (int i = 0; i < STEPS; i++) { /* Gauss's rule of two points */
+	for (int i = 0; i < STEPS; i++) { /* Gauss's rule with two points */
 		double middle = from + (i + 0.5) * h, off = h / (2 * sqrt(3));
 		sum += f(p, sin(middle - off)) * cos(middle - off) + f(p, sin(middle + off)) * cos(middle + off);
 	}
@@ -62,7 +63,7 @@ static void check_directions(const struct phase *p)
 			assert_true(fabs(vec3_length(wi) - 1) < 1e-12);
 			assert_true(fabs(local.z - cosine) < 1e-12);
 			sum = vec3_madd(sum, 1, local);
-			/* of a cosine that is rounded, near 1 */
+			/* the cosine is rounded near 1 */
 			assert_true(fabs(phase_eval(p, nowhere, wo, wi) / pdf - 1) < 1e-8);
 			assert_true(phase_eval(p, nowhere, wi, wo) == phase_eval(p, nowhere, wo, wi));
 		}
@@ -79,7 +80,7 @@ static void check_share(const struct phase *p, double bound, unsigned parts)
 	assert_true(fabs(integral(p, density, bound) - (double)below / NUMBERS) < 1e-6 + (double)parts / NUMBERS);
 }
 
-/* parts: between which u chooses first; 0: there are none. */
+/* parts: number of parts between which u chooses first; 0: none. */
 static void check(const struct phase *p, double mean, unsigned parts)
 {
 	enum { NUMBERS = 20 };
@@ -95,7 +96,7 @@ static void check(const struct phase *p, double mean, unsigned parts)
 	}
 	for (int end = -1; end <= 1; end += 2)
 		assert_true(isfinite(p->ops->eval(p, nowhere, end)) && p->ops->eval(p, nowhere, end) >= 0);
-	/* terms of 1 cancel down to (1 - g)^2 on the side without the peak */
+	/* on the side without the peak, terms of size 1 cancel to (1 - g)^2 */
 	assert_true(fabs(p->ops->sample(p, nowhere, 0)) <= 1 + 1e-9 &&
 		    fabs(p->ops->sample(p, nowhere, 1 - 0x1p-53)) <= 1 + 1e-9);
 	check_directions(p);
@@ -112,7 +113,7 @@ static void make_phase(struct phase *p, const struct scene_node *n)
 		fail_msg("%s", e.text);
 }
 
-/* Of one property, and of functions inside. */
+/* A node with one property, and with nested functions. */
 #define NODE(name_of_type, ...)                                        \
 	(struct scene_node)                                            \
 	{                                                              \
@@ -145,7 +146,7 @@ static void test_simple(void **state)
 	}
 }
 
-/* Of values at equal distances. */
+/* Returns the mean cosine of a table with equidistant values. */
 static double mean_of_table(const double *value, int count)
 {
 	double h = 2.0 / (count - 1), sum = 0, moment = 0;
@@ -175,14 +176,14 @@ static void test_tables(void **state)
 		make_phase(&p, &NODE("tabphase", TEXT("values", tables[i].text)));
 		check(&p, mean_of_table(tables[i].value, tables[i].count), 0);
 	}
-	/* Where they are: 1 is forwards. */
+	/* The order of values: the last one is for the cosine 1, forward scattering. */
 	make_phase(&p, &NODE("tabphase", TEXT("values", "1,2,5")));
 	assert_true(fabs(phase_eval(&p, nowhere, (vec3){0, 0, -1}, (vec3){0, 0, 1}) * 2 * M_PI - 1) < 1e-15);
 	assert_true(fabs(phase_eval(&p, nowhere, (vec3){0, 0, 1}, (vec3){0, 0, 1}) * 2 * M_PI - 0.2) < 1e-15);
 	assert_true(fabs(p.ops->eval(&p, nowhere, -0.5) * 2 * M_PI - 0.3) < 1e-15);
 }
 
-/* Henyey and Greenstein's function by a fine table. */
+/* The Henyey-Greenstein function as a fine table. */
 static void test_fine_table(void **state)
 {
 	(void)state;
@@ -198,7 +199,8 @@ static void test_fine_table(void **state)
 	for (int i = 0; i < 1000; i++) {
 		double u = (i + 0.5) / 1000, cosine = 2 * u - 1;
 		double wanted = hg.ops->eval(&hg, nowhere, cosine), drawn = hg.ops->sample(&hg, nowhere, u);
-		/* An eighth of the squared width, times the second derivative over the value: 211 at most. */
+		/* The error is an eighth of the squared width times the second derivative over the value, which is at
+		 * most 211. */
 		assert_true(fabs(table.ops->eval(&table, nowhere, cosine) / wanted - 1) < 8e-6);
 		assert_true(fabs(table.ops->sample(&table, nowhere, u) - drawn) < 2e-6);
 	}
@@ -233,7 +235,7 @@ static void test_parts(void **state)
 	}
 }
 
-/* Of a node that says nothing, and of none. */
+/* The defaults of a node without properties, and without a node. */
 static void test_defaults(void **state)
 {
 	(void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Phase functions of several parts in scenes: a weight on a grid, at the place where light is scattered; what the
- * weights of a mixture leave of the scattering coefficient; what is refused. */
+/* Phase functions with several parts in scenes: a weight on a grid, evaluated at the point of scattering; the
+ * scattering coefficient that the weights of a mixture leave; errors. */
 #include "tests/support/memory_assets.h"
 #include "tests/support/vol.h"
 #include "tests/support/worlds.h"
@@ -23,7 +23,7 @@ static double along_x(double x, double y, double z, uint32_t channel)
 	return 0.25 + 0.5 * x + 0.125 * channel;
 }
 
-/* A ball of a medium that scatters by `phase`; g.vol is `grid`. */
+/* A sphere of a medium that scatters by `phase`; g.vol is `grid`. */
 static const struct memory_file *scene_of(const char *phase)
 {
 	static char xml[2048];
@@ -48,7 +48,8 @@ static const struct memory_file *scene_of(const char *phase)
 #define MIXTURE(weights, parts) \
 	"<phase type='mixturephase'><string name='weights' value='" weights "'/>" parts "</phase>"
 
-/* Of two values along x, in the middles of the halves of the unit cube: the weight is theirs, and even beyond. */
+/* Two values along x, at the centres of the halves of the unit cube: the weight is interpolated between them, and
+ * constant beyond. */
 static void test_weight_on_grid(void **state)
 {
 	(void)state;
@@ -58,13 +59,13 @@ static void test_weight_on_grid(void **state)
 	vol_make(&grid, (const uint32_t[3]){2, 1, 1}, 1, along_x);
 	struct world *w = world_of_files(8, 8, scene_of(BLEND(ON_GRID)));
 	const struct phase *p = &w->media[0].phase;
-	vec3 wo = {0, 0.6, 0.8}, wi = {0, 0, -1}; /* on by 0.8 */
+	vec3 wo = {0, 0.6, 0.8}, wi = {0, 0, -1}; /* the cosine of the scattering angle is 0.8 */
 	double even = 1 / (4 * M_PI), forwards = even * 0.75 / pow(0.45, 1.5);
 	for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
 		double weight = places[i].weight, pdf;
 		vec3 at = vec3_scale(w->scale, vec3_sub((vec3){places[i].x, 0.3, 0.4}, w->center));
 		assert_true(fabs(phase_eval(p, at, wo, wi) - ((1 - weight) * even + weight * forwards)) < 1e-7);
-		/* The share of u that draws from the first: half of these go backwards. */
+		/* The numbers u that choose the first part: half of its directions go backwards. */
 		unsigned back = 0;
 		for (int k = 0; k < 1000; k++) {
 			vec3 drawn = phase_sample(p, at, wo, (const double[2]){(k + 0.5) / 1000, 0.3}, &pdf);
@@ -85,13 +86,13 @@ static void test_what_weights_leave(void **state)
 	const vec3 o = {0, 0, 0};
 	assert_true(fabs(medium_scattering(m, o, along_z, &wl).v[0] * w->scale - 0.7 * 2) < 1e-12);
 	assert_true(fabs(medium_extinction(m, o, along_z, &wl).v[0] * w->scale - 4) < 1e-12);
-	double table = 1.8 / (2.5 * 2 * M_PI), forwards = 0.75 / (4 * M_PI * pow(0.85, 1.5)); /* of 0.4 */
+	double table = 1.8 / (2.5 * 2 * M_PI), forwards = 0.75 / (4 * M_PI * pow(0.85, 1.5)); /* at the cosine 0.4 */
 	double found = m->phase.ops->eval(&m->phase, o, 0.4);
 	assert_true(fabs(found - (0.2 * forwards + 0.5 * table) / 0.7) < 1e-12);
 	world_free(w);
 }
 
-/* Beyond 1 all is the second. */
+/* A weight above 1 selects the second part alone. */
 static void test_weight_above_one(void **state)
 {
 	(void)state;

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * SGGX microflakes against an ellipsoid, of which they are the mirrors: rays of one direction that hit it are reflected
- * where its points, found by intersection, have their normals. The share of rays that hit it is its projected area, and
- * the directions have the density of the phase function, by counts in bins of the sphere. Directions that the phase
- * function draws have the same counts. (Level 1e-5 for each test of six ellipsoids, of 2^18 rays and 128 bins. Power:
- * if 3 % of what is in every other bin is in its neighbour instead, all of them find it.)
+ * SGGX microflakes are compared with a mirroring ellipsoid that has the same distribution of normals: parallel rays
+ * that hit it, by intersection, are reflected about its normals. The share of rays that hit is its projected area, and
+ * the reflected directions have the density of the phase function, by counts in bins of the sphere. Directions sampled
+ * from the phase function have the same counts. (Level 1e-5 for each test of six ellipsoids, with 2^18 rays and 128
+ * bins. Power: moving 3 % of every other bin to its neighbour is found for all ellipsoids.)
  *
- * Densities have an integral of 1, by quadrature; the area times the density is the same with both directions
- * exchanged; equal eigenvalues make the isotropic function.
+ * Densities have an integral of 1, by quadrature; area times density is symmetric in both directions; equal eigenvalues
+ * give the isotropic function.
  */
 #include "tests/support/dice.h"
 #include "tests/support/stats.h"
@@ -52,8 +52,8 @@ static struct phase made_of(const double s[6])
 
 /* ---- ellipsoids ---- */
 
-/* Points M u of the unit sphere's u. The area element of a normal n = C u, C the cofactors of M, is |C u| du, so the
- * projected area along w is pi |C^T w|, and S = C C^T up to that factor. */
+/* The points M u for u on the unit sphere. The normal there is n = C u, with the cofactors C of M, and the area element
+ * |C u| du, so the projected area along w is pi |C^T w|, and S = C C^T up to that factor. */
 struct ellipsoid {
 	mat4 m, inverse;
 	double s[6];
@@ -86,7 +86,7 @@ static struct ellipsoid one_of(int k)
 }
 enum { ELLIPSOIDS = 6 };
 
-/* A ray from `wo` that comes in with an offset; false: it passes the ellipsoid. */
+/* Reflects a ray from `wo` with an offset. Returns false if it misses the ellipsoid. */
 static bool reflected(const struct ellipsoid *e, vec3 wo, vec3 offset, vec3 *wi)
 {
 	vec3 o = mat4_vector(&e->inverse, vec3_madd(offset, 100, wo)), d = mat4_vector(&e->inverse, vec3_neg(wo));
@@ -108,7 +108,8 @@ static int bin_of(vec3 w)
 	return (row < ROWS ? row : ROWS - 1) * COLUMNS + (column < COLUMNS ? column : COLUMNS - 1);
 }
 
-/* The integral of the density over each bin, by the midpoint rule in the cosine and the angle; returns their sum. */
+/* Computes the integral of the density over each bin, by the midpoint rule in the cosine and the azimuth; returns the
+ * sum. */
 static double expected_in_bins(const struct phase *p, vec3 wo, double expected[BINS])
 {
 	enum { FINE = 128 };
@@ -165,7 +166,7 @@ static void check_ellipsoid(int k)
 	       "%.3g\n",
 	       k, sum, off, 100 * error / chance, of_mirrors, of_drawn);
 	assert_true(fabs(off) < 4.5 && of_mirrors > LEVEL && of_drawn > LEVEL);
-	/* The power that is stated. */
+	/* The test has the power stated above. */
 	for (int i = 0; i < BINS / 2; i++) {
 		share[2 * i] += 0.03 * share[2 * i + 1];
 		share[2 * i + 1] *= 0.97;
@@ -213,7 +214,7 @@ static void test_isotropic(void **state)
 	}
 }
 
-/* Flakes in one plane or along one line are a little rough; none let light pass. */
+/* Flakes in one plane or along one line are slightly rough; without flakes, light passes. */
 static void test_limits(void **state)
 {
 	(void)state;
@@ -231,7 +232,7 @@ static void test_limits(void **state)
 			assert_true(phase_area(&p, nowhere, a) > 0);
 		}
 	}
-	/* Of a mirror that looks up, the area seen along w is |w.z|. */
+	/* The area of a mirror facing up, seen along w, is |w.z|. */
 	struct phase p = made_of(flat[0]);
 	assert_true(fabs(phase_area(&p, nowhere, (vec3){0.6, 0, 0.8}) - 0.8) < 1e-5);
 	p = made_of((const double[6]){0, 0, 0, 0, 0, 0});

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Attributes of meshes (colours and numbers of vertices and faces) as read from PLY, serialized and OBJ files: which
- * names they get, whether integers are sRGB, what belongs to vertices and what to faces, and files that would make far
- * more numbers than they have bytes.
+ * Attributes of meshes (colours and numbers of vertices and faces) as read from PLY, serialized and OBJ files: their
+ * names, whether integers are sRGB, the order of vertices and faces, and files that would make far more numbers than
+ * they have bytes.
  */
 #include "tests/support/memory_assets.h"
 #include "tests/support/mesh_files.h"
@@ -23,7 +23,7 @@
 static void test_names(void **state)
 {
 	(void)state;
-	/* "property group channel ..." and the groups that come out. */
+	/* Properties, the group and channel of each, and the resulting groups. */
 	static const struct {
 		const char *properties, *groups;
 	} cases[] = {
@@ -119,8 +119,8 @@ static bool near(float a, double b)
 
 #define VERTICES "property float x\nproperty float y\nproperty float z\n"
 
-/* Integers stand for 0 to 1 and are sRGB, unless the shape says otherwise; a polygon's number is that of each of its
- * triangles, and one without an area takes its own with it. */
+/* Integers stand for 0 to 1 and are sRGB, unless the shape says otherwise; a polygon's number applies to each of its
+ * triangles, and that of a triangle without area is dropped with it. */
 static void test_ply_values(void **state)
 {
 	(void)state;
@@ -165,7 +165,7 @@ static void test_ply_values(void **state)
 	release(&b);
 }
 
-/* One polygon with many corners and many numbers would make far more of them than the file has bytes. */
+/* One polygon with many corners and many attributes would make far more numbers than the file has bytes. */
 static void test_ply_bound(void **state)
 {
 	(void)state;
@@ -207,8 +207,8 @@ static void test_serialized(void **state)
 	}
 }
 
-/* Three numbers after a position are an sRGB colour, also of the faces of one material; a weight is none, and colours
- * count only if each vertex of the file has one. */
+/* Three numbers after a position are an sRGB colour, also for the faces of one material; a single weight is not, and
+ * colours are used only if each vertex of the file has one. */
 static void test_obj(void **state)
 {
 	(void)state;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Curves: the tubes lie where the distance to the curve, found by searching along it, is the radius; areas and volumes
- * are those of cylinders, cones and spheres; and whatever is in a file gives a mesh or a sentence.
+ * Curves: points of the tubes are at the distance of the radius from the curve, found by searching along it; areas and
+ * volumes are those of cylinders, cones and spheres; and any file gives a mesh or an error.
  */
 #include "tests/support/built_shape.h"
 #include "tests/support/dice.h"
@@ -18,7 +18,7 @@
 #include <cmocka.h>
 
 static const double pi = 3.14159265358979323846;
-#define SCALE (pi / TUBE_SIDES / sin(pi / TUBE_SIDES)) /* of radii, tube.h */
+#define SCALE (pi / TUBE_SIDES / sin(pi / TUBE_SIDES)) /* factor of radii, tube.h */
 
 static struct built_shape build_curves(const char *type, const char *content, const void *bytes, size_t size)
 {
@@ -72,7 +72,7 @@ static void spline_at(const double (*p)[4], int count, double x, vec3 *c, double
 	*r = d[3][3];
 }
 
-/* How far q is from the spheres along the curve, over the radius of the one that is nearest. */
+/* Returns the distance of q from the spheres along the curve, over the radius of the nearest one. */
 static double distance(curve_at *at, const double (*p)[4], int count, vec3 q)
 {
 	enum { STEPS = 20000 };
@@ -137,8 +137,8 @@ static void test_surfaces(void **state)
 	check_surface("bsplinecurve", spline_at, 0.05, 150);
 }
 
-/* Normals are those of the surface between the rings, as its triangles have them: the mean over those around a vertex.
- * The radius changes fast here. */
+/* Normals are those of the surface between the rings, computed as the mean over the triangles around a vertex. The
+ * radius changes fast here. */
 static void test_normals(void **state)
 {
 	(void)state;
@@ -169,7 +169,7 @@ static void test_normals(void **state)
 		double lean = vec3_dot(mesh_unit(vec3_sub(mesh_load(m->position[i]), middle)), mesh_load(m->normal[i]));
 		steep += lean < 0.98;
 	}
-	assert_true(steep > 50); /* so a normal across the axis would not do */
+	assert_true(steep > 50); /* so that normals perpendicular to the axis would be wrong */
 	free(sum);
 	built_shape_release(&b);
 }
@@ -182,19 +182,20 @@ static bool near(double a, double b, double share)
 static void test_areas_and_volumes(void **state)
 {
 	(void)state;
-	/* A straight tube without ends: the area is exact. */
+	/* A straight tube with open ends has exactly the right area. */
 	struct built_shape b = built_ok("bsplinecurve", "", "0 0 0 0.5\n1 0 0 0.5\n2 0 0 0.5\n3 0 0 0.5\n4 0 0 0.5\n");
 	assert_true(near(built_area(&b.g.mesh), 2 * pi * 0.5 * 2, 1e-12));
 	for (uint32_t i = 0; i < b.g.mesh.vertex_count; i++)
 		assert_true(near(b.g.mesh.uv[i][1], (b.g.mesh.position[i][0] - 1) / 2, 1e-12) ||
 			    b.g.mesh.position[i][0] == 1);
 	built_shape_release(&b);
-	/* With round ends, closed, facing outwards. */
+	/* With round ends, it is closed and faces outwards. */
 	b = built_ok("linearcurve", "", "0 0 0 0.5\n0 0 3 0.5\n");
 	assert_true(near(built_volume(&b.g.mesh), pi * 0.25 * 3 + 4 * pi / 3 * 0.125, 0.05));
 	assert_true(near(built_area(&b.g.mesh), 2 * pi * 0.5 * 3 + 4 * pi * 0.25, 0.03));
 	built_shape_release(&b);
-	/* One sphere inside another, and a point twice: only the large one, whichever comes first. */
+	/* If one sphere is inside another, or a point is given twice, only the larger sphere remains, whichever comes
+	 * first. */
 	static const char *const spheres[] = {"0 0 0 1\n0.5 0 0 0.25\n", "0.5 0 0 0.25\n0 0 0 1\n",
 					      "0 0 0 1\n0 0 0 1\n", "0 0 0 0.5\n0 0 0 1\n", "0 0 0 1\n0 0 0 0.5\n"};
 	for (size_t i = 0; i < sizeof spheres / sizeof *spheres; i++) {
@@ -208,8 +209,8 @@ static void test_areas_and_volumes(void **state)
 	}
 }
 
-/* Cones between the points of a chain against the spline that v names: off by at most a twentieth of the largest radius
- * around, in position and radius together. */
+/* Cones between the points of a chain, compared with the spline at the same v, deviate by at most a twentieth of the
+ * largest radius nearby, in position and radius together. */
 static void test_chain_of_spline(void **state)
 {
 	(void)state;
@@ -244,7 +245,7 @@ static void test_chain_of_spline(void **state)
 	built_shape_release(&b);
 }
 
-/* v grows over all pieces of all curves, the same for each piece. */
+/* v grows over all pieces of all curves, by the same amount for each piece. */
 static void test_v(void **state)
 {
 	(void)state;
@@ -266,7 +267,7 @@ static void test_v(void **state)
 	}
 }
 
-/* The transform moves control points, and leaves their radii. */
+/* to_world transforms the control points, but not their radii. */
 static void test_placed(void **state)
 {
 	(void)state;
@@ -302,7 +303,7 @@ static size_t put_float(unsigned char *to, float v)
 	return 4;
 }
 
-/* Two hairs and, between them, one of a single point, which is none. */
+/* Two hairs, and between them one of a single point, which is left out. */
 static size_t binary_hair(unsigned char *to)
 {
 	static const float v[] = {0, 0, 0, 1, 0, 0, 2, 1, 0, INFINITY, 9, 9, 9, INFINITY, 0, 2, 0, 0, 3, 0};
@@ -327,7 +328,7 @@ static void test_hair(void **state)
 					"<float name='radius' value='0.05'/><transform name='to_world'>"
 					"<scale x='7' y='7' z='2'/><rotate y='1' angle='30'/></transform>",
 					"0 0 0\n0 1 0\n");
-	/* to_world scales radii as it scales z. A tube of 12 sides has the area of the cylinder, without its ends. */
+	/* to_world scales radii like its z axis. A tube of 12 sides has the area of the cylinder, without the ends. */
 	assert_true(near(built_area(&s.g.mesh), 2 * M_PI * 0.1 * 7, 0.03));
 	if (b.result)
 		fail_msg("%s", b.error.text);
@@ -335,7 +336,7 @@ static void test_hair(void **state)
 	assert_int_equal(a.g.mesh.vertex_count, c.g.mesh.vertex_count);
 	assert_memory_equal(a.g.mesh.position, b.g.mesh.position, b.g.mesh.vertex_count * sizeof *b.g.mesh.position);
 	assert_memory_equal(a.g.mesh.position, c.g.mesh.position, b.g.mesh.vertex_count * sizeof *b.g.mesh.position);
-	assert_true(near(built_area(&d.g.mesh) / built_area(&a.g.mesh), 0.25, 0.1)); /* 0.025 without a radius */
+	assert_true(near(built_area(&d.g.mesh) / built_area(&a.g.mesh), 0.25, 0.1)); /* 0.025 is the default radius */
 	built_shape_release(&a);
 	built_shape_release(&b);
 	built_shape_release(&c);
@@ -383,7 +384,7 @@ static void test_bad_files(void **state)
 	built_shape_release(&b);
 }
 
-/* Numbers of any size, repeated points, turns on the spot: a mesh of finite numbers, or an error. */
+/* Numbers of any size, repeated points and abrupt turns give a mesh of finite numbers, or an error. */
 static void test_extremes(void **state)
 {
 	(void)state;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Displaced meshes against what they stand for: no cracks whatever the base, the base itself at height 0, and
- * positions, normals and derivatives of normals that approach the analytic surface's at the expected order.
+ * Displaced meshes have no cracks, whatever the base mesh; with height 0 they are the base itself; and positions,
+ * normals and derivatives of normals converge to those of the analytic surface at the expected order.
  */
 #include "common/base/mem.h"
 #include "tests/support/failing_memory.h"
@@ -59,7 +59,7 @@ static void release(struct built *b)
 	scene_fini(&b->scene);
 }
 
-/* Different at the two ends of each unit, and nowhere smooth: the hardest case for seams. */
+/* A height that differs at the two ends of each unit and is smooth nowhere: the hardest case for seams. */
 static double rough_height(const void *user, double u, double v)
 {
 	(void)user;
@@ -101,7 +101,7 @@ static int compare_points(const double *a, const double *b)
 	return 0;
 }
 
-/* Each side of each triangle is another's, in the other direction, with exactly the same ends. */
+/* Each side of each triangle is also a side of another, in the opposite direction, with exactly the same ends. */
 static void assert_closed(const struct mesh *m)
 {
 	size_t n = 3 * (size_t)m->triangle_count;
@@ -179,7 +179,7 @@ static void test_no_cracks(void **state)
 		}
 }
 
-/* Those of triangles without an area, too: the second face has none. */
+/* Likewise those of triangles without area, such as the second face. */
 static void test_unused_vertices_stay(void **state)
 {
 	(void)state;
@@ -229,7 +229,7 @@ static void test_height_zero_is_the_base(void **state)
 	}
 }
 
-/* A cube grown by a constant: its faces lie further out, their normals are theirs but where they meet. */
+/* A cube enlarged by a constant height: its faces are further out, with their own normals except where they meet. */
 static void test_constant_on_a_cube(void **state)
 {
 	(void)state;
@@ -252,7 +252,7 @@ static void test_constant_on_a_cube(void **state)
 		assert_true(corner == 3 || edge == 2 || face == 1);
 		if (face)
 			assert_true(fmax(fabs(n.x), fmax(fabs(n.y), fabs(n.z))) > 1 - 1e-14);
-		else /* turned outwards, less than half way to the neighbour's */
+		else /* turned outwards, by less than half the angle to the neighbour's normal */
 			assert_true(vec3_dot(n, vec3_normalize(p)) > 0.5 &&
 				    fmax(fabs(n.x), fmax(fabs(n.y), fabs(n.z))) < 0.999);
 	}
@@ -262,14 +262,15 @@ static void test_constant_on_a_cube(void **state)
 	release(&b);
 }
 
-/* Errors against the analytic surface, the largest over all vertices and triangles. */
+/* Largest deviations from the analytic surface over all vertices and triangles. */
 struct misses {
 	double position, normal, derivative;
 };
 
 typedef void surface(double u, double v, vec3 *p, vec3 *n);
 
-/* How the unit normal changes with u and v inside a triangle, from the mesh and from the surface. */
+/* Compares the derivatives of the unit normal with respect to u and v inside a triangle, of the mesh and of the
+ * surface. */
 static double derivative_off(const struct mesh *m, const uint32_t t[3], surface *of)
 {
 	const double *c0 = m->uv[t[0]], *c1 = m->uv[t[1]], *c2 = m->uv[t[2]];
@@ -294,7 +295,7 @@ static double derivative_off(const struct mesh *m, const uint32_t t[3], surface 
 	return worst;
 }
 
-/* With a margin in v, for spheres: towards the poles u says nothing. */
+/* With a margin in v for spheres, since u is undefined at the poles. */
 static struct misses measure(const struct mesh *m, surface *of, double margin)
 {
 	struct misses r = {0, 0, 0};
@@ -317,7 +318,7 @@ static struct misses measure(const struct mesh *m, surface *of, double margin)
 	return r;
 }
 
-/* The normal of any of them, by differences of positions far smaller than the meshes'. */
+/* Returns the normal of a surface, from differences of positions with steps far smaller than those of the meshes. */
 static vec3 normal_of(vec3 (*at)(double, double), double u, double v, double sign)
 {
 	double h = 1e-4;
@@ -341,7 +342,7 @@ static void plane(double u, double v, vec3 *p, vec3 *n)
 	*n = normal_of(plane_at, u, v, 1);
 }
 
-/* Repeats in u, and has one value at each pole. */
+/* A height that is periodic in u, and has a single value at each pole. */
 static double bumps(const void *user, double u, double v)
 {
 	(void)user;
@@ -361,8 +362,8 @@ static void ball(double u, double v, vec3 *p, vec3 *n)
 	*n = normal_of(ball_at, u, v, -1);
 }
 
-/* Positions lie on the surface; normals are off by the square of the step (a quarter at the next level), what is
- * interpolated from them has derivatives off by the step (a half). */
+/* Positions lie on the surface; the error of normals is proportional to the square of the step (a quarter at the next
+ * level), and that of the derivatives of interpolated normals to the step (a half). */
 static void expect_convergence(const char *type, double (*height)(const void *, double, double), double scale,
 			       surface *of, double margin)
 {
@@ -396,7 +397,7 @@ static void test_ball_approaches(void **state)
 	expect_convergence("sphere", bumps, 0.1, ball, 0.1);
 }
 
-/* At the poles, where u says nothing, the normal is right too. */
+/* The normal is also right at the poles, where u is undefined. */
 static void test_poles(void **state)
 {
 	(void)state;
@@ -459,7 +460,7 @@ static void test_memory_runs_out(void **state)
 	assert_int_equal(r, 0);
 }
 
-/* A million triangles: the time is printed; a limit as wide as this fails for what is not linear only. */
+/* A million triangles: the time is printed; only an algorithm that is not linear exceeds a limit this wide. */
 static void test_a_million(void **state)
 {
 	(void)state;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A height field against the same mesh written as OBJ, its normals against those of the function that it samples. */
+/* A height field is compared with the same mesh written as OBJ, and its normals with those of the function that it
+ * samples. */
 #include "tests/support/built_shape.h"
 #include "tests/support/pictures.h"
 #include "tests/support/sample_images.h"
@@ -20,7 +21,7 @@ static const void *picture;
 static size_t picture_size;
 static char obj[1 << 16];
 
-/* One shape of 0.6; its files are a.hdr and m.obj. */
+/* Builds a shape of 0.6; its files are a.hdr and m.obj. */
 static struct built_shape build(const char *type, const char *content)
 {
 	char xml[2048];
@@ -61,7 +62,7 @@ static void take_picture(struct pictures *p, uint32_t width, uint32_t height_, d
 	picture_size = p->file[p->count - 1].size;
 }
 
-/* The mesh as one would write it: rows of the picture from y = -1 on, quads cut from (x, y) to (x + 1, y + 1). */
+/* Writes the mesh: rows of the picture from y = -1 on, with quads cut from (x, y) to (x + 1, y + 1). */
 static void write_obj(double scale)
 {
 	size_t n = 0;
@@ -119,7 +120,7 @@ static double bowl(uint32_t x, uint32_t y)
 	return (a * a + b * b) / 64;
 }
 
-/* Of a plane exactly, borders too; of a bowl to the square of a pixel's width. */
+/* The normals of a plane are exact, also at the borders; those of a bowl up to the square of a pixel's width. */
 static void test_normals(void **state)
 {
 	(void)state;
@@ -150,7 +151,7 @@ static void test_normals(void **state)
 	pictures_fini(&p);
 }
 
-/* Numbers as they are stored, or decoded as colours are, as the picture's texture says. */
+/* The texture of the picture determines whether numbers are used as stored, or decoded like colours. */
 static void test_decoding(void **state)
 {
 	(void)state;
@@ -180,7 +181,7 @@ static void test_decoding(void **state)
 	free(png);
 }
 
-/* As in the documentation of Mitsuba 0.6: a bitmap inside `scale`, here inside another. */
+/* As in the documentation of Mitsuba 0.6, a bitmap inside `scale`, here nested in another one. */
 static void test_scaled(void **state)
 {
 	(void)state;
@@ -209,7 +210,7 @@ static void refuses(const char *content, const char *sentence)
 	built_shape_release(&b);
 }
 
-/* The bitmap may have any name, and stand elsewhere. */
+/* The bitmap may have any name, and be defined elsewhere. */
 static void test_named(void **state)
 {
 	(void)state;

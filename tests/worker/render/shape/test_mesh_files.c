@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * PLY and serialized meshes: every layout of the same solid gives the same mesh; no prefix and no damaged byte of a
- * file does anything but give a mesh or a sentence.
+ * PLY and serialized meshes: every layout of the same solid gives the same mesh; any prefix of a file, and any file
+ * with damaged bytes, gives a mesh or an error.
  */
 #include "tests/support/built_shape.h"
 #include "tests/support/dice.h"
@@ -26,7 +26,7 @@ static struct built_shape build(const char *type, const char *content, const voi
 	return built_shape(files, scene_tables());
 }
 
-/* Every vertex where it belongs, in the file's order; values are exact in float. */
+/* Every vertex is at its position, in the order of the file; values are exact as floats. */
 static void assert_solid(const char *type, const char *content, const struct mesh_file *f, double scale, bool normals,
 			 bool uv, bool flip)
 {
@@ -51,7 +51,7 @@ static void assert_solid(const char *type, const char *content, const struct mes
 	built_shape_release(&b);
 }
 
-/* Lines that end in a carriage return alone, as Rhino writes them. */
+/* Makes lines end in a carriage return alone, as Rhino writes them. */
 static void return_only(struct mesh_file *f)
 {
 	const char *last = "end_header\n";
@@ -100,7 +100,7 @@ static void test_ply_polygons(void **state)
 	built_shape_release(&b);
 }
 
-/* Points and lines that are written as faces are triangles without area; the others keep their colours. */
+/* Points and lines written as faces become triangles without area; the other faces keep their colours. */
 static void test_ply_lines(void **state)
 {
 	(void)state;
@@ -122,7 +122,7 @@ static void test_ply_lines(void **state)
 	built_shape_release(&b);
 }
 
-/* An arrow head, whose fan around the first corner would turn one triangle over. */
+/* An arrow head, whose fan around the first corner would contain a reversed triangle. */
 #define ARROW "-1 -1 0\n0 0.5 0\n1 -1 0\n0 1 0\n"
 static void test_concave_faces(void **state)
 {
@@ -167,8 +167,8 @@ static void test_serialized(void **state)
 				if (flags & 4)
 					continue; /* tangents were never written */
 				mesh_file_serialized(&f, version, doubles, flags, 3);
-				/* Where there are none they follow from the triangles: by symmetry a corner's is its
-				 * place. */
+				/* Missing normals are computed from the triangles: by symmetry, that of a corner has
+				 * the direction of its position. */
 				assert_solid("serialized", "", &f, 1, true, flags & 2, false);
 				assert_solid("serialized", "<integer name='shape_index' value='2'/>", &f, 3, true,
 					     flags & 2, false);
@@ -179,7 +179,7 @@ static void test_serialized(void **state)
 	}
 }
 
-/* Version 5 has named attributes, of which one with coefficients of spectra is left out. */
+/* Version 5 has named attributes, of which the one with spectral coefficients is left out. */
 static void test_serialized_attributes(void **state)
 {
 	(void)state;
@@ -272,7 +272,7 @@ static void test_bad_ply(void **state)
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
 		refuses("ply", "", cases[i].text, strlen(cases[i].text), cases[i].error);
-	/* A number that is none, where bytes can say so. */
+	/* NaN, in formats that can store it. */
 	static struct mesh_file f;
 	mesh_file_ply(&f, PLY_LITTLE);
 	const char *end = "end_header\n";
@@ -283,7 +283,7 @@ static void test_bad_ply(void **state)
 	refuses("ply", "", f.bytes, f.size, "m: vertex 0: a number that is not finite");
 }
 
-/* Programs write such where a vertex has no triangle with an area: as if the normal were not there. */
+/* Programs write NaN if a vertex has no triangle with an area: it counts as a missing normal. */
 static void test_normals_that_are_none(void **state)
 {
 	(void)state;
@@ -335,7 +335,7 @@ static void test_bad_serialized(void **state)
 	refuses("serialized", "", g.bytes, g.size, "m: the compressed mesh is damaged");
 }
 
-/* Or an error; a mesh has indices within its range. */
+/* Returns whether a file gives a mesh, whose indices must be in range, rather than an error. */
 static bool gives_a_mesh(const char *type, const struct mesh_file *f)
 {
 	struct built_shape b = build(type, "", f->bytes, f->size);
@@ -347,7 +347,7 @@ static bool gives_a_mesh(const char *type, const struct mesh_file *f)
 	return good;
 }
 
-/* Each number of version 5 that can be wrong behind a good checksum. */
+/* Each number of version 5 that can be wrong in a stream with a valid checksum. */
 static void test_bad_serialized_5(void **state)
 {
 	(void)state;
@@ -387,7 +387,7 @@ static void test_bad_serialized_5(void **state)
 		mesh_file_of_stream_5(&f, &g);
 		refuses("serialized", "", f.bytes, f.size, bad[i].text);
 	}
-	/* Any prefix of what is inside, and any of its bytes changed. */
+	/* Any prefix of the uncompressed data, and any of its bytes changed. */
 	struct dice d = dice_of("damaged streams");
 	for (size_t i = 0; i < 3000; i++) {
 		g = good;
@@ -400,7 +400,7 @@ static void test_bad_serialized_5(void **state)
 	}
 }
 
-/* Any prefix, and any file with some bytes changed: a mesh or an error, never more (sanitizers watch). */
+/* Any prefix, and any file with some bytes changed, gives a mesh or an error; sanitizers detect anything else. */
 static void test_damage(void **state)
 {
 	(void)state;

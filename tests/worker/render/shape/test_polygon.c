@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Polygons against an independent test of what is inside (the even-odd rule): random points are in one triangle if they
- * are in the polygon, and in none otherwise. Of outlines that cross themselves only the number of triangles counts.
+ * Triangulated polygons are compared with an independent test of the inside (the even-odd rule): random points are in
+ * exactly one triangle if they are in the polygon, and in none otherwise. For outlines that cross themselves, only the
+ * number of triangles is checked.
  */
 #include "tests/support/dice.h"
 #include "worker/render/math/frame.h"
@@ -35,7 +36,8 @@ static double side(const struct outline *o, uint32_t a, uint32_t b, double x, do
 	return (o->x[b] - o->x[a]) * (y - o->y[a]) - (o->y[b] - o->y[a]) * (x - o->x[a]);
 }
 
-/* In a plane across n, away from the origin. Each triangle has the polygon's sense, 1 or -1. */
+/* Checks the polygon in a plane across n, away from the origin. Each triangle has the orientation of the polygon, 1 or
+ * -1. */
 static void check(const char *what, const struct outline *o, vec3 n, int sense)
 {
 	static struct polygon p;
@@ -87,7 +89,7 @@ static void check_both(const char *what, struct outline *o)
 	}
 }
 
-/* Around the middle, with random radii: few of them are convex. */
+/* Corners around a centre, with random radii: few of these polygons are convex. */
 static void test_random(void **state)
 {
 	(void)state;
@@ -119,7 +121,7 @@ static void test_spiral(void **state)
 	}
 }
 
-/* A square with a square hole, which the outline reaches and leaves along one line; and corners on straight lines. */
+/* A square with a square hole, to and from which the outline runs along one line; and corners on straight lines. */
 static void test_hole(void **state)
 {
 	(void)state;
@@ -153,7 +155,7 @@ static void test_fan(void **state)
 	}
 }
 
-/* Outlines that cross themselves at random, of all sizes: as many triangles as ever, of corners that there are. */
+/* Outlines of all sizes that cross themselves at random give n - 2 triangles with valid corners. */
 static void test_crossed(void **state)
 {
 	(void)state;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Surfaces of grids: vertices are where the interpolated field is 0, by another way to interpolate; the mesh is closed,
- * faces where the field grows and has the volume and normals of the body that the field describes.
+ * Surfaces of grids: the field at vertices is 0, by another way of interpolating; the mesh is closed, faces the
+ * direction in which the field grows, and has the volume and normals of the body that the field describes.
  */
 #include "tests/support/built_shape.h"
 #include "tests/support/dice.h"
@@ -39,7 +39,7 @@ static double mix(double t, double a, double b)
 	return a + t * (b - a);
 }
 
-/* The field at a point of the unit cube, by interpolating along one side after the other. */
+/* Returns the field at a point of the unit cube, by interpolating along one axis after the other. */
 static double value_at(const struct vol *v, const double p[3])
 {
 	uint32_t at[3];
@@ -63,8 +63,8 @@ static int compare_edges(const void *a, const void *b)
 	return *x < *y ? -1 : *x > *y;
 }
 
-/* Every edge is passed once in each direction; with holes, at most once. Degenerate triangles have been dropped, so
- * this holds where no value is 0. */
+/* Every edge occurs once in each direction; with holes, at most once. Since degenerate triangles have been dropped,
+ * this holds only if no value is 0. */
 static void check_edges(const struct mesh *m, bool closed)
 {
 	size_t count = 3 * (size_t)m->triangle_count;
@@ -155,7 +155,7 @@ static double slope(double x, double y, double z, uint32_t channel)
 	return 2 * x + y - z - 0.613;
 }
 
-/* Interpolation is exact for a plane; where it leaves the cube, it ends. */
+/* Interpolation is exact for a plane, which ends where it leaves the cube. */
 static void test_plane(void **state)
 {
 	(void)state;
@@ -166,15 +166,16 @@ static void test_plane(void **state)
 	const struct mesh *m = &b.g.mesh;
 	const vec3 normal = vec3_normalize((vec3){2, 1, -1});
 	check_edges(m, false);
-	/* Its shadow on y, z is where 0 <= x = (0.613 - y + z) / 2 <= 1: all but the corner y > z + 0.613. */
+	/* Its projection onto y, z is the part with 0 <= x = (0.613 - y + z) / 2 <= 1: all but the corner y > z +
+	 * 0.613. */
 	assert_true(fabs(built_area(m) * normal.x - (1 - 0.5 * 0.387 * 0.387)) < 1e-6);
 	for (uint32_t i = 0; i < m->vertex_count; i++)
 		assert_true(vec3_length(vec3_sub(mesh_load(m->normal[i]), normal)) < 1e-6);
 	built_shape_release(&b);
 }
 
-/* Any field: closed if positive at the faces of the cube, and vertices on the surface. Flat, because normals, which
- * mean little here, would turn triangles. */
+/* Any field gives a closed mesh if it is positive at the faces of the cube, with vertices on the surface. Flat, because
+ * normals, which are meaningless for noise, would reverse triangles. */
 static void test_noise(void **state)
 {
 	(void)state;
@@ -249,7 +250,7 @@ static void test_bad_files(void **state)
 		v.value[i] = 1;
 	vol_write(&v);
 	refuses(&v, "m: its values do not change their sign: there is no surface");
-	/* Zeros and numbers of any size: a mesh, or an error. */
+	/* Zeros and numbers of any size give a mesh, or an error. */
 	static const float numbers[] = {0, -0.0f, 1, -1, 3e38f, -3e38f, 1e-45f, -1e-45f, 1e-20f, -1e-20f};
 	struct dice d = dice_of("extreme grids");
 	for (int round = 0; round < 500; round++) {

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Shapes as meshes: rectangle, cube, sphere, ellipsoid, disk and cylinder have the area, the outside and the texture
- * coordinates that Mitsuba's have, OBJ files become the triangles that they name, normals that are not in a file are
- * made as documented, and bad files are refused with the line at fault.
+ * Shapes as meshes: rectangle, cube, sphere, ellipsoid, disk and cylinder have the area, the orientation and the
+ * texture coordinates of Mitsuba's shapes; OBJ files become the triangles that they describe; normals missing in a file
+ * are computed as documented; and invalid files are refused with the line at fault.
  */
 #include "common/base/mem.h"
 #include "tests/support/failing_memory.h"
@@ -27,7 +27,7 @@ struct built {
 	int result;
 };
 
-/* One shape: type, what is in its element, and the text of m.obj. */
+/* Builds a shape, given its type, the contents of its element, and the text of m.obj. */
 static struct built build(const char *type, const char *content, const char *obj)
 {
 	char xml[2048];
@@ -76,7 +76,7 @@ static void assert_vec3(vec3 a, double x, double y, double z)
 		fail_msg("(%g, %g, %g) is not (%g, %g, %g)", a.x, a.y, a.z, x, y, z);
 }
 
-/* All triangles and normals of a closed body around the origin look away from it, or all towards it. */
+/* All triangles and normals of a closed body around the origin face away from it, or all towards it. */
 static void assert_facing(const struct mesh *m, double sign)
 {
 	for (uint32_t i = 0; i < m->triangle_count; i++) {
@@ -187,7 +187,7 @@ static double area(const struct mesh *m)
 	return sum;
 }
 
-/* A sphere that is scaled unevenly, mirrored and sheared: its points and normals against those of x^T A x = 1. */
+/* The points and normals of a sphere that is scaled unevenly, mirrored and sheared are those of x^T A x = 1. */
 static void test_ellipsoid(void **state)
 {
 	(void)state;
@@ -212,7 +212,7 @@ static void test_ellipsoid(void **state)
 		     "<boolean name='flip_normals' value='true'/><transform name='to_world'><scale x='2'/></transform>",
 		     NULL);
 	assert_facing(&b.g.mesh, -1);
-	/* A prolate spheroid's area: 2 pi (1 + c / e asin e), c = 2, e^2 = 3/4. */
+	/* The area of a prolate spheroid: 2 pi (1 + c / e asin e), c = 2, e^2 = 3/4. */
 	double e = sqrt(0.75);
 	assert_true(fabs(area(&b.g.mesh) / (2 * M_PI * (1 + 2 / e * asin(e))) - 1) < 1e-3);
 	release(&b);
@@ -273,7 +273,7 @@ static void test_obj_polygons(void **state)
 	assert_vec3(triangle_normal(&b.g.mesh, 1), 0, 0, 1);
 	assert_vec3(to_vec3(b.g.mesh.normal[2]), 0, 0, 1);
 	release(&b);
-	/* Backwards indices, joined lines, blanks, carriage returns, colours after positions. */
+	/* Negative indices, joined lines, blanks, carriage returns, colours after positions. */
 	b = build_ok("obj", "", "v 0 0 0 1 1 1\r\nv 1 0 \\\r\n 0\r\n  v\t1 1 0\r\nf -3 \\\n -2 -1 # end");
 	assert_int_equal(b.g.mesh.triangle_count, 1);
 	assert_vec3(to_vec3(b.g.mesh.position[b.g.mesh.index[0][1]]), 1, 0, 0);
@@ -303,7 +303,7 @@ static void test_obj_material(void **state)
 		assert_memory_equal(b.g.mesh.position[v], blue[i], sizeof blue[i]);
 		assert_true(b.g.mesh.uv[v][1] == 0.75);
 	}
-	assert_int_equal(b.g.mesh.vertex_count, 4); /* what the two faces share they share here */
+	assert_int_equal(b.g.mesh.vertex_count, 4); /* vertices that the faces share are shared in the mesh */
 	assert_false(b.g.materials);
 	release(&b);
 	b = build_ok("obj", "<string name='material' value='red paint'/>", PARTS);
@@ -319,7 +319,7 @@ static void test_obj_material(void **state)
 	refuses("<string name='material' value='red'/>", PARTS, "has no faces of the material `red`");
 }
 
-/* The file is read once for all its materials, and once more when another has been asked for in between. */
+/* The file is read once for all its materials, and again if another file has been requested in between. */
 static void test_obj_is_kept(void **state)
 {
 	(void)state;
@@ -374,9 +374,9 @@ static void test_obj_attributes(void **state)
 		SQUARE "vt 0 0.25\nvt 1 0\nvt 1 1 0\nvn 0 0 2\nvn 0 3 4\nf 1/1/1 2/2/1 3/3/1\nf 1/1/2 3/3/1 4//1\n";
 	struct built b = build_ok("obj", "", obj);
 	const struct mesh *m = &b.g.mesh;
-	assert_int_equal(m->vertex_count, 5); /* 1 appears with two normals */
+	assert_int_equal(m->vertex_count, 5); /* vertex 1 has two normals */
 	const uint32_t *t = m->index[0], *s = m->index[1];
-	assert_true(m->uv[t[0]][0] == 0 && m->uv[t[0]][1] == 0.75); /* v runs downwards in pictures */
+	assert_true(m->uv[t[0]][0] == 0 && m->uv[t[0]][1] == 0.75); /* v runs downwards in images */
 	assert_true(m->uv[t[1]][1] == 1);
 	assert_int_equal(t[2], s[1]);
 	assert_int_not_equal(t[0], s[0]);
@@ -402,7 +402,7 @@ static void test_smooth_normals(void **state)
 	(void)state;
 	struct built b = build_ok("obj", "", OCTAHEDRON);
 	assert_facing(&b.g.mesh, 1);
-	for (uint32_t i = 0; i < 6; i++) /* by symmetry the normal of a corner is its place */
+	for (uint32_t i = 0; i < 6; i++) /* by symmetry, the normal of a corner is its position */
 		assert_vec3(to_vec3(b.g.mesh.normal[i]), b.g.mesh.position[i][0], b.g.mesh.position[i][1],
 			    b.g.mesh.position[i][2]);
 	release(&b);
@@ -414,7 +414,7 @@ static void test_smooth_normals(void **state)
 	release(&b);
 }
 
-/* Two right angles against one: weights are angles, not areas or counts. */
+/* Two right angles on one side, one on the other: weights are angles, not areas or counts. */
 static void test_normals_are_weighted_by_angle(void **state)
 {
 	(void)state;
@@ -445,7 +445,7 @@ static void test_flat_triangles_are_dropped(void **state)
 	assert_int_equal(b.g.mesh.triangle_count, 1);
 	assert_int_equal(b.dropped, 3);
 	release(&b);
-	/* Points and lines that are written as faces. */
+	/* Points and lines written as faces. */
 	b = build_ok("obj", "", SQUARE "f 1\nf 1 2 3\nf 1 2\n");
 	assert_int_equal(b.g.mesh.triangle_count, 1);
 	assert_int_equal(b.dropped, 2);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * max_smooth_angle against the same meshes with their normals written out: which faces share a normal, weights by
+ * max_smooth_angle is compared with the same meshes with explicit normals: the faces that share a normal, weights by
  * angle, the order of faces where three meet, seams of texture coordinates and colours, and angles that are refused.
  */
 #include "tests/support/append.h"
@@ -19,7 +19,7 @@ static size_t used;
 
 #define put(...) append(text, sizeof text, &used, __VA_ARGS__)
 
-/* The mesh in `text`. */
+/* Builds the mesh in `text`. */
 static struct built_shape build(const char *content)
 {
 	char xml[1024];
@@ -40,7 +40,7 @@ static struct built_shape build_ok(const char *content)
 	return b;
 }
 
-/* Triangle for triangle and corner for corner the same places and normals; vertices may be others. */
+/* All corners of all triangles have the same positions and normals; the numbering of vertices may differ. */
 static void expect_same(struct built_shape *a, struct built_shape *b)
 {
 	const struct mesh *x = &a->g.mesh, *y = &b->g.mesh;
@@ -59,15 +59,15 @@ static void expect_same(struct built_shape *a, struct built_shape *b)
 	built_shape_release(b);
 }
 
-/* A prism of `sides` around z, from z = 0 to 1, with its lids. Normals: of the sides those of a cylinder if round, else
- * of each side; 0: none in the file, and corners share positions. */
+/* A prism with `sides` sides around z, from z = 0 to 1, with lids. ROUND: the sides have the normals of a cylinder;
+ * FLAT: each side has its own; NONE: the file has no normals, and corners share positions. */
 enum normals { NONE, FLAT, ROUND };
 static void put_prism(int sides, enum normals normals)
 {
 	used = 0;
 	for (int i = 0; i < 2 * sides; i++)
 		put("v %.17g %.17g %d\n", cos(M_PI * (i / 2) * 2 / sides), sin(M_PI * (i / 2) * 2 / sides), i % 2);
-	/* the normals around: at corner i that of angle 2 i, between corners that of 2 i + 1; then down, up */
+	/* normals: 2 i at corner i, 2 i + 1 between corners; then down, up */
 	for (int i = 0; i < 2 * sides; i++)
 		put("vn %.17g %.17g 0\n", cos(M_PI * i / sides), sin(M_PI * i / sides));
 	put("vn 0 0 -1\nvn 0 0 1\n");
@@ -95,8 +95,8 @@ static void put_prism(int sides, enum normals normals)
 		}
 }
 
-/* Normals are weighted by angles. A quad's two triangles meet in two of its corners, so each side has 90 degrees there
- * in all, and the normal in the middle of two sides is the mean. */
+/* Normals are weighted by angles. The two triangles of a quad meet at two of its corners, so each side contributes 90
+ * degrees in all there, and the normal between two sides is their mean. */
 static void test_prisms(void **state)
 {
 	(void)state;
@@ -116,7 +116,7 @@ static void test_prisms(void **state)
 		put_prism(sides, ROUND);
 		as_written = build_ok("");
 		expect_same(&smooth, &as_written);
-		/* Normals of the file are forgotten. */
+		/* Normals in the file are ignored. */
 		put_prism(sides, FLAT);
 		smooth = build_ok(above);
 		put_prism(sides, ROUND);
@@ -125,7 +125,7 @@ static void test_prisms(void **state)
 	}
 }
 
-/* Across everything: what a file whose corners share all vertices has without normals. And across nothing. */
+/* Smooth across all edges, which gives the normals of a file whose corners share all vertices; and across none. */
 static void test_ends(void **state)
 {
 	(void)state;
@@ -138,7 +138,8 @@ static void test_ends(void **state)
 	expect_same(&none, &flat);
 }
 
-/* Three faces around an edge, 40 degrees each from the one before: the first takes the second, the third is left. */
+/* Three faces around an edge, each at 40 degrees to the one before: the first is grouped with the second, and the third
+ * remains. */
 static void test_first_come(void **state)
 {
 	(void)state;
@@ -160,11 +161,11 @@ static void test_first_come(void **state)
 		if (!(fabs(cosine - 1) < 1e-12))
 			fail_msg("face %d: normal %g %g %g", i, n[0], n[1], n[2]);
 	}
-	assert_int_equal(m->vertex_count, 2 + 2 + 3); /* two of the edge for the first two, two for the third */
+	assert_int_equal(m->vertex_count, 2 + 2 + 3); /* two on the edge for the first two faces, two for the third */
 	built_shape_release(&b);
 }
 
-/* Where texture coordinates differ, surfaces are not smooth across, as in Mitsuba. */
+/* Edges with different texture coordinates are not smooth, as in Mitsuba. */
 static void test_seams(void **state)
 {
 	(void)state;
@@ -179,7 +180,7 @@ static void test_seams(void **state)
 	built_shape_release(&b);
 }
 
-/* Nor where colours do; each corner keeps its own, and each triangle what is its. */
+/* Nor are edges with different colours; each corner and each triangle keeps its attributes. */
 static void test_attributes(void **state)
 {
 	(void)state;
@@ -198,8 +199,8 @@ static void test_attributes(void **state)
 	assert_int_equal(shape_build(b.scene.objects[0], &assets, &b.arena, &b.g, &dropped, &b.error), 0);
 	const struct mesh *m = &b.g.mesh;
 	assert_int_equal(m->vertex_count, 5);
-	assert_int_equal(m->index[0][2], m->index[1][1]); /* y = 1 has one colour */
-	assert_true(m->index[0][0] != m->index[1][0]);	  /* x = y = 0 has two */
+	assert_int_equal(m->index[0][2], m->index[1][1]); /* one colour at y = 1 */
+	assert_true(m->index[0][0] != m->index[1][0]);	  /* two colours at x = y = 0 */
 	assert_int_equal(m->attribute_count, 2);
 	for (uint32_t i = 0; i < m->attribute_count; i++) {
 		const struct attribute *a = &m->attributes[i];
@@ -230,7 +231,7 @@ static void test_bad_input(void **state)
 	expect_refused(ANGLE(181), "maxSmoothAngle=181 is outside [0, 180]");
 	expect_refused(ANGLE(30) "<boolean name='faceNormals' value='true'/>",
 		       "max_smooth_angle and face_normals contradict each other");
-	/* 40,000 triangles of different directions around a point */
+	/* 40,000 triangles with different directions around a point */
 	used = 0;
 	put("v 0 0 0\n");
 	for (int i = 0; i <= 40000; i++)

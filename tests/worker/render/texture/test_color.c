@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Spectra made from colours: back to the same RGB under D65 within what the fit promises, between 0 and 1 everywhere,
- * constant for grey; emitters give their RGB; what many bounces do to a colour. Tables of values against a search
- * written down once more.
+ * Spectra made from colours have the same RGB under D65 within the tolerance of the fit, lie between 0 and 1
+ * everywhere, and are constant for grey; emitters have their RGB; many bounces multiply spectra. Tables of values are
+ * compared with a separate search.
  */
 #include "worker/render/math/cie.h"
 #include "worker/render/texture/color.h"
@@ -27,7 +27,7 @@ static spectrum at_table(const void *user, const struct wavelengths *w)
 	return color_eval_rgb_reflectance(user, w);
 }
 
-/* Linear Rec. 709 of a spectrum, under D65 or by itself, by the sum at 1 nm. */
+/* Computes the linear Rec. 709 of a spectrum, under D65 or without an illuminant, by a sum in steps of 1 nm. */
 static void rgb_of(spectrum_at f, const void *user, bool under_d65, double rgb[3])
 {
 	double xyz[3] = {0};
@@ -41,7 +41,7 @@ static void rgb_of(spectrum_at f, const void *user, bool under_d65, double rgb[3
 				xyz[c] += s.v[k] * cie_observer[i + k][c] / CIE_Y_SUM *
 					  (under_d65 ? color_d65(w.nm[k]) : 1);
 	}
-	/* The published matrix, not the one that the fit uses. */
+	/* The published matrix instead of the one that the fit uses. */
 	const double rec709[3][3] = {{3.2404542, -1.5371385, -0.4985314},
 				     {-0.9692660, 1.8760108, 0.0415560},
 				     {0.0556434, -0.2040259, 1.0572252}};
@@ -66,7 +66,7 @@ static double fit_error(const double rgb[3], bool table)
 	return worst;
 }
 
-/* The grid's ratios of components fall between the table's nodes. */
+/* The ratios of components in this grid lie between the nodes of the table. */
 static void test_round_trip(void **state)
 {
 	(void)state;
@@ -82,7 +82,7 @@ static void test_round_trip(void **state)
 	}
 	for (int t = 0; t < 2; t++)
 		print_message("%s: largest error %.2e, mean %.2e\n", t ? "table" : "fit", worst[t], sum[t] / count);
-	/* 2e-6 of it is the difference between the published matrix and the table's white. */
+	/* 2e-6 is due to the difference between the published matrix and the table's white. */
 	assert_true(worst[0] < 1e-4);
 	assert_true(worst[1] < 0.005);
 }
@@ -145,7 +145,7 @@ static void test_emitters_give_their_rgb(void **state)
 	for (int i = 0; i < CIE_COUNT; i++)
 		y += cie_observer[i][1] * color_d65(CIE_FIRST_NM + i) / CIE_Y_SUM;
 	assert_true(fabs(y - 1) < 1e-5);
-	/* Without an illuminant a constant spectrum is reddish: its Rec. 709 values. */
+	/* The Rec. 709 values of a constant spectrum without an illuminant, which is reddish. */
 	struct color flat = color_constant(1);
 	double rgb[3];
 	rgb_of(at_color, &flat, false, rgb);
@@ -166,7 +166,7 @@ static spectrum at_bounces(const void *user, const struct wavelengths *w)
 	return s;
 }
 
-/* As paths estimate it: by wavelengths that are drawn, from their four lanes. */
+/* Estimates RGB like paths do, from the four lanes of sampled wavelengths. */
 static void drawn_rgb(const struct bounces *b, double rgb[3])
 {
 	enum { DRAWN = 1 << 14 };
@@ -189,9 +189,9 @@ static void drawn_rgb(const struct bounces *b, double rgb[3])
 }
 
 /*
- * Saturated reflectances under an emitter of rgb 1: what is drawn is what the integral is, to 0.1 %, and one bounce
- * gives the colour of the scene. Of n bounces the spectra are multiplied, not the colours: that is what light does, and
- * a renderer that multiplies R, G and B has something else (docs/method.md).
+ * Saturated reflectances under an emitter of rgb 1: the sampled estimate agrees with the integral to 0.1 %, and one
+ * bounce gives the colour of the scene. n bounces multiply spectra, not colours, as in reality; a renderer that
+ * multiplies R, G and B gives another result (docs/method.md).
  */
 static void test_bounces_multiply_spectra(void **state)
 {
@@ -215,7 +215,7 @@ static void test_bounces_multiply_spectra(void **state)
 		print_message("(%g %g %g): after one, two, three bounces %.4f %.4f %.4f times the product of colours\n",
 			      colours[i][0], colours[i][1], colours[i][2], ratio[0], ratio[1], ratio[2]);
 		assert_true(fabs(ratio[0] - 1) < 1e-3);
-		/* Under a constant spectrum, which is reddish: again the spectra's product. */
+		/* Likewise under a constant spectrum, which is reddish. */
 		struct bounces once = {.count = 1};
 		double flat[3], under[3];
 		struct color even = color_constant(1);
@@ -243,10 +243,10 @@ static void test_unbounded_keeps_its_rgb(void **state)
 	rgb_of(at_color, &c, true, rgb);
 	for (int i = 0; i < 3; i++)
 		assert_true(fabs(rgb[i] - k[i]) < 1e-4 * k[0]);
-	/* and so it does in textures */
+	/* likewise in textures */
 	rgb_of(at_unbounded, k, true, rgb);
 	for (int i = 0; i < 3; i++)
-		assert_true(fabs(rgb[i] - k[i]) < COLOR_UNBOUNDED_OVER * 0.005 * k[0]); /* the table's error */
+		assert_true(fabs(rgb[i] - k[i]) < COLOR_UNBOUNDED_OVER * 0.005 * k[0]); /* error of the table */
 	const struct wavelengths w = wavelengths_sample(0.1);
 	const double grey[3] = {7, 7, 7}, black[3] = {0, 0, 0};
 	assert_true(color_eval_rgb_unbounded(grey, &w).v[0] == 7);
@@ -271,7 +271,7 @@ static void test_bounds_hold(void **state)
 		}
 }
 
-/* Where wavelengths repeat, the lanes are what each wavelength alone has. */
+/* If wavelengths repeat, each lane has the value of its wavelength alone. */
 static void test_few_wavelengths(void **state)
 {
 	(void)state;
@@ -302,7 +302,7 @@ static void test_tables(void **state)
 	const double nm[] = {400, 410, 500, 700}, x[] = {0.1, 0.3, 0.2, 0.8};
 	struct value v = table_of(nm, x, 4);
 	struct color c;
-	/* Beyond the table there is nothing, as in Mitsuba, but for what is no share of light. */
+	/* Beyond a table the value is 0, as in Mitsuba, except for unbounded quantities. */
 	for (int role = COLOR_REFLECTANCE; role <= COLOR_UNBOUNDED; role++) {
 		assert_int_equal(color_from_value(&v, (enum color_role)role, &arena, &c, &e), 0);
 		struct wavelengths w = {.nm = {360, 405, 600, 830}};
@@ -320,7 +320,7 @@ static void test_tables(void **state)
 		assert_true(color_max(&c) == (ends ? 0.3 : 0));
 		v = table_of(nm, x, 4);
 	}
-	/* Mitsuba 3's tests of `irregular`, from 450 nm by 50. */
+	/* Values of Mitsuba 3's tests of `irregular`, from 450 nm in steps of 50 nm. */
 	const double three[] = {500, 600, 650}, value[] = {1, 2, 0.5}, known[] = {0, 1, 1.5, 2, 0.5, 0};
 	v = table_of(three, value, 3);
 	assert_int_equal(color_from_value(&v, COLOR_ILLUMINANT, &arena, &c, &e), 0);
@@ -338,7 +338,7 @@ static void test_tables(void **state)
 	arena_fini(&arena);
 }
 
-/* A search through the table that leaves nothing out. */
+/* A linear search through the table. */
 static double by_search(const double *nm, const double *x, uint32_t n, double at)
 {
 	if (at <= nm[0])
@@ -349,7 +349,7 @@ static double by_search(const double *nm, const double *x, uint32_t n, double at
 	return x[n - 1];
 }
 
-/* Equidistant tables, one with gaps of all sizes, and one whose samples nearly coincide. */
+/* Equidistant tables, one with intervals of all sizes, and one with samples that nearly coincide. */
 static void test_two_tables_at_once(void **state)
 {
 	(void)state;
@@ -366,7 +366,7 @@ static void test_two_tables_at_once(void **state)
 				assert_int_equal(color_from_value(&va, COLOR_UNBOUNDED, &arena, &a, &e), 0);
 				assert_int_equal(color_from_value(&vb, COLOR_UNBOUNDED, &arena, &b, &e), 0);
 				a.scale = 0.5;
-				b.nm = u < 0.5 ? a.nm : b.nm; /* as metals have them */
+				b.nm = u < 0.5 ? a.nm : b.nm; /* like the tables of metals */
 				struct wavelengths w = wavelengths_sample_few(u, few ? few : SPECTRUM_LANES);
 				spectrum out[2], sa = color_eval(&a, &w), sb = color_eval(&b, &w);
 				color_eval_both(&a, &b, &w, out);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* An indexed image has the bits of the image that it was made from, in less memory where numbers recur. */
+/* An indexed image has the same bits as the image from which it was made, in less memory if numbers recur. */
 #include "worker/render/texture/indexed_image.h"
 
 #include <errno.h>
@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-/* That many different numbers, each at least once, in an order that looks random. */
+/* Makes an image with the given count of different numbers, each at least once, in pseudo-random order. */
 static struct image image_with(uint32_t numbers, uint32_t width, uint32_t height, uint32_t channels)
 {
 	size_t count = (size_t)width * height * channels;
@@ -21,7 +21,7 @@ static struct image image_with(uint32_t numbers, uint32_t width, uint32_t height
 	return i;
 }
 
-/* Bytes of the arena that its copy takes. */
+/* Returns the bytes of the arena that the copy takes. */
 static size_t check(const struct image *from, uint32_t index_bytes)
 {
 	struct arena a = {0};
@@ -54,12 +54,12 @@ static void test_every_count(void **state)
 		size_t count = (size_t)from.width * from.height * from.channels;
 		size_t used = check(&from, cases[i].bytes);
 		size_t expected = cases[i].bytes ? cases[i].bytes * count + 4 * cases[i].numbers : 4 * count;
-		assert_true(used <= expected + 128); /* both rounded up to lines of the cache */
+		assert_true(used <= expected + 128); /* both are rounded up to cache lines */
 		free(from.pixels);
 	}
 }
 
-/* Zeros of both signs and the smallest and largest floats are numbers of their own. */
+/* Zeros of both signs, and the smallest and largest floats, are distinct numbers. */
 static void test_odd_numbers(void **state)
 {
 	(void)state;
@@ -70,12 +70,12 @@ static void test_odd_numbers(void **state)
 static uint32_t inverse(uint32_t odd)
 {
 	uint32_t x = odd;
-	for (int i = 0; i < 5; i++) /* Newton's iteration modulo 2^32 doubles the bits that are right */
+	for (int i = 0; i < 5; i++) /* Newton's iteration modulo 2^32 doubles the number of correct bits */
 		x *= 2 - odd * x;
 	return x;
 }
 
-/* Finite floats that all fall on one slot of the hash table. */
+/* Fills x with finite floats that all hash to the same slot. */
 static void fill_with_collisions(float *x, uint32_t count)
 {
 	uint32_t unmix = inverse(0x9e3779b1u), found = 0;
@@ -87,7 +87,7 @@ static void fill_with_collisions(float *x, uint32_t count)
 	}
 }
 
-/* A file of such numbers does not take time by the square of its size: it is stored without indices. */
+/* A file of colliding numbers does not take quadratic time: it is stored without indices. */
 static void test_collisions(void **state)
 {
 	(void)state;
@@ -101,8 +101,8 @@ static void test_collisions(void **state)
 	free(from.pixels);
 }
 
-/* Nor is a table searched to its limit for each pixel: a few such numbers, and then only the one found last. A few
- * pixels of it do no harm. */
+/* Nor is the whole table searched for each pixel of a file with a few colliding numbers, followed by the one that is
+ * found last only. A few pixels with that number do not matter. */
 static void test_far_number(void **state)
 {
 	(void)state;
@@ -119,7 +119,7 @@ static void test_far_number(void **state)
 	free(from.pixels);
 }
 
-/* All images of a scene together: what was read before lies in the arena. */
+/* The limit applies to all images of a scene together: the arena contains those read before. */
 static void test_scene_limit(void **state)
 {
 	(void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A picture is decoded once for all textures that want the same pixels, and again for those that want others. */
+/* A picture is decoded once for all textures that use the same pixels, and again for those that use others. */
 #include "tests/support/nodes.h"
 #include "tests/support/pictures.h"
 #include "worker/render/texture/picture_cache.h"
@@ -32,7 +32,7 @@ static void close_counted(void *user, struct asset *a)
 	c->inner.close(c->inner.user, a);
 }
 
-/* Whether its maximum was found before, by another texture, or not. */
+/* The maximum is the same, whether another texture has computed it before or not. */
 static void check_maximum(const struct raster *r)
 {
 	double m = 0;
@@ -81,7 +81,7 @@ static void test_shared(void **state)
 	assert_ptr_equal(image_of(&s, "filename=p1", &reflectance, &a).index8, cut.index8);
 	assert_ptr_equal(image_of(&s, "filename=p1", &light, &a).index8, bright.index8);
 	assert_int_equal(c.opened, 7);
-	/* Memory that ends sooner or later is not shared. */
+	/* Memory with another lifetime is not shared. */
 	assert_ptr_not_equal(image_of(&s, "filename=p0", &reflectance, &other).index8, first);
 	assert_ptr_equal(image_of(&s, "filename=p0", &reflectance, &a).index8, first);
 	arena_fini(&other);

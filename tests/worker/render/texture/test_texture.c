@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Textures by themselves: where an image's pixels lie in uv, wrapping, borders, filters, transforms of uv, colours and
- * raw values, and derivatives against differences. Those made of other textures: scale, tint, product, channel,
- * threshold, gamma. What is refused says why.
+ * Single textures: the positions of pixels in uv, wrapping, borders, filters, transforms of uv, colours and raw values,
+ * and derivatives compared with differences. Textures made of others: scale, tint, product, channel, threshold, gamma.
+ * Errors give the reason.
  */
 #include "tests/support/nodes.h"
 #include "tests/support/pictures.h"
@@ -28,7 +28,7 @@ struct fixture {
 	struct texture_build build;
 };
 
-/* Picture 0 is 3 x 2, grey: 0 .25 .5 / .75 1 .125. Picture 1 is 2 x 1: red, white. Picture 2 is bright grey. */
+/* Picture 0 is 3 x 2 and grey: 0 .25 .5 / .75 1 .125. Picture 1 is 2 x 1: red, white. Picture 2 is bright grey. */
 static int setup(void **state)
 {
 	static struct fixture f;
@@ -118,7 +118,8 @@ static void test_wrapping(void **state)
 	assert_value(&mixed, -1, 1.25, 0);
 }
 
-/* Around the image all is black, or white; between the outermost pixels' centres and the border's it is mixed. */
+/* Outside the image everything is black, or white; between the centres of the outermost pixels and of the border it is
+ * interpolated. */
 static void test_borders(void **state)
 {
 	struct texture black = make_texture(*state, "bitmap filename=p0 wrap_mode=black", COLOR_REFLECTANCE),
@@ -263,7 +264,7 @@ static void test_refusals_say_why(void **state)
 	}
 }
 
-/* Where any number is allowed, such as for the indices of metals, an image has those of a reflectance. */
+/* Where any number is allowed, such as for the indices of metals, the values of an image are those of a reflectance. */
 static void test_unbounded(void **state)
 {
 	struct texture bounded = make_texture(*state, "bitmap filename=p0", COLOR_REFLECTANCE),
@@ -275,8 +276,8 @@ static void test_unbounded(void **state)
 	}
 }
 
-/* Derivatives against differences: exact up to rounding where the texture is a polynomial, which it is between pixel
- * centres. */
+/* Compares derivatives with differences, which are exact up to rounding where the texture is a polynomial, that is
+ * between pixel centres. */
 static void assert_jet(const struct texture *t, double u, double v, double h)
 {
 	struct texture_jet j, n[4];
@@ -306,7 +307,7 @@ static void test_derivatives(void **state)
 				     "checkerboard color0=1 color1=-3"};
 	for (size_t k = 0; k < sizeof texts / sizeof *texts; k++) {
 		struct texture t = make_texture(f, texts[k], COLOR_RELIEF);
-		/* Nowhere near a line between pixel centres or squares. */
+		/* Not near lines through pixel centres or between squares. */
 		for (int i = 0; i < 60; i++)
 			assert_jet(&t, -2.03 + 0.0711 * i, 1.07 + 0.0577 * i, 1e-7);
 	}
@@ -318,7 +319,7 @@ static void test_derivatives(void **state)
 	assert_true(fabs(j.x[0] - 0.125) < 1e-12 && fabs(j.du[0] + 0.75) < 1e-12);
 }
 
-/* A map over a surface made darker, or brighter up to white, and one of heights of either sign. */
+/* A reflectance made darker, or brighter up to white, and heights of either sign. */
 static void test_scale(void **state)
 {
 	struct fixture *f = *state;
@@ -346,7 +347,7 @@ static void test_scale(void **state)
 	assert_true(fabs(j.du[0] + 1.5) < 1e-12 && fabs(j.x[0] + 0.25) < 1e-12);
 }
 
-/* Of a colour the luminance, as of a coloured image. */
+/* The height of a colour is its luminance, as for coloured images. */
 static void test_coloured_height(void **state)
 {
 	struct fixture *f = *state;
@@ -355,7 +356,7 @@ static void test_coloured_height(void **state)
 	assert_true(texture_height(&t, 0.75, 0.25) == -3);
 }
 
-/* Of a coloured image that stands for a number Mitsuba 3 takes the luminance and 0.6 the mean, at all wavelengths, and
+/* For a coloured image that stands for a number, Mitsuba 3 takes the luminance and 0.6 the mean, at all wavelengths;
  * Mitsuba 3's checkerboards of numbers begin with color1. */
 static void test_numbers(void **state)
 {
@@ -385,12 +386,12 @@ static void test_numbers(void **state)
 		struct texture t = make_texture(f, cases[i].text, COLOR_REFLECTANCE);
 		spectrum x = look_up(&t, cases[i].u, 0.25, &colour);
 		for (int k = 0; k < SPECTRUM_LANES; k++)
-			if (fabs(x.v[k] - cases[i].expected) > 1e-7) /* of floats */
+			if (fabs(x.v[k] - cases[i].expected) > 1e-7) /* rounding of floats */
 				fail_msg("row %zu: %.9g is not %.9g", i, x.v[k], cases[i].expected);
 	}
 	f->build = build;
 	f->source.decoded = NULL;
-	/* The colour is still one, whatever the pixels of the same file became. */
+	/* The colour is not affected by the other use of the same file. */
 	spectrum x = look_up(&red, 0.25, 0.25, &colour);
 	assert_true(x.v[2] > 2 * x.v[1]);
 }
@@ -406,7 +407,7 @@ static struct texture tinted_texture(struct fixture *f, const char *scale, const
 	return t;
 }
 
-/* A colour times a colour is, at each wavelength, the product of the two; what a colour has above 1 is a factor. */
+/* A colour times a colour is their product at each wavelength; the part of a colour above 1 becomes a factor. */
 static void test_tint(void **state)
 {
 	struct fixture *f = *state;
@@ -435,7 +436,7 @@ static void test_tint(void **state)
 		    strstr(e.text, "a number here, not a colour"));
 }
 
-/* A texture times a texture is the product at each place. */
+/* A texture times a texture is their product at each point. */
 static void test_product(void **state)
 {
 	struct fixture *f = *state;
@@ -468,11 +469,11 @@ static void test_channel_and_threshold(void **state)
 	assert_value(&t, 0.25, 0.5, 0.0625);
 	t = make_texture(*state, "bitmap filename=p0 threshold=0.5 filter_type=nearest", COLOR_REFLECTANCE);
 	assert_value(&t, 1.5 / 3, 0.25, 0);
-	assert_value(&t, 2.5 / 3, 0.25, 1); /* 0.5 itself */
+	assert_value(&t, 2.5 / 3, 0.25, 1); /* 0.5 itself counts as above the threshold */
 	assert_value(&t, 0.5 / 3, 0.75, 1);
 }
 
-/* The stored numbers to that power, before the threshold; images of another gamma are not shared. */
+/* The stored numbers are raised to the power gamma before the threshold; images with another gamma are not shared. */
 static void test_gamma(void **state)
 {
 	struct texture t = make_texture(*state, "bitmap filename=p0 gamma=2.2", COLOR_REFLECTANCE);
@@ -481,7 +482,7 @@ static void test_gamma(void **state)
 	t = make_texture(*state, "bitmap filename=p0 gamma=1", COLOR_REFLECTANCE);
 	assert_value(&t, 1.5 / 3, 0.25, 0.25);
 	t = make_texture(*state, "bitmap filename=p0 gamma=0.5 threshold=0.5 filter_type=nearest", COLOR_REFLECTANCE);
-	assert_value(&t, 1.5 / 3, 0.25, 1); /* the root of 0.25 */
+	assert_value(&t, 1.5 / 3, 0.25, 1); /* 0.5, the square root of 0.25, reaches the threshold */
 	assert_value(&t, 2.5 / 3, 0.75, 0);
 }
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Grids of numbers against a slow way (tests/support/slow_grid.h). They have random sizes, places and values, all
- * modes, one channel or three; rays begin inside and outside and run along axes, in planes of points and through
- * points, too. Where an integral reaches a value is checked by integrating up to there.
+ * Grids are compared with a slow implementation (tests/support/slow_grid.h). They have random sizes, positions and
+ * values, all modes, one or three channels; rays begin inside and outside, some run along axes, in planes of points and
+ * through points. The position at which an integral reaches a value is checked by integrating up to it.
  */
 #include "worker/render/volume/grid.h"
 
@@ -33,13 +33,13 @@ static mat4 some_place(struct dice *d)
 	return mat4_mul(mat4_translate(shift), turned);
 }
 
-/* `sparse`: but for one or two points there is nothing. */
+/* sparse: all values but those of one or two points are 0. */
 static void fill(struct trial *t, struct dice *d, bool sparse)
 {
 	size_t count = (size_t)(t->g.channels * t->g.size[0] * t->g.size[1] * t->g.size[2]);
 	for (size_t i = 0; i < count; i++)
 		t->value[i] = !sparse && dice_below(d, 4) ? (float)dice_throw(d) : 0;
-	/* Also at the borders, which count on the other side where the grid repeats itself. */
+	/* Also at the borders, which matter on the opposite side if the grid repeats. */
 	for (int n = 0; n < 2; n++) {
 		size_t at = 0;
 		for (int i = 2; i >= 0; i--) {
@@ -50,7 +50,7 @@ static void fill(struct trial *t, struct dice *d, bool sparse)
 	}
 }
 
-/* Around the middle of the grid and as far as to a corner of it, so that it holds much else. */
+/* A box around the centre of the grid that reaches to a corner, so that it contains much space outside the grid. */
 static void set_box(struct grid *g)
 {
 	mat4 back;
@@ -67,7 +67,7 @@ static void set_box(struct grid *g)
 	}
 }
 
-/* As volume.c makes them: the box ends half a cell behind the points, or at the points where outside is 0. */
+/* Like those of volume.c: the box ends half a cell beyond the points, or at the points if values outside are 0. */
 static void make_trial(struct trial *t, struct dice *d, bool upright)
 {
 	struct grid *g = &t->g;
@@ -127,7 +127,7 @@ static void test_values(void **state)
 	assert_true(inside > 200);
 }
 
-/* From anywhere to somewhere in the box; `whole`: halves of whole numbers, so that rays meet edges and corners and run
+/* A ray from anywhere to a point in the box; whole: with multiples of 1/2, so that rays meet edges and corners and run
  * within faces. */
 static struct grid_ray some_ray(const struct grid *g, struct dice *d, bool whole)
 {
@@ -216,8 +216,8 @@ static void test_rays(void **state)
 	assert_true(met > 1500);
 }
 
-/* From far away, with almost no slope, and with none: the same as the ray that it stands for; never NaN, never endless.
- */
+/* Rays from far away, with almost no slope, and with none: results are those of an equivalent ray, never NaN, and never
+ * take endless time. */
 static void test_hard_rays(void **state)
 {
 	(void)state;
@@ -230,7 +230,7 @@ static void test_hard_rays(void **state)
 		double slope = slopes[dice_below(&d, sizeof slopes / sizeof *slopes)];
 		struct grid_ray r = {{x, y, -4}, {slope, slope, 1}, 0, INFINITY},
 				plain = {{x, y, -4}, {0, 0, 1}, 0, 99};
-		bool in_plane = round % 2; /* of points; then a slope may decide on which side of a jump the ray is */
+		bool in_plane = round % 2; /* then a slope may decide on which side of a jump the ray is */
 		if (in_plane)
 			r.o.x = plain.o.x = floor(x);
 		feclearexcept(FE_INVALID);

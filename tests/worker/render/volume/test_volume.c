@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Volumes as scenes of both dialects state them: where a grid lies and what is outside of it, against the rules of each
- * written down once more; colours of three channels; what is refused, left out with --lenient, and shared; which
- * effects of a medium that varies can be switched off.
+ * Volumes in scenes of both dialects: the position of a grid and the values outside it, compared with a separate
+ * implementation of the rules; colours of three channels; volumes that are refused, left out with --lenient, and
+ * shared; the effects of a varying medium that can be switched off.
  */
 #include "worker/render/volume/volume.h"
 #include "tests/support/dice.h"
@@ -28,7 +28,7 @@ static double linear_field(double x, double y, double z, uint32_t channel)
 	return 0.3 + 0.1 * x + 0.2 * y * z + 0.05 * channel * x;
 }
 
-/* A ball of a medium, in a scene of that version; g.vol is `grid` and h.vol `second`. */
+/* A sphere of a medium, in a scene of the given version; g.vol is `grid` and h.vol `second`. */
 static const struct memory_file *scene_of(const char *version, const char *type, const char *inner)
 {
 	static char xml[2048];
@@ -71,7 +71,8 @@ static double mix3(const double f[3], const int i[3])
 	return sum;
 }
 
-/* u: from 0 to 1 in the box. Mitsuba 3 has values in the middle of cells, 0.6 on the box. */
+/* u: from 0 to 1 in the box. Mitsuba 3 has values at the centres of cells, 0.6 has the outermost ones on the faces of
+ * the box. */
 static double wanted_at(const double u[3], bool dialect_3, bool nearest)
 {
 	double f[3];
@@ -146,7 +147,7 @@ static void test_places(void **state)
 		check_place(&places[i]);
 }
 
-/* In 3.x the box is that around the turned cube, with the values at the border; in 0.6 there is nothing. */
+/* In 3.x the bounding box of the rotated cube has the values at the border outside the cube; in 0.6 they are 0. */
 static void test_turned(void **state)
 {
 	(void)state;
@@ -187,13 +188,13 @@ static void test_turned(void **state)
 	}
 }
 
-/* What an albedo is outside of its grid. */
+/* The values of an albedo outside its grid. */
 static void test_outside(void **state)
 {
 	(void)state;
 	static const struct {
 		const char *version, *params;
-		double u, wanted; /* along x, of the values 0.25 and 0.75 */
+		double u, wanted; /* position along x, and value, for a grid of 0.25 and 0.75 */
 	} cases[] = {
 		{"3.0.0", "", 3.1, 0.75},
 		{"3.0.0", "", -9, 0.25},
@@ -226,8 +227,8 @@ static void test_outside(void **state)
 
 /* ---- colours ---- */
 
-/* Grey is the same at all wavelengths; where colours are rgb the channels are these; elsewhere a primary has most of
- * its colour and little of the others. */
+/* Grey is constant over wavelengths; with colour=rgb the channels are R, G and B; otherwise a primary has most of its
+ * own colour and little of the others. */
 static void test_colours(void **state)
 {
 	(void)state;
@@ -276,7 +277,7 @@ static void test_cube(void **state)
 	(void)state;
 	static const struct {
 		const char *version, *inner;
-		double low, size; /* of the cube; 0: it is everywhere */
+		double low, size; /* of the cube; 0: not limited */
 	} cases[] = {
 		{"3.0.0", "", 0, 1},
 		{"3.0.0", "<float name='sigma_t' value='1'/>", 0, 1},
@@ -341,7 +342,7 @@ static void test_constants(void **state)
 		   "<float name='sigmaT' value='2'/><float name='albedo' value='.25'/>");
 }
 
-/* Bytes count as 0 to 1. */
+/* Bytes stand for 0 to 1. */
 static void test_bytes(void **state)
 {
 	(void)state;
@@ -360,7 +361,7 @@ static void test_bytes(void **state)
 	world_free(w);
 }
 
-/* Two volumes of one file at different places have the same numbers, those of another file have others. */
+/* Two volumes of one file at different positions share their values; those of another file do not. */
 static void test_shared(void **state)
 {
 	(void)state;
@@ -394,7 +395,7 @@ static void test_refused(void **state)
 	vol_make(&grid, (const uint32_t[3]){4, 3, 5}, 1, linear_field);
 	world_of_files_refused(scene_of("3.0.0", "homogeneous", GRID("sigma_t", "")),
 			       "sigma_t must not vary in space in a homogeneous medium");
-	/* A turn by 90 degrees as exporters write it. */
+	/* A rotation by 90 degrees as exporters write it. */
 	struct world *upright =
 		world_with("3.0.0", GRID("sigma_t", "<string name='wrap_mode' value='mirror'/><transform "
 						    "name='to_world'><matrix value='6e-17 0 1 0 0 1 0 0 "
@@ -467,7 +468,7 @@ static void test_effects(void **state)
 	vol_make(&grid, (const uint32_t[3]){1, 1, 1}, 1, linear_field); /* 0.3 */
 	static const struct {
 		const char *effects;
-		double share; /* of sigma_t that is left */
+		double share; /* remaining share of sigma_t */
 	} cases[] = {{NULL, 1}, {"-scattering", 0.8}, {"-absorption", 0.2}, {"-absorption,-scattering", 0}};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		worlds_effects = cases[i].effects;
@@ -486,7 +487,7 @@ static void test_effects(void **state)
 			"absorption and scattering can only be switched off together in this scene: it has a medium "
 			"whose albedo varies from place to place");
 	}
-	/* White everywhere, but as a grid: nothing is absorbed, and sigma_t is what it was. */
+	/* A white albedo, but as a grid: nothing is absorbed, and sigma_t is unchanged. */
 	worlds_effects = NULL;
 	grid.value[0] = 1;
 	vol_write(&grid);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The texture `volume`: at places in the scene against the function that its grid was made from, on spheres, meshes,
- * instances and lamps, in one channel and in three; roughness by a grid, of which the least is found; without a grid;
- * what it cannot be, refused.
+ * The texture `volume`: compared at points of the scene with the function from which its grid was made, on spheres,
+ * meshes, instances and lights, with one channel and with three; a roughness on a grid, whose smallest value is found;
+ * a volume without a grid; errors.
  */
 #include "worker/render/volume/volume.h"
 #include "tests/support/dice.h"
@@ -23,7 +23,7 @@
 static const struct wavelengths colour = {.nm = {450, 550, 600, 700}};
 static struct vol grid;
 
-/* Linear in the place, so that the grid has it exactly between the middles of its outermost cells. */
+/* A linear function of position, which the grid represents exactly between the centres of its outermost cells. */
 static double field(double x, double y, double z, uint32_t channel)
 {
 	return 0.2 + 0.3 * x + (channel == 1 ? 0 : 0.2 * y) + (channel == 2 ? -0.15 : 0.1) * z;
@@ -47,7 +47,8 @@ static struct world *world_with(uint32_t channels, const char *inner)
 	return world_of_files(8, 8, files);
 }
 
-/* At a place in the world: the grid's box goes from -2 to 2, and its first and last points are half a cell inside. */
+/* Returns the value at a point of the world: the box of the grid runs from -2 to 2, and its first and last points are
+ * half a cell inside. */
 static double wanted_at(const struct world *w, vec3 p, uint32_t channel)
 {
 	vec3 q = vec3_madd(w->center, 1 / w->scale, p);
@@ -68,7 +69,7 @@ static void assert_reflectance(const struct world *w, const struct surface_point
 			fail_msg("shape %u, lane %d: %g, not %g", x->prim.shape, l, found.v[l], wanted.v[l]);
 }
 
-/* Triangles; two instances of one mesh, whose material is one. */
+/* Triangles; and two instances of one mesh with one material. */
 static void test_places(void **state)
 {
 	(void)state;
@@ -94,7 +95,7 @@ static void test_places(void **state)
 	}
 }
 
-/* Checks an area light with a volume at points that are drawn, and at points that paths hit. */
+/* Checks an area light with a volume at sampled points, and at points that paths hit. */
 static void check_lamp(const char *shape, uint32_t channels)
 {
 	char inner[1024];
@@ -134,7 +135,7 @@ static void test_lamps(void **state)
 	check_lamp("rectangle", 3);
 }
 
-/* The least roughness is found by looking at places all over the grid. */
+/* The smallest roughness is found by probing points all over the grid. */
 static void test_roughness(void **state)
 {
 	(void)state;
