@@ -31,7 +31,7 @@ struct camera {
 	double center_x, center_y;   /* the film point on the axis: the middle of the film plus the offset of the
 					principal point */
 	double near_clip, far_clip;  /* distances along the axis, in the rescaled world */
-	bool lens; /* x_k is sampled and mutated: the radius is above 0, or camera_force_aperture says so */
+	bool lens; /* x_k is sampled and mutated: the radius is above 0, or camera_force_aperture was used */
 	double aperture, focus;			    /* radius; distance of the plane of focus along the axis */
 	const struct camera_projection *projection; /* NULL: onto a plane */
 	double kc[2], fold;	    /* for perspective_rdist; fold: squared slope at which the image ends */

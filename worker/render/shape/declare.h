@@ -6,7 +6,7 @@
 #include "worker/render/plugin/param.h"
 #include "worker/render/shape/displace.h"
 
-/* Of meshes from files (smooth.h). */
+/* A parameter of meshes from files (smooth.h). */
 #define MESH_SMOOTH_PARAM                                                                   \
 	{                                                                                   \
 		"max_smooth_angle", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, 0, 180, NULL \

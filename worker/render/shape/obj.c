@@ -172,5 +172,5 @@ SHAPE_OPS(obj, {"filename", UNDERSTOOD(VALUE_STRING)},
 	  {"material", UNDERSTOOD(VALUE_STRING)}, /* only the faces after `usemtl` with this name; "": those before the
 						     first `usemtl` */
 	  {"face_normals", UNDERSTOOD(VALUE_BOOL)}, {"flip_tex_coords", UNDERSTOOD(VALUE_BOOL)}, {"collapse", IGNORED},
-	  {"load_materials", UNDERSTOOD(VALUE_BOOL)}, /* .mtl files are never read: false says that none is wanted */
+	  {"load_materials", UNDERSTOOD(VALUE_BOOL)}, /* .mtl files are not read; false: without a note */
 	  MESH_SMOOTH_PARAM, {"shape_index", REFUSED}, SHAPE_PARAMS);

@@ -198,7 +198,7 @@ static double table_value(const struct color *c, double nm)
 	return piece_value(c, piece_of(c, nm));
 }
 
-/* Computes the RGB components that stand for the colour, at scale 1, if paths carry RGB: D65 is white, and negative
+/* Computes the RGB components of the colour, at scale 1, for paths that carry RGB: D65 is white, and negative
  * components become 0. */
 static void set_rgb(struct color *c, bool under_d65)
 {
