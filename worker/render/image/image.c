@@ -19,7 +19,7 @@ static const struct image_format *const formats[] = {
 #undef FORMAT
 };
 
-/* A grey value as three equal ones, in place. */
+/* Reduces the image to one channel, in place. A grey image stays as it is: its value counts for each channel. */
 static void keep_channel(struct image *img, enum image_channel channel)
 {
 	size_t count = (size_t)img->width * img->height;
@@ -38,7 +38,7 @@ void image_grey(struct image *i, enum image_channel as)
 	for (size_t k = 0; k < count; k++) {
 		const float *p = i->pixels + 3 * k;
 		const double rgb[3] = {(double)p[0], (double)p[1], (double)p[2]};
-		bool same = p[0] == p[1] && p[0] == p[2]; /* and stays so */
+		bool same = p[0] == p[1] && p[0] == p[2]; /* equal channels keep their exact value, free of rounding */
 		i->pixels[k] = same		  ? p[0]
 			       : as == IMAGE_MEAN ? (float)((rgb[0] + rgb[1] + rgb[2]) / 3)
 						  : (float)rec709_luminance(rgb);
@@ -46,7 +46,7 @@ void image_grey(struct image *i, enum image_channel as)
 	i->channels = 1;
 }
 
-/* The alpha of an image of a format that has none. */
+/* Makes the alpha channel of an image whose format has none: 1 everywhere. */
 static void make_opaque(struct image *img)
 {
 	for (size_t i = 0; i < (size_t)img->width * img->height; i++)

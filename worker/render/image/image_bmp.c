@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Uncompressed Windows bitmaps: palettes of 1, 4 and 8 bits, and 24 and 32 bits per pixel, from bottom to top or, with
- * a negative height, from top to bottom. A grey palette gives one channel. Alpha is not read, because most writers
+ * a negative height, from top to bottom. A palette of greys gives one channel. Alpha is not read, because most writers
  * leave 0 there.
  *
  * Failures: -EBADMSG for a file that contradicts itself or ends too early, -ENOTSUP for compression, 16 bits and
@@ -18,7 +18,7 @@ struct bmp {
 	bool down; /* rows from top to bottom */
 	uint32_t bits, pixels_at;
 	const unsigned char *palette;
-	uint32_t colours, entry; /* entries, and bytes of each: blue, green, red */
+	uint32_t colours, entry; /* entries, and bytes per entry: blue, green, red */
 };
 
 static int read_palette(struct bmp *b, uint32_t header, uint32_t used)
@@ -34,7 +34,7 @@ static int read_palette(struct bmp *b, uint32_t header, uint32_t used)
 	return 0;
 }
 
-/* For 32 bits with masks: only the default masks are accepted. */
+/* Returns whether the masks of a 32-bit image are the default ones; no others are accepted. */
 static bool masks_are_usual(const struct bmp *b)
 {
 	const unsigned char *p = b->in->bytes + FILE_HEADER + INFO_HEADER;
@@ -71,7 +71,7 @@ static int read_header(struct bmp *b)
 	return read_palette(b, header, used);
 }
 
-/* The three bytes of pixel x of a row; NULL: not in the palette. */
+/* Returns the blue, green and red bytes of pixel x of a row; NULL if its index is beyond the palette. */
 static const unsigned char *pixel_at(const struct bmp *b, const unsigned char *row, uint64_t x)
 {
 	if (!b->palette)

@@ -27,7 +27,8 @@ static int copy_planes(const struct image_input *in, const struct exr_image *x, 
 	return r;
 }
 
-/* Colours in another space, such as ACEScg, become those of BT.709, whose negative ones are out of its gamut. */
+/* Converts colours given in another space, such as ACEScg, to BT.709. Colours outside BT.709's gamut get negative
+ * values. */
 static int convert(const struct image_input *in, const struct exr_image *x, struct image *out)
 {
 	struct primaries p;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* One line per file format, in the order in which they are tried: FORMAT(NAME) stands for its const struct image_format
- * image_format_NAME. tga is last, because the others have a beginning of their own. */
+/* One line per file format, in the order in which formats are tried: FORMAT(NAME) stands for its const struct
+ * image_format image_format_NAME. tga comes last, because only its files do not begin with a signature. */
 FORMAT(png)
 FORMAT(jpeg)
 FORMAT(exr)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Radiance images: mantissas of red, green, blue and a common exponent (Ward 1991, Real Pixels), flat or run-length
- * encoded by component. EXPOSURE is not applied, as in Mitsuba.
+ * Radiance images: mantissas of red, green and blue with a common exponent (Ward 1991, Real Pixels), stored flat or
+ * run-length encoded by component. As in Mitsuba, EXPOSURE is not applied.
  */
 #include "worker/render/image/image_decode.h"
 
@@ -58,7 +58,8 @@ static int read_header(struct cursor *c, int64_t *width, int64_t *height)
 	return 0;
 }
 
-/* One component of a scan line: a count above 128 repeats the next byte, one up to 128 copies that many. */
+/* Decodes one component of a scan line: a count above 128 repeats the next byte count - 128 times, a count up to 128
+ * copies that many bytes. */
 static bool read_runs(struct cursor *c, unsigned char *out, size_t n)
 {
 	size_t i = 0;
@@ -126,7 +127,7 @@ static int decode(const struct image_input *in, struct image *out)
 	struct cursor c = {in, in->bytes, in->bytes + in->size};
 	int64_t width, height;
 	int r = read_header(&c, &width, &height);
-	/* The best compression: two bytes for 127 values of a component. */
+	/* The best compression stores 127 values of a component in two bytes. */
 	uint64_t w = r ? 0 : (uint64_t)width, h = r ? 0 : (uint64_t)height;
 	if (!r)
 		r = image_allocate(in, out, w, h, 3,

@@ -10,9 +10,9 @@
 
 #include <setjmp.h>
 
-enum { SCANS_MAX = 200 }; /* of a progressive file: each costs a pass over all pixels */
+enum { SCANS_MAX = 200 }; /* limit for a progressive file: each scan costs a pass over all pixels */
 
-/* State that survives the longjmp; the library's structures require theirs to come first. */
+/* State that survives the longjmp. errors and progress extend libjpeg's structures. */
 struct state {
 	struct jpeg_error_mgr errors;
 	struct jpeg_progress_mgr progress;
@@ -39,7 +39,7 @@ static void on_error(j_common_ptr jpeg)
 	longjmp(s->back, 1);
 }
 
-/* The library replaces missing data with grey and only warns; here that is an error. Surplus bytes and odd versions
+/* libjpeg replaces missing data with grey and only warns; here that is an error. Surplus bytes and unusual versions
  * are harmless. */
 static void on_message(j_common_ptr jpeg, int level)
 {
@@ -69,7 +69,7 @@ static int read_header(struct state *s)
 	if (j->arith_code)
 		return error_set(s->in->error, EINVAL, "JPEG with arithmetic coding is not supported");
 	j->out_color_space = channels == 1 ? JCS_GRAYSCALE : JCS_RGB;
-	/* Every block of 8 x 8 takes at least one bit. */
+	/* A block of 8 x 8 pixels takes at least one bit. */
 	return image_allocate(s->in, s->out, j->image_width, j->image_height, channels,
 			      (uint64_t)j->image_width * j->image_height / 512);
 }

@@ -6,8 +6,8 @@
 #include <stdint.h>
 
 struct image {
-	uint32_t width, height, channels; /* channels: 1 or 3 (alpha is dropped) */
-	float *pixels;			  /* [height][width][channels], finite, in the arena */
+	uint32_t width, height, channels; /* channels: 1 or 3; alpha is dropped, or is the only channel */
+	float *pixels;			  /* [height][width][channels], all finite; allocated in the arena */
 };
 
 #endif

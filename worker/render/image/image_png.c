@@ -54,7 +54,8 @@ static void on_read(png_structp png, png_bytep out, size_t n)
 	s->at += n;
 }
 
-/* Grey or RGB with 8 or 16 bits, with alpha if requested: palettes and lower depths are expanded. */
+/* Sets libpng up to deliver grey or RGB of 8 or 16 bits, with alpha if requested: palettes and lower depths are
+ * expanded. */
 static int read_header(struct state *s)
 {
 	png_set_read_fn(s->png, s, on_read);
@@ -65,7 +66,7 @@ static int read_header(struct state *s)
 	uint32_t width = png_get_image_width(s->png, s->info), height = png_get_image_height(s->png, s->info);
 	png_set_expand(s->png);
 	if (s->in->alpha)
-		png_set_add_alpha(s->png, 0xffff, PNG_FILLER_AFTER); /* if there is none */
+		png_set_add_alpha(s->png, 0xffff, PNG_FILLER_AFTER); /* where the file has no alpha */
 	else
 		png_set_strip_alpha(s->png);
 	png_set_interlace_handling(s->png);
@@ -75,7 +76,7 @@ static int read_header(struct state *s)
 	if ((s->in->alpha ? s->channels != 2 && s->channels != 4 : s->channels != 1 && s->channels != 3) ||
 	    (s->depth != 8 && s->depth != 16))
 		return error_set(s->in->error, EINVAL, "PNG with %u channels of %u bits", s->channels, s->depth);
-	/* deflate produces at most 1032 bytes per byte; a pixel takes at least a bit. */
+	/* deflate expands a byte to at most 1032; a pixel takes at least one bit. */
 	return image_allocate(s->in, s->out, width, height, s->in->alpha ? 1 : s->channels,
 			      (uint64_t)width * height / (8 * 1032));
 }
@@ -110,7 +111,7 @@ static int convert(struct state *s)
 	if (!value)
 		return error_set(s->in->error, ENOMEM, "out of memory");
 	image_table(value, max, s->in->raw || s->in->alpha);
-	uint32_t step = s->in->alpha ? s->channels : 1, first = step - 1; /* alpha is a pixel's last */
+	uint32_t step = s->in->alpha ? s->channels : 1, first = step - 1; /* alpha is the last sample of a pixel */
 	size_t n = (size_t)s->out->width * s->out->channels;
 	for (uint32_t y = 0; y < s->out->height; y++) {
 		const png_byte *p = s->rows[y];

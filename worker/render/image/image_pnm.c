@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Portable maps: binary PGM and PPM (P5, P6) of 8 and 16 bits, and PFM (Pf, PF), whose floats are stored from the
- * bottom row up, in the byte order that the sign of its scale gives, and are multiplied by its size.
+ * Portable maps: binary PGM and PPM (P5, P6) of 8 and 16 bits, and PFM (Pf, PF). PFM stores floats from the bottom row
+ * up; the sign of its scale gives the byte order, and the floats are multiplied by the scale's absolute value.
  *
- * Failures: -EBADMSG for a header that is not one, a file that ends too early, a sample above the largest, and a float
+ * Failures: -EBADMSG for a malformed header, a file that ends too early, a sample above the stated maximum, and a float
  * that is not finite.
  */
 #include "worker/render/image/image_decode.h"
@@ -20,8 +20,8 @@ struct pnm {
 	const struct image_input *in;
 	const unsigned char *at;
 	int64_t width, height;
-	double scale;		  /* of PFM, else the largest sample */
-	uint32_t channels, bytes; /* of a sample */
+	double scale;		  /* of a PFM file; for PGM and PPM, the largest sample */
+	uint32_t channels, bytes; /* bytes: per sample */
 	bool floats, big_endian;
 };
 
@@ -36,7 +36,7 @@ static bool at_blank(const struct pnm *m)
 	return c > 0 && number_is_blank((char)c);
 }
 
-/* A word after blanks and comments, which begin with '#'. One byte after it is taken as well. */
+/* Reads a word after any blanks and comments, which begin with '#', and consumes the one blank after the word. */
 static bool next_word(struct pnm *m, char word[WORD_MAX])
 {
 	size_t n = 0;

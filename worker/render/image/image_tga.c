@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Truevision's TGA: grey of 8 bits, colours of 24 and 32 bits, palettes of these with indices of 8 bits; plain or
- * run-length encoded, from any corner. Packets may go on in the next row.
+ * Truevision's TGA: 8-bit grey, 24-bit and 32-bit colour, and palettes of such colours with 8-bit indices; uncompressed
+ * or run-length encoded, starting at any corner. A run may continue into the next row.
  *
- * Nothing at the beginning of a file tells what it is. It is one if its name ends in .tga, or if it ends with the
- * version 2 signature.
+ * A TGA file has no signature at its beginning. A file counts as TGA if its name ends in .tga, or if it ends with the
+ * signature of version 2.
  *
  * Failures: -EBADMSG for a file that contradicts itself or ends too early, -ENOTSUP for 15 and 16 bits, interleaved
- * rows and other kinds.
+ * rows and other kinds of pixels.
  */
 #include "worker/render/image/image_decode.h"
 #include "common/base/bytes.h"
@@ -17,19 +17,19 @@ enum { HEADER = 18, KIND_MAPPED = 1, KIND_COLOUR = 2, KIND_GREY = 3, KIND_PACKED
 
 struct tga {
 	const struct image_input *in;
-	uint32_t width, height, kind, bytes; /* of a pixel */
+	uint32_t width, height, kind, bytes; /* bytes: per pixel, or per palette index */
 	bool packed, down, leftwards;
-	const unsigned char *map; /* NULL: pixels are colours */
+	const unsigned char *map; /* the palette; NULL: the pixels are colours */
 	uint32_t map_first, map_count, map_bytes;
-	const unsigned char *at; /* what comes next */
-	/* Of the current packet: */
+	const unsigned char *at; /* next unread byte */
+	/* The current run-length packet: */
 	uint32_t left;
-	const unsigned char *repeated; /* NULL: each pixel is stored */
+	const unsigned char *repeated; /* the pixel that the packet repeats; NULL: each pixel is stored */
 };
 
 static bool is_tga(const struct image_input *in)
 {
-	static const char signature[] = "TRUEVISION-XFILE."; /* with the 0 */
+	static const char signature[] = "TRUEVISION-XFILE."; /* followed by its terminating 0 */
 	const char *format = picture_name_format(in->name);
 	return (format && strcmp(format, ".tga") == 0) ||
 	       (in->size >= HEADER + sizeof signature &&
@@ -94,7 +94,8 @@ static const unsigned char *take_bytes(struct tga *t, size_t bytes)
 	return p;
 }
 
-/* The bytes of the next pixel: blue, green, red and perhaps alpha, or grey. NULL: the file ends, or the palette. */
+/* Returns the bytes of the next pixel: blue, green, red and perhaps alpha, or grey. NULL if the file ends too early
+ * or the index is beyond the palette. */
 static const unsigned char *next_pixel(struct tga *t)
 {
 	if (t->packed && t->left == 0) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* WebP, lossy and lossless, by libwebp. A RIFF file that is none, a damaged one and an animation are errors. */
+/* WebP, lossy and lossless, decoded by libwebp. Other RIFF files, damaged files and animations are errors. */
 #include "worker/render/image/image_decode.h"
 
 #include <string.h>
@@ -24,7 +24,7 @@ static int decode(const struct image_input *in, struct image *out)
 		return error_set(in->error, EBADMSG, "WebP: damaged, or cut off in its header");
 	if (about.has_animation)
 		return error_set(in->error, ENOTSUP, "WebP: an animation; supported: single images");
-	/* A lossless image of one colour takes next to nothing. */
+	/* No lower limit on the file's size: a lossless image of a single colour takes next to nothing. */
 	int r = image_allocate(in, out, (uint64_t)about.width, (uint64_t)about.height, in->alpha ? 1 : 3, 0);
 	if (r)
 		return r;

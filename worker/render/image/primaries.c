@@ -7,7 +7,7 @@
 
 static const struct primaries bt709 = {{0.64f, 0.30f, 0.15f, 0.3127f}, {0.33f, 0.60f, 0.06f, 0.3290f}};
 
-/* Not if rounding to float may be all that keeps the primaries off one line. */
+/* Returns false if the primaries may be off a common line only because of rounding to float. */
 static bool spans(const mat4 *columns)
 {
 	double volume = fabs(mat4_det3(*columns)), box = 1;
@@ -16,7 +16,8 @@ static bool spans(const mat4 *columns)
 	return volume > FLT_EPSILON * box;
 }
 
-/* The primaries' XYZ are the columns, each scaled so that (1,1,1) is the white with Y = 1. */
+/* Computes the matrix from RGB to XYZ. Its columns are the XYZ of the primaries, scaled so that (1,1,1) is the white
+ * point with Y = 1. */
 static bool to_xyz(const struct primaries *p, mat4 *m)
 {
 	mat4 columns = mat4_identity(), inverse;

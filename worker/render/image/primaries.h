@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Colours relative to the primaries and the white that an OpenEXR file names, as linear BT.709. As in OpenEXR's
- * RGBtoXYZ and XYZtoRGB, the colour stays the same stimulus: another white is not adapted to D65. Pure.
+ * Converts colours relative to the primaries and the white point that an OpenEXR file states to linear BT.709. As with
+ * OpenEXR's RGBtoXYZ and XYZtoRGB, the colour stays the same stimulus: there is no chromatic adaptation to D65. Pure.
  */
 #ifndef WORKER_RENDER_IMAGE_PRIMARIES_H
 #define WORKER_RENDER_IMAGE_PRIMARIES_H
@@ -13,7 +13,8 @@ struct primaries {
 };
 
 bool primaries_are_bt709(const struct primaries *p);
-/* m: BT.709 from the file's colour, [row][column]. False: the primaries lie on a line, or the white on the alychne. */
+/* m: the matrix from the file's RGB to BT.709, [row][column]. Returns false if the primaries lie on a line or the
+ * white point lies on the alychne (y = 0). */
 bool primaries_to_bt709(const struct primaries *p, double m[3][3]);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The sRGB transfer function (IEC 61966-2-1), decoding only; odd beyond [0,1]. */
+/* The decoding half of the sRGB transfer function (IEC 61966-2-1), extended beyond [0,1] as an odd function. */
 #ifndef WORKER_RENDER_IMAGE_SRGB_H
 #define WORKER_RENDER_IMAGE_SRGB_H
 

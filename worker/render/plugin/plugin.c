@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Look-ups in the tables of plug-ins, and two tables of its own: the names that parameters had in 0.5 and 0.6, and
- * Mitsuba's plug-ins that the tables lack. They are lists of some dozens, searched from the beginning.
+ * Look-ups in the tables of plug-ins, and two tables of this file's own: the parameters that 0.5 and 0.6 named
+ * differently, and those plug-ins of Mitsuba that the other tables do not list. The tables have some dozens of rows and
+ * are searched linearly.
  *
- * Nothing fails: a name that no table has is NULL or false, and the caller reports it with the nearest name.
+ * Nothing fails: a name that is in no table gives NULL or false, and the caller reports it with the most similar name.
  */
 #include "worker/render/plugin/plugin.h"
 
@@ -51,7 +52,7 @@ const struct plugin_decl *plugin_find(const struct plugin_decl *decls, enum plug
 		if (d->cls != cls)
 			continue;
 		if (strcasecmp(d->type, type) ==
-		    0) /* Mitsuba looks for a file of this name, so "Sphere" works on Windows */
+		    0) /* Mitsuba opens a file of this name, so "Sphere" works on Windows */
 			return d;
 		if (is_any(d->type))
 			any = d;

@@ -10,39 +10,42 @@
 #include <stddef.h>
 
 const char *plugin_class_name(enum plugin_class cls);		     /* "bsdf" */
-bool plugin_class_find(const char *element, enum plugin_class *cls); /* also <camera>, the old name of <sensor> */
+bool plugin_class_find(const char *element, enum plugin_class *cls); /* also finds <camera>, the old name of <sensor> */
 void plugin_offer_classes(struct spelling *s);
 
-/* The entry with that name, or the class's "*"; NULL: unknown. */
+/* Each returns the entry with that name, or else the "*" entry; NULL if there is neither. */
 const struct plugin_decl *plugin_find(const struct plugin_decl *decls, enum plugin_class cls, const char *type);
 const struct param *plugin_param(const struct plugin_decl *d, const char *name);
 
-/* Whether any of them has a parameter of that name. */
+/* Returns whether any plug-in in the tables has a parameter of that name. */
 bool plugin_any_has(const struct plugin_decl *decls, const char *name);
 
-/* The 3.x name of what 0.5/0.6 names differently, beyond the spelling; otherwise the name itself. */
+/* Returns Mitsuba 3's name for a parameter that 0.5/0.6 calls by another word (not just in camelCase); any other
+ * name is returned as it is. */
 const char *plugin_new_name(const struct plugin_decl *d, const char *name);
 
-/* A name of an older version, and the one that it is read as. */
+/* A name that older versions used, and the name that it is read as. */
 struct renamed {
-	int before;		    /* the minor version of 0.x that dropped it; 0: any */
-	const char *element, *type; /* what has it, or in which a parameter is; NULL: any */
+	int before;		    /* the minor version of 0.x that dropped the old name; 0: any version */
+	const char *element, *type; /* where the rule applies; NULL: anywhere */
 	const char *old, *now;
-	bool parameter; /* a parameter's name; otherwise a type's, or without `element` an element's */
+	bool parameter; /* a parameter's name; otherwise the name of a type or, if `element` is NULL, of an element */
 };
-bool plugin_new_name_at(size_t i, struct renamed *out); /* false: no more */
+bool plugin_new_name_at(size_t i, struct renamed *out); /* false: i is past the last name */
 
-/* An object in the scene that only tells Mitsuba where light comes from, and changes no image. type: NULL: none. */
+/* Returns whether an object only tells Mitsuba where light comes from and does not change the image. type may be
+ * NULL. */
 bool plugin_is_guide(const char *element, const char *type);
 
-/* Whether it is one of Mitsuba's own plug-ins, of either dialect, that the tables lack, or lacked, by this name. */
+/* Returns whether Mitsuba (0.6 or 3) has a plug-in of this name that has no entry of its own in the tables, or had
+ * none in earlier versions of the tables. */
 bool plugin_is_mitsubas(enum plugin_class cls, const char *type);
-/* The index-th of these, with its class; NULL: no more. */
+/* Returns the index-th of these plug-ins and stores its class; NULL after the last. */
 const char *plugin_of_mitsuba(size_t index, enum plugin_class *cls);
 
 void plugin_offer_types(const struct plugin_decl *decls, enum plugin_class cls, struct spelling *s);
 void plugin_offer_params(const struct plugin_decl *d, struct spelling *s);
 void plugin_list_types(const struct plugin_decl *decls, enum plugin_class cls, char *text, size_t size);
-void plugin_list_params(const struct plugin_decl *d, char *text, size_t size); /* the understood ones */
+void plugin_list_params(const struct plugin_decl *d, char *text, size_t size); /* only parameters that are understood */
 
 #endif

@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The end of a number is found first, by hand: strtod would accept more, and where it stops depends on the locale. Then
- * strtod converts it in the C locale. Lists are read number by number, each with the separators behind it.
+ * Numbers in text. number_scan finds the end of a number itself, because strtod accepts more (hexadecimal, "inf") and
+ * stops at a place that depends on the locale. With at most 15 or so digits and a small exponent the value is one exact
+ * integer times or divided by one exact power of ten; any other number is converted by strtod_l in the C locale. Lists
+ * are read one number at a time, each followed by its separators.
  *
- * Failures: NULL, false or -1, as the header says; errors are worded by callers.
+ * Failures are NULL, false or -1, as the header says; the caller words the error.
  */
 #include "worker/render/text/number.h"
 
@@ -14,7 +16,8 @@
 #include <string.h>
 #include <strings.h>
 
-/* Powers of ten that a double represents exactly: with a mantissa below 2^53, one operation rounds correctly. */
+/* The powers of ten that a double represents exactly: with a mantissa below 2^53, a single operation rounds
+ * correctly. */
 static const double power_of_ten[] = {1e0,  1e1,  1e2,	1e3,  1e4,  1e5,  1e6,	1e7,  1e8,  1e9,  1e10, 1e11,
 				      1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
 
@@ -31,7 +34,8 @@ static bool is_digit(char c)
 	return c >= '0' && c <= '9';
 }
 
-/* [first, last) consists of digits, a point and an exponent. */
+/* Converts [first, last), which number_scan has accepted: an optional sign, digits, a point and an exponent. False
+ * if it is too long or overflows. */
 static bool convert_slowly(const char *first, const char *last, double *out)
 {
 	static pthread_once_t once = PTHREAD_ONCE_INIT;
@@ -48,8 +52,8 @@ static bool convert_slowly(const char *first, const char *last, double *out)
 
 struct digits {
 	uint64_t mantissa;
-	int exponent; /* of ten */
-	bool exact;   /* the mantissa has all digits */
+	int exponent; /* decimal exponent of the mantissa's last digit */
+	bool exact;   /* no digit had to be left out of the mantissa */
 	bool any;
 };
 
@@ -154,7 +158,7 @@ static const char *skip_blanks(const char *p)
 	return p;
 }
 
-/* A number of a scene file; "0.5f", as some programs write it, is 0.5. */
+/* Reads a number of a scene file; a trailing "f", which some programs write as in C, is skipped: "0.5f" is 0.5. */
 static const char *scan_value(const char *p, const char *end, double *out)
 {
 	const char *rest = number_scan(p, end, out);
@@ -175,7 +179,7 @@ bool number_parse_int(const char *text, int64_t *out)
 	return rest && *skip_blanks(rest) == 0;
 }
 
-/* The place behind blanks and separators. Mitsuba takes any number of them for one. */
+/* Returns the position after any blanks and separators. Like Mitsuba, treats several separators in a row as one. */
 static const char *skip_separators(const char *p, const char *separators)
 {
 	while (number_is_blank(*p) || (*p && strchr(separators, *p)))

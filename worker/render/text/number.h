@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Numbers as text, always with a point, whatever the process's locale. NaN, infinity, hexadecimal and values that
- * overflow are not numbers. Any thread; allocates nothing (except the locale, once).
+ * Numbers in text, with a decimal point whatever the process's locale. NaN, infinity, hexadecimal numbers and values
+ * that overflow are not accepted as numbers. Any thread; the only allocation is the C locale, once.
  */
 #ifndef WORKER_RENDER_TEXT_NUMBER_H
 #define WORKER_RENDER_TEXT_NUMBER_H
@@ -10,26 +10,28 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Reads a number at the start of [p, end) and returns what follows it; NULL: there is none. Correctly rounded. */
+/* Each reads a number at the start of [p, end) and returns the position after it, or NULL if there is no number or
+ * it overflows. Floating-point values are correctly rounded. */
 const char *number_scan(const char *p, const char *end, double *out);
 const char *number_scan_int(const char *p, const char *end, int64_t *out);
 
-/* The same for files written by programs: their spellings of non-numbers ("nan", "-nan(ind)", "inf", "1.#IND") give
- * NaN, which the caller refuses or replaces. */
+/* Like number_scan(), for files written by programs: the spellings of NaN and infinity that C libraries print
+ * ("nan", "-nan(ind)", "inf", "1.#IND") give NaN, which the caller refuses or replaces. */
 const char *number_scan_printed(const char *p, const char *end, double *out);
 
-/* The whole text is one number; blanks around it and an `f` after it are allowed. */
+/* Each returns whether the whole text is one number, apart from blanks around it; number_parse() also accepts an `f`
+ * after the number. */
 bool number_parse(const char *text, double *out);
 bool number_parse_int(const char *text, int64_t *out);
 
-/* A list of such numbers, separated by blanks, commas or both. The count, or -1 if it contains anything else or more
- * than max. */
+/* Reads numbers, as number_parse() accepts them, separated by blanks, commas or both. Returns their count, or -1 if
+ * the text contains anything else or more than max numbers. */
 int number_list(const char *text, double *out, size_t max);
 
-/* The same for weights of mixtures, which Mitsuba 0.6 also separates by ";". */
+/* Like number_list(), for the weights of mixtures, which Mitsuba 0.6 also separates by ";". */
 int number_weights(const char *text, double *out, size_t max);
 
-/* The rest of a line from p on, without the blanks around it. */
+/* Returns the rest of the line from p on, without the blanks around it, and stores its length. */
 const char *number_line_rest(const char *p, const char *end, size_t *length);
 
 static inline bool number_is_blank(char c)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Mitsuba 0.6's camelCase in 3.x spelling. Pure; any thread. */
+/* Converts Mitsuba 0.6's camelCase names to the spelling of 3.x. Pure; any thread. */
 #ifndef WORKER_RENDER_TEXT_SNAKE_CASE_H
 #define WORKER_RENDER_TEXT_SNAKE_CASE_H
 

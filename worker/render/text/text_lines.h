@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A file of lines that begin with a word, like Wavefront's. Blanks around words are skipped. Pure. */
+/* Splits a text file, such as Wavefront's, into lines that begin with a keyword. Blanks around words are skipped.
+ * Pure. */
 #ifndef WORKER_RENDER_TEXT_TEXT_LINES_H
 #define WORKER_RENDER_TEXT_TEXT_LINES_H
 
@@ -8,16 +9,16 @@
 
 struct text_line {
 	int number;
-	const char *word, *rest; /* rest: without the blanks around it */
+	const char *word, *rest; /* rest: what follows the word, without the blanks around it */
 	size_t word_length, rest_length;
 };
 
 struct text_lines {
 	const char *p, *end;
-	int number; /* of the last line */
+	int number; /* number of the line returned last, from 1 */
 };
 
-/* The next line; false: none is left. An empty line has an empty word. */
+/* Stores the next line and returns true, or returns false at the end of the text. An empty line has an empty word. */
 bool text_lines_next(struct text_lines *t, struct text_line *out);
 bool text_line_is(const struct text_line *l, const char *word);
 
