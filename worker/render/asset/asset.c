@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Opens the files of a scene on behalf of one that is not trusted: every name must stay below the scene's folder or
- * one that the user added.
+ * Opens the files of a scene that is not trusted: every name must stay below the scene's folder or below a folder that
+ * the user added with --path.
  *
  * Happy path: search_open tries the folders in order. open_below opens the folder and lets the kernel resolve the name
- * beneath it (openat2, RESOLVE_BENEATH); read_all then reads the file into memory. A name that leads out of the
- * scene's folder or is absolute (asset_name_up) is resolved by its text alone, and opened if it ends below one of the
- * folders.
+ * beneath it (openat2, RESOLVE_BENEATH); read_all then reads the file into memory. A name that is absolute or leads out
+ * of the scene's folder (asset_name_up) is resolved textually, and opened if the result lies below one of the folders.
  *
- * Failures are one sentence in struct error: a name that leads out (-EINVAL, with the --path that would allow it), one
- * that is not there (-ENOENT, with the --path that would find it, or a name like it), anything but a regular file, a
- * file above 4 GB or one that shrinks while it is read. Kernels without openat2 do not follow symbolic links at all.
+ * Failures are one sentence in struct error: a name that leads out of the folders (-EINVAL, with the --path that would
+ * allow it), a file that does not exist (-ENOENT, with the --path that would find it, or a similar name), anything but
+ * a regular file, a file above 4 GB or one that shrinks while it is read. On kernels without openat2, symbolic links
+ * are not followed at all.
  */
 #include "worker/render/asset/asset.h"
 
@@ -47,7 +47,7 @@ static bool is_below(const char *name)
 	return true;
 }
 
-/* Where the kernel cannot keep the look-up below the folder, symbolic links are not followed at all. */
+/* For kernels that cannot confine the look-up to the folder: follows no symbolic links at all. */
 static int open_step_by_step(int folder, const char *name)
 {
 	int at = dup(folder);
@@ -92,7 +92,7 @@ static int open_below(const char *folder, const char *name)
 	return fd;
 }
 
-/* Read, not mapped: a file that another process shortens must not kill this one. */
+/* Reads the file rather than mapping it: a mapped file that another process truncates would kill this one. */
 static int read_all(int fd, const char *name, struct asset *out, struct error *e)
 {
 	struct stat st;
@@ -116,7 +116,8 @@ static int read_all(int fd, const char *name, struct asset *out, struct error *e
 	return 0;
 }
 
-/* `shown` is the name for the user, who wrote another one where it leads out of the scene's folder. */
+/* `shown` is the name for messages, as the user wrote it: it differs from `name` if the written name leads out of
+ * the scene's folder. */
 static int open_in(const char *folder, const char *name, const char *shown, struct asset *out, struct error *e)
 {
 	*out = (struct asset){0};
@@ -140,8 +141,8 @@ static const char *path_after(const char *folder, const char *path)
 	return strncmp(path, folder, n) == 0 && path[n] == '/' ? path + n + 1 : NULL;
 }
 
-/* The part of an absolute path after the folder, compared as written or with the folder's links resolved; NULL: it is
- * not below the folder. */
+/* Returns the part of an absolute path after the folder, compared as written or with the folder's symbolic links
+ * resolved; NULL if the path is not below the folder. */
 static const char *path_below(const char *folder, const char *path)
 {
 	char real[PATH_MAX];
@@ -149,7 +150,7 @@ static const char *path_below(const char *folder, const char *path)
 	return name || !realpath(*folder ? folder : ".", real) ? name : path_after(real, path);
 }
 
-/* A name that leads `up` folders out of the scene's own, or to the top of all, and then to `rest`. */
+/* Opens a name that leads `up` folders out of the scene's own, or to the root, and from there to `rest`. */
 static int open_outside(const struct asset_folders *f, const char *canonical, struct asset *out, struct error *e)
 {
 	char path[PATH_MAX + NAME_MAX_BYTES], shown[NAME_MAX_BYTES];
@@ -163,7 +164,7 @@ static int open_outside(const struct asset_folders *f, const char *canonical, st
 	for (size_t i = 0; i < up && end > 0; i++)
 		while (end > 0 && path[--end] != '/')
 			;
-	size_t top = end; /* the folder to which ".." leads: it has all that is named by as many */
+	size_t top = end; /* end of the folder that the ".." lead to, suggested for --path */
 	snprintf(path + end, sizeof path - end, "/%s", rest);
 	int rc = 0;
 	for (size_t i = 0; i < f->count && (rc == 0 || rc == -ENOENT || rc == -ENOTDIR); i++) {
@@ -199,8 +200,8 @@ static bool has_file(const char *folder, const char *name)
 	return fd >= 0;
 }
 
-/* The folder, to be given with --path, in which the file is: the current one, from which the scene was perhaps written,
- * or one around the scene's. NULL: none. */
+/* Returns a folder in which the file exists, to be suggested for --path: the current folder, relative to which the
+ * scene may have been written, or one of those above the scene's. NULL if none has it. */
 static const char *find_elsewhere(const char *scene_folder, const char *name, char path[PATH_MAX])
 {
 	enum { UP = 8 };
@@ -217,7 +218,7 @@ static const char *find_elsewhere(const char *scene_folder, const char *name, ch
 	return NULL;
 }
 
-/* One of mesh_1.obj is not a mistyped mesh_2.obj. */
+/* Where mesh_1.obj exists, it is not suggested for mesh_2.obj. */
 static bool has_same_digits(const char *a, const char *b)
 {
 	for (;; a++, b++) {
@@ -230,8 +231,8 @@ static bool has_same_digits(const char *a, const char *b)
 	}
 }
 
-/* The entry of that folder whose name is nearest; of large folders some are compared, since thousands of files may be
- * missing. */
+/* Finds the entry of that folder with the most similar name. Compares only the first entries of a large folder,
+ * since thousands of files may be missing. */
 static bool find_entry(const char *folder, const char *inside, const char *wanted, char best[NAME_MAX + 1])
 {
 	enum { COMPARED_MAX = 1024 };
@@ -265,8 +266,8 @@ static bool is_file(const char *folder, const char *name)
 	return regular;
 }
 
-/* The file in that folder whose name is nearest: what is not there of each part of the path is replaced. Names of
- * Windows often differ in capitals only. */
+/* Finds an existing file with a similar name: each part of the path that does not exist is replaced by the most
+ * similar entry. Names from Windows often differ only in upper and lower case. */
 static bool find_near(const char *folder, const char *name, char near[NAME_MAX_BYTES])
 {
 	size_t used = 0;
@@ -291,7 +292,7 @@ static bool find_near(const char *folder, const char *name, char near[NAME_MAX_B
 	return is_file(folder, near);
 }
 
-/* Like open_any; if the file is not found, the error says which --path would help. */
+/* Like open_any, but if the file is not found, the error says which --path would help. */
 static int search_open(void *user, const char *name, struct asset *out, struct error *e)
 {
 	const struct asset_folders *f = user;

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A file that nobody uses any more stays until another one is opened. While it is in use, others are opened beside it
- * and not kept. Failures are the inner source's, and too many bytes; without memory for the name a file is not kept.
+ * The file opened last stays open after its last user has closed it, until another file is opened. While it is in use,
+ * other files are opened beside it and are not kept. Failures are those of the inner source, and -E2BIG after too many
+ * bytes; if there is no memory for its name, a file is not kept.
  */
 #include "worker/render/asset/asset_keeper.h"
 
@@ -26,7 +27,7 @@ static int keeper_open(void *user, const char *name, struct asset *out, struct e
 		return 0;
 	}
 	if (k->users == 0)
-		drop_asset(k); /* before the other takes memory */
+		drop_asset(k); /* before the next file takes memory */
 	if (k->read > ASSET_KEEPER_BYTES_MAX)
 		return error_set(e, E2BIG, "%s: the scene asks for its files again and again; %llu GB were read so far",
 				 name, (unsigned long long)k->read >> 30);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A source of files that keeps the last one open: where many shapes and pictures lie in one file (glTF) it is read
- * once. What it reads in all is bounded (-E2BIG): a short scene may ask for two large files by turns, a million times.
- * One thread; must outlive what it opened.
+ * A source of files that keeps the last file open, so that a file that holds many shapes and pictures (glTF) is read
+ * once. The total number of bytes read is limited (-E2BIG), because a short scene may ask for two large files in turn,
+ * a million times. One thread; the keeper must outlive the files it has opened.
  */
 #ifndef WORKER_RENDER_ASSET_ASSET_KEEPER_H
 #define WORKER_RENDER_ASSET_ASSET_KEEPER_H
@@ -18,10 +18,10 @@ struct asset_keeper {
 	char *name; /* NULL: nothing is kept */
 	struct asset kept;
 	unsigned users;
-	uint64_t read; /* bytes, so far */
+	uint64_t read; /* bytes read so far */
 };
 
-/* k->inner is set, the rest 0. */
+/* k->inner must be set and all other members 0. */
 struct asset_source asset_keeper_source(struct asset_keeper *k);
 void asset_keeper_fini(struct asset_keeper *k);
 

@@ -17,7 +17,7 @@ static bool is_top(const char *name, size_t n)
 	return n == TOP && memcmp(name, ASSET_NAME_TOP, TOP) == 0;
 }
 
-/* Where the last part of out[0..n) begins. */
+/* Returns where the last component of out[0..n) begins. */
 static size_t last_part(const char *out, size_t n)
 {
 	while (n > 0 && out[n - 1] != '/')

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Opens the file, checks the range against its size, and decodes base64 (RFC 4648, section 4; the padding may lack).
- * Fails where the file is not there, the range leads out of it, or a letter is none of the 64.
+ * Opens the file, checks the range against its size, and decodes base64 (RFC 4648, section 4; padding is optional).
+ * Fails if the file cannot be opened, the range is not within it, or a character is not one of base64's 64.
  */
 #include "worker/render/asset/asset_range.h"
 
@@ -28,7 +28,7 @@ void asset_range_encode(const unsigned char *bytes, size_t n, char *text)
 	*text = 0;
 }
 
-/* The number of bytes; -1: it is no base64. `out` has room for three quarters of n. */
+/* Returns the number of decoded bytes, or -1 if the text is not base64. `out` has room for three quarters of n. */
 static int64_t decode(const unsigned char *text, size_t n, unsigned char *out)
 {
 	size_t count = 0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A range of a file's bytes, as they stand there or written in base64. Any thread. */
+/* A range of a file's bytes, stored as they are or encoded in base64. Any thread. */
 #ifndef WORKER_RENDER_ASSET_ASSET_RANGE_H
 #define WORKER_RENDER_ASSET_ASSET_RANGE_H
 
@@ -14,19 +14,19 @@ struct asset_range {
 	const unsigned char *bytes;
 	size_t size;
 	struct asset file;
-	bool opened;		/* the file */
-	unsigned char *decoded; /* NULL: the file's own */
+	bool opened;		/* `file` is open */
+	unsigned char *decoded; /* the bytes decoded from base64; NULL: `bytes` points into the file */
 };
 
-/* `count` bytes from `first` on; UINT64_MAX: to its end. -EINVAL where the range is not in the file, or is no base64.
- * asset_range_close after 0 alone. */
+/* Opens `count` bytes starting at `first`; a count of UINT64_MAX means up to the end of the file. Returns -EINVAL if
+ * the range is not within the file or is not base64. Call asset_range_close() only after success. */
 int asset_range_open(struct asset_range *r, const struct asset_source *assets, const char *name, uint64_t first,
 		     uint64_t count, bool base64, struct error *e);
 void asset_range_close(struct asset_range *r, const struct asset_source *assets);
 
-/* Decodes base64. name: for the message. */
+/* Replaces the range by what its base64 decodes to. name: for the message. */
 int asset_range_decode(struct asset_range *r, const char *name, struct error *e);
-/* With a final 0. text: ASSET_RANGE_TEXT(n) bytes. */
+/* Encodes n bytes in base64, with a terminating 0. text: ASSET_RANGE_TEXT(n) bytes. */
 #define ASSET_RANGE_TEXT(n) (((n) + 2) / 3 * 4 + 1)
 void asset_range_encode(const unsigned char *bytes, size_t n, char *text);
 

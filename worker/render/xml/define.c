@@ -106,7 +106,7 @@ static int refuse_unknown(struct define_table *t, const char *name, size_t lengt
 			 wanted, spelling_hint(&s, hint, sizeof hint));
 }
 
-/* One pass; with out NULL only the length is found. */
+/* Makes one pass over the text; if out is NULL, only the length is computed. */
 static int expand(struct define_table *t, const char *text, bool keep_unknown, size_t size_max, char *out,
 		  size_t *length, struct error *e)
 {
@@ -114,7 +114,7 @@ static int expand(struct define_table *t, const char *text, bool keep_unknown, s
 	while (*text) {
 		const char *piece = text;
 		size_t piece_length = 1;
-		if (text[0] == '\\' && text[1] == '$') { /* a $ that begins no name */
+		if (text[0] == '\\' && text[1] == '$') { /* a literal $, written as \$ */
 			piece = text + 1;
 			text += 2;
 		} else if (*text == '$') {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Elements that are not in an XML file but made from the contents of other files. One thread; they are allocated in
- * the given arena. */
+/* Makes elements that do not come from an XML file but from the contents of other files. One thread; they are
+ * allocated in the given arena. */
 #ifndef WORKER_RENDER_XML_ELEMENT_MAKE_H
 #define WORKER_RENDER_XML_ELEMENT_MAKE_H
 
@@ -9,17 +9,18 @@
 
 enum { ELEMENT_MAKE_ATTRIBUTES = 4 };
 
-/* Appends it to the children of `parent`. */
+/* Appends `el` to the children of `parent`. */
 void element_link(struct xml_element *parent, struct xml_element *el);
 
-/* A new element of that place in a file, appended to `parent` (NULL: to none). NULL: out of memory. */
+/* Makes an element that is reported at that place in a file, and appends it to `parent` unless that is NULL. Returns
+ * NULL if out of memory. */
 struct xml_element *element_make(struct xml_element *parent, const char *name, const char *file, int line,
 				 struct arena *arena);
 
-/* Adds an attribute to an element of element_make, at most ELEMENT_MAKE_ATTRIBUTES. */
+/* Adds an attribute to an element made by element_make(), which has room for ELEMENT_MAKE_ATTRIBUTES of them. */
 void element_put(struct xml_element *el, const char *name, const char *value);
 
-/* A parameter: a new element of `in` with `name` and `value`. false: out of memory. */
+/* Appends a parameter to `in`: an element `kind` with `name` and `value`. Returns false if out of memory. */
 bool element_value(struct xml_element *in, const char *kind, const char *name, const char *value, struct arena *arena);
 
 #endif

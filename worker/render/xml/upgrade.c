@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * upgrade() walks over the file's elements, inner ones last, so that rules see the enclosing elements under their new
+ * upgrade() walks over the file's elements, outer ones first, so that rules see the enclosing elements under their new
  * names. Rules are rows of tables, like Mitsuba's own; those that need more than a new name are functions.
  *
- * What differs in more than names before 0.3: `phong`, `ward` and `microfacet` had two factors besides their colours,
+ * Before 0.3, more than names was different: `phong`, `ward` and `microfacet` had two factors besides their colours,
  * and other defaults; `mirror` was smooth chrome; and <lookAt ox="..." ...> was mirrored. In files of 2.x and 3.x only
- * `disney` has another name since, as which Mitsuba's `principled` was known before its release.
+ * one name has changed since: `disney`, under which Mitsuba's `principled` was known before its release.
  *
- * Failure: out of memory.
+ * The only failure is running out of memory.
  */
 #include "worker/render/xml/upgrade.h"
 
@@ -17,7 +17,8 @@
 #include <string.h>
 #include <strings.h>
 
-/* Minor version before which it applies: 0.3 is `before` 4. NULL: any. */
+/* A rule. before: the minor version from which it no longer applies (4: files before 0.4). NULL: any element or
+ * type. */
 struct new_name {
 	int before;
 	const char *element, *type, *old, *now;
@@ -37,7 +38,7 @@ static const struct new_name types[] = {
 	{3, "bsdf", NULL, "microfacet", "roughplastic"},
 };
 
-/* For elements inside one of that name and type. */
+/* Names of parameters: of children of an element with that name and type. */
 static const struct new_name parameters[] = {
 	{4, "emitter", "area", "intensity", "radiance"},
 	{4, "emitter", "constant", "intensity", "radiance"},
@@ -62,7 +63,7 @@ static const struct new_name parameters[] = {
 static const struct new_name elements[] = {{4, NULL, NULL, "luminaire", "emitter"},
 					   {4, NULL, NULL, "camera", "sensor"}};
 
-/* `thin` chooses between this and `principledthin`. */
+/* `thin` selects between this and `principledthin`. */
 static const struct new_name unreleased[] = {{0, "bsdf", NULL, "disney", "principled"}};
 
 bool upgrade_name_at(size_t i, struct renamed *out)
@@ -114,7 +115,7 @@ static void rename_value(const struct new_name *rules, size_t count, int minor, 
 		}
 }
 
-/* Adds an element with one or two attributes as the first inside another. */
+/* Inserts an element with one or two attributes as the first child of another. */
 static struct xml_element *put_first(struct xml_element *in, const char *name, const char *key, const char *value,
 				     const char *key_2, const char *value_2, struct arena *arena)
 {
@@ -137,7 +138,7 @@ static struct xml_element *put_first(struct xml_element *in, const char *name, c
 	return el;
 }
 
-/* What another element says from now on. */
+/* Removes an element whose meaning another element has taken over. */
 static void take_out(struct xml_element *in, const struct xml_element *el)
 {
 	struct xml_element *before = NULL;
@@ -151,7 +152,7 @@ static void take_out(struct xml_element *in, const struct xml_element *el)
 		in->last = before;
 }
 
-/* Cameras before 0.4 were mirrored horizontally, and their angle of view was that of the smaller side. */
+/* Before 0.4, cameras were mirrored horizontally, and their angle of view was that of the smaller side. */
 static bool turn_camera(struct xml_element *camera, struct arena *arena)
 {
 	const char *axis = "smaller";
@@ -181,12 +182,12 @@ static struct xml_element *named_child(const struct xml_element *in, const char 
 	return NULL;
 }
 
-/* Materials of diffuse and specular light, and their colours by default. */
+/* Materials with a diffuse and a specular lobe, and the default colours of these. */
 static const struct lobes {
 	const char *type, *diffuse, *specular;
 } lobes[] = {{"phong", "0.5", "0.2"}, {"ward", "0.5", "0.2"}, {"microfacet", "0", "1"}};
 
-/* A texture `scale` in the place of a colour, which moves into it. */
+/* Puts a `scale` texture in the place of a colour, which becomes the texture's value. */
 static bool wrap(struct xml_element *colour, const char *factor, struct arena *arena)
 {
 	struct xml_element *inner = arena_alloc(arena, 1, sizeof *inner);
@@ -215,7 +216,7 @@ static bool wrap(struct xml_element *colour, const char *factor, struct arena *a
 	return put_first(colour, "float", "name", "scale", "value", factor, arena);
 }
 
-/* One colour and its factor, which is 1 if it is not given. */
+/* Applies a factor to a colour; without the factor's element the factor is 1. */
 static bool scale_colour(struct xml_element *bsdf, const char *name, const char *factor_name, const char *fallback,
 			 struct arena *arena)
 {
@@ -241,7 +242,8 @@ static bool upgrade_material(struct xml_element *bsdf, struct arena *arena)
 	return !is_of_type(bsdf, "mirror") || put_first(bsdf, "string", "name", "material", "value", "Cr", arena);
 }
 
-/* origin, target and up had an attribute for each number; x is that of the first of them, such as `ox`. */
+/* Joins the three attributes that origin, target and up once had, one per number, into one; x is the first letter of
+ * their names, such as "o" of ox, oy and oz. */
 static bool join(const struct xml_element *el, const char *x, const char *name, struct xml_attribute *out,
 		 struct arena *arena)
 {
@@ -260,7 +262,7 @@ static bool join(const struct xml_element *el, const char *x, const char *name, 
 	return true;
 }
 
-/* el: a lookAt with such attributes, which comes after a scale that mirrors x. */
+/* Replaces a lookAt that has such attributes by a scale that mirrors x, followed by a lookAt in today's form. */
 static bool turn_lookat(struct xml_element *el, struct arena *arena)
 {
 	struct xml_element *look = arena_alloc(arena, 1, sizeof *look);
@@ -275,7 +277,7 @@ static bool turn_lookat(struct xml_element *el, struct arena *arena)
 	*mirror = (struct xml_attribute){"x", "-1"};
 	for (struct xml_element *c = look->first; c; c = c->next)
 		c->parent = look;
-	el->first = el->last = NULL; /* otherwise a walk over the elements returns to the wrong one, and never ends */
+	el->first = el->last = NULL; /* otherwise a walk over the elements would return to this one and never end */
 	el->name = "scale";
 	el->attributes = mirror;
 	el->attribute_count = 1;
@@ -285,7 +287,7 @@ static bool turn_lookat(struct xml_element *el, struct arena *arena)
 	return true;
 }
 
-/* What needs more than a new name in files from before 0.3. */
+/* Applies the rules for files from before 0.3 that need more than a new name. */
 static bool upgrade_oldest(struct xml_element *el, struct arena *arena)
 {
 	if (is_named(el, "bsdf"))
@@ -304,7 +306,7 @@ static int upgrade(struct xml_element *el, int minor, struct arena *arena, struc
 			el->name = elements[i].now;
 	if (camera && !turn_camera(el, arena))
 		return xml_error(el, e, ENOMEM, "out of memory");
-	/* pixelFormat has replaced it, and has no effect here. */
+	/* pixelFormat, which has no effect here, has replaced the film's `alpha`. */
 	const char *name = xml_attribute(el, "name");
 	if (minor < 4 && el->parent && is_named(el->parent, "film") && name && strcmp(name, "alpha") == 0)
 		el->ignored = true;
@@ -334,7 +336,7 @@ int upgrade_file(struct xml_element *scene, int minor, struct arena *arena, stru
 	return upgrade(scene, minor, arena, e);
 }
 
-/* `thin` chose between what are two plug-ins since. */
+/* The parameter `thin` selected between what are now two plug-ins. */
 static void rename_disney(struct xml_element *bsdf, struct xml_attribute *type)
 {
 	struct xml_element *thin = named_child(bsdf, "thin");

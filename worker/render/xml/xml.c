@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * expat calls open_element and on_end. Each element is put into the arena with its attributes, with $names replaced and
- * files searched along the paths. <include> reads the named file in its place. Nothing is interpreted here.
+ * expat calls on_start and on_end. open_element puts each element into the arena with its attributes, with $names
+ * replaced and files searched along the paths. An <include> is replaced by the contents of its file, which is read at
+ * the include's end tag. Nothing is interpreted here.
  *
  * Failures stop the parser at once, with file and line: errors of expat, a document type with declarations, and depth,
- * counts and sizes beyond the limits in xml.h. A file whose XML is wrong somewhere is kept up to there, with the error
- * in the list of what is missing, so that one run finds the problems of the rest.
+ * counts and sizes beyond the limits in xml.h. If a file is not well formed, what comes before the mistake is kept and
+ * the error goes into the list of missing things, so that the same run also finds the problems of the rest.
  */
 #include "worker/render/xml/xml.h"
 
@@ -29,26 +30,26 @@ struct reader {
 	struct define_table defines;
 	struct error *error;
 	int failed;    /* the first error's negative errno */
-	int includes;  /* files around the current one */
-	size_t bytes;  /* total bytes of files so far */
-	bool mixed;    /* noted that files have both dialects */
+	int includes;  /* number of files that include the current one, one inside another */
+	size_t bytes;  /* total size of the files read so far */
+	bool mixed;    /* noted that the files are of both dialects */
 	bool upgraded; /* noted that a file is from before 0.4 */
-	bool worded;   /* noted that there is text */
-	bool cut;      /* noted that a file goes on after its first element */
+	bool worded;   /* noted that text is ignored */
+	bool cut;      /* noted that what follows a file's first element is ignored */
 	bool by_end;   /* noted that a file was found by the end of its path */
-	bool broken;   /* the last file that was read is not well formed */
+	bool broken;   /* the last file read is not well formed */
 	/* the current file */
 	XML_Parser parser;
 	const char *file;
 	struct xml_element *top;     /* the file's <scene> */
 	struct xml_element *current; /* innermost open element */
-	struct xml_element *hook;    /* the <include> element that the file replaces, NULL for the main file */
+	struct xml_element *hook;    /* the <include> element that the file replaces; NULL for the main file */
 	int depth;
-	int minor; /* if the version is below 0.5, otherwise -1 */
+	int minor; /* minor version of a file before 0.5; otherwise -1 */
 	bool snake;
 };
 
-/* expat needs realloc without the old size, which is stored in front of each block. */
+/* expat's realloc does not pass the old size, so the size is stored in front of each block. */
 union header {
 	size_t size;
 	max_align_t align;
@@ -87,7 +88,7 @@ static void *expat_realloc(void *p, size_t size)
 
 static const XML_Memory_Handling_Suite expat_memory = {expat_alloc, expat_realloc, expat_free};
 
-/* Elements for which this is true are marked ignored, with everything inside. */
+/* Returns whether an element has no meaning here: it is marked ignored, with everything inside. */
 static bool xml_is_foreign(const char *element)
 {
 	/* Final or preview mode, objects hidden by an editor, settings of another renderer. */
@@ -103,7 +104,7 @@ static void stop(struct reader *r, int code)
 
 static int line_now(const struct reader *r)
 {
-#if XML_MAJOR_VERSION > 2 || XML_MINOR_VERSION >= 9 /* where the other is deprecated */
+#if XML_MAJOR_VERSION > 2 || XML_MINOR_VERSION >= 9 /* which deprecates the other */
 	return (int)XML_GetCurrentLineNumber64(r->parser);
 #else
 	return (int)XML_GetCurrentLineNumber(r->parser);
@@ -116,7 +117,8 @@ static int out_of_memory(struct reader *r)
 			 r->file, line_now(r), XML_MEMORY_MAX >> 20);
 }
 
-/* All names without a value and all files that are not there are reported, not only the first. */
+/* Adds the error to the list of missing things: all names without a value and all missing files are reported, not
+ * only the first. */
 static int note_missing(struct reader *r)
 {
 	const char *text = arena_strdup(r->arena, r->error->text);
@@ -146,7 +148,7 @@ static int copy_attributes(struct reader *r, struct xml_element *el, const char 
 		int c = 0;
 		if (el->ignored || !strchr(value, '$'))
 			a[i].value = arena_strdup(r->arena, value);
-		else /* $scene['memUsage'] is for the labels that Mitsuba 0.6 writes into images */
+		else /* Mitsuba 0.6 writes $scene['memUsage'] and the like as labels into images */
 			c = define_substitute(&r->defines, value, r->snake && strchr(value, '['), XML_VALUE_MAX,
 					      &a[i].value, r->error);
 		if (c == -ENOENT || c == -EEXIST) {
@@ -170,7 +172,7 @@ static int copy_attributes(struct reader *r, struct xml_element *el, const char 
 	return 0;
 }
 
-/* Mitsuba takes type, id and name there, and they mean nothing; editors add namespaces. */
+/* Mitsuba accepts type, id and name on <scene>, where they have no effect; XML editors add namespaces. */
 static bool means_nothing(const char *attribute)
 {
 	return !strcmp(attribute, "type") || !strcmp(attribute, "id") || !strcmp(attribute, "name") ||
@@ -191,7 +193,8 @@ static int needs_version(const struct reader *r, const struct xml_element *el)
 	return xml_error(el, r->error, EINVAL, "needs version=\"0.6.0\" or version=\"3.0.0\" and the like");
 }
 
-/* Files from before 0.3 have none. The main file turns out to be one at its end, and those that it includes follow. */
+/* Files from before 0.3 state no version. A main file without one is first read as such a file, and checked at its
+ * end; the files that it includes need no version either. */
 static const char *version_of(const struct reader *r, const struct xml_element *el)
 {
 	const char *version = xml_attribute(el, "version");
@@ -199,7 +202,8 @@ static const char *version_of(const struct reader *r, const struct xml_element *
 	return old ? "0.2" : version;
 }
 
-/* The version determines which dialect's names and rules apply. An included file may hold one object alone. */
+/* Selects the dialect, whose names and rules apply, by the file's version. An included file may hold a single object
+ * instead of a <scene>. */
 static int begin_file(struct reader *r, struct xml_element *el)
 {
 	if (!el->parent && strcmp(el->name, "scene") != 0)
@@ -228,11 +232,11 @@ static int begin_file(struct reader *r, struct xml_element *el)
 			"the old files";
 	}
 	r->tree->black_backs |= dialect_3;
-	r->tree->dialect_3 |= dialect_3; /* 3.x reads older files, 0.6 no newer ones */
+	r->tree->dialect_3 |= dialect_3; /* 3.x reads older files, but 0.6 does not read newer ones */
 	return 0;
 }
 
-/* From 2.x on, an object may have a version of its own, for the names in it. */
+/* Selects the names of an object: from 2.x on, it may have a version of its own. */
 static int begin_object(struct reader *r, struct xml_element *el)
 {
 	el->snake = r->snake || (el != r->top && el->parent->snake);
@@ -259,7 +263,7 @@ static int read_default(struct reader *r, const struct xml_element *el)
 	return c ? error_prefix(r->error, c, "%s:%d: <default>", el->file, el->line) : 0;
 }
 
-/* Adds a folder. Files that are named after this element are searched there, before the scene's own folder. */
+/* Adds a folder. Files named after this element are searched for there before the scene's own folder. */
 static int read_path(struct reader *r, const struct xml_element *el)
 {
 	const char *value = xml_attribute(el, "value");
@@ -274,7 +278,8 @@ static int read_path(struct reader *r, const struct xml_element *el)
 	return 0;
 }
 
-/* Once for the whole scene, which often has hundreds of such paths. */
+/* Notes that a file was found by the end of its path: once for the whole scene, which often has hundreds of such
+ * paths. */
 static int note_end(struct reader *r, const char *written, const char *name)
 {
 	if (!name || r->by_end || r->tree->note_count == XML_NOTES_MAX)
@@ -293,8 +298,9 @@ static int note_end(struct reader *r, const char *written, const char *name)
 	return 0;
 }
 
-/* <include filename>, <spectrum filename> and <string name="filename" value>. Plug-ins open the last, and Mitsuba's do
- * not know which file names it. */
+/* Finds the files named by <include filename>, <spectrum filename> and <string name="filename" value>. The last is
+ * opened by a plug-in; Mitsuba's plug-ins do not know which scene file names it, so it is not searched for beside that
+ * file. */
 static int find_files(struct reader *r, struct xml_element *el)
 {
 	const char *named = xml_attribute(el, "name");
@@ -361,15 +367,16 @@ static int open_element(struct reader *r, const char *name, const char **attribu
 
 static int read_file(struct reader *r, const char *name);
 
-/* An element in which a file breaks off. The file of an <include> would have been read at its end. */
+/* Marks an element that is still open where a file breaks off. The file of an open <include> was not read, because
+ * that happens at its end tag. */
 static void leave_open(struct xml_element *el)
 {
 	el->told = true;
 	el->unset |= strcmp(el->name, "include") == 0;
 }
 
-/* After a file that is not well formed: whether what it holds up to there can be understood. What is still open is
- * incomplete, and not looked at. */
+/* Returns whether the part before the mistake of a file that is not well formed can be used. Elements that are still
+ * open there are incomplete and are not interpreted. */
 static bool keep_beginning(struct reader *r)
 {
 	if (!r->top || r->minor >= 0 || !xml_attribute(r->top, "version"))
@@ -380,7 +387,7 @@ static bool keep_beginning(struct reader *r)
 	return true;
 }
 
-/* An <include> inside an object becomes the object that its file holds. */
+/* Replaces an <include> inside an object by the object in its file. */
 static int become_included(struct xml_element *el, struct error *e)
 {
 	const struct xml_element include = *el;
@@ -410,7 +417,7 @@ static int read_include(struct reader *r, struct xml_element *el)
 	int c = at_top ? 0 : element_check(el, "filename", false, r->error);
 	if (c)
 		return c;
-	if (el->unset) { /* which has been noted */
+	if (el->unset) { /* has been noted */
 		r->tree->holes = r->defines.incomplete = true;
 		return 0;
 	}
@@ -462,7 +469,8 @@ static void on_start(void *user, const char *name, const char **attributes)
 		stop(r, c);
 }
 
-/* Most often a letter too many. Mitsuba says nothing, so one note for the whole scene is enough. */
+/* Text between elements is most often a stray character. Mitsuba ignores it silently, so one note per scene is
+ * enough. */
 static int note_text(struct reader *r, const struct xml_element *el)
 {
 	if (!el->text || el->ignored || r->worded || r->tree->note_count == XML_NOTES_MAX)
@@ -504,7 +512,7 @@ static void on_text(void *user, const char *text, int length)
 			r->current->text = true;
 }
 
-/* Without declarations of its own it means nothing: the file that it names is never opened. */
+/* A DOCTYPE without declarations has no effect: the file that it names is never opened. */
 static void on_doctype(void *user, const char *name, const char *system, const char *public_id, int has_subset)
 {
 	(void)name, (void)system, (void)public_id;
@@ -530,7 +538,7 @@ static bool ends_early(struct reader *r, enum XML_Error code)
 	return true;
 }
 
-/* Another program's scene, a mesh, an image. */
+/* Returns whether the file is not XML at all, but perhaps another program's scene, a mesh or an image. */
 static bool is_something_else(const struct asset *a)
 {
 	const unsigned char *text = a->bytes;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A scene file as a tree of elements, through expat: includes opened, defaults substituted, nothing interpreted.
- * DOCTYPE is refused, and with it every entity; depth, sizes and counts are bounded. One thread; the tree is allocated
- * in the given arena.
+ * Reads a scene file into a tree of elements, with expat: includes are opened and defaults substituted, but nothing is
+ * interpreted. A DOCTYPE with declarations is refused, and with it every entity; depth, sizes and counts are bounded.
+ * One thread; the tree is allocated in the given arena.
  */
 #ifndef WORKER_RENDER_XML_XML_H
 #define WORKER_RENDER_XML_XML_H
@@ -18,8 +18,8 @@ enum {
 	XML_DEPTH_MAX = 64,   /* nesting of elements, and of objects that refer to objects */
 	XML_INCLUDE_MAX = 15, /* files that include files */
 	XML_FILES_MAX = 1024, /* files included in total */
-	XML_PATHS_MAX = 16,   /* folders that are searched for files */
-	XML_NOTES_MAX = 8,    /* on a file as a whole */
+	XML_PATHS_MAX = 16,   /* values of <path> */
+	XML_NOTES_MAX = 8,    /* notes that apply to a file as a whole */
 	XML_MISSING_MAX = DEFINE_MISSING_MAX,
 	XML_ELEMENTS_MAX = 1 << 20,
 	XML_ATTRIBUTES_MAX = 24,
@@ -30,19 +30,20 @@ enum {
 };
 
 struct xml_tree {
-	struct xml_element *root; /* <scene>; what a file holds is inside its <include>, or in the place of one that
-				     stands in an object */
+	struct xml_element *root; /* <scene>. The contents of an included file are children of its <include>; inside an
+				     object, the included object takes the <include>'s place. */
 	bool dialect_3;
-	bool black_backs; /* XML of version >= 2 */
+	bool black_backs; /* an XML file of version >= 2 was read: as in Mitsuba 3, one-sided materials are black from
+			     behind */
 	uint32_t element_count, include_count, path_count, note_count, missing_count;
-	const char *includes[XML_FILES_MAX];  /* names of included files; repeated where included more than once */
+	const char *includes[XML_FILES_MAX];  /* names of included files, with repetitions */
 	const char *notes[XML_NOTES_MAX];     /* notes for the user about the file */
-	const char *missing[XML_MISSING_MAX]; /* a sentence for each $name without a value and each file that is not
-						 there or cannot be read to its end */
-	bool holes; /* some file is missing: unknown ids, which it may define, are not reported */
-	bool blind; /* a <path> has no value: the scene is not built, since files in it would be missing */
-	const char *
-		paths[XML_PATHS_MAX]; /* of <path>, in their order; names of files after them are searched there, too */
+	const char *missing[XML_MISSING_MAX]; /* a sentence for each $name without a value and each file that is missing
+						 or cannot be read to its end */
+	bool holes; /* some file is missing: unknown ids are not reported, because it may define them */
+	bool blind; /* a <path> has no value: the scene is not built, since files that are there would seem to be
+		       missing */
+	const char *paths[XML_PATHS_MAX]; /* of <path>, for the files named after it */
 };
 
 int xml_read(struct xml_tree *t, const struct asset_source *assets, const char *name,

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Looks for a file where Mitsuba does: in the folders of the file that names it and of those that include this one, in
- * those of <path>, in the scene's folder. At last, only here, it is looked for by the end of its path. Files are opened
- * to see whether they are there, and closed again.
+ * Looks for a file where Mitsuba does: beside the scene file that names it and beside the files that include that one,
+ * then in the folders of <path>, then in the scene's folder. After that, unlike Mitsuba, it looks for the end of the
+ * path in the scene's folder. Files are opened to see whether they exist, and closed again.
  *
- * Failure: -ENOMEM only. A file that is nowhere is reported by whoever opens it.
+ * The only failure is -ENOMEM. A file that is found nowhere is reported by the code that opens it.
  */
 #include "worker/render/xml/xml_files.h"
 
@@ -13,7 +13,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* FOLDER/NAME, or NAME alone. NULL: out of memory. */
+/* Returns the canonical form of FOLDER/NAME, or of NAME if the folder is "". NULL if out of memory. */
 static const char *canonical(struct arena *arena, const char *folder, const char *name)
 {
 	size_t n = strlen(folder), size = n + 1 + strlen(name);
@@ -31,7 +31,7 @@ static bool leads_out(const char *canonical_name)
 	return asset_name_up(canonical_name, &rest) > 0;
 }
 
-/* 0, or why it cannot be opened: -EINVAL where it leads out of the folders that may be read. */
+/* Returns 0 if the file can be opened, otherwise the error: -EINVAL if it is outside the folders that may be read. */
 static int try_open(const struct xml_files *f, const char *name)
 {
 	struct asset a;
@@ -42,7 +42,7 @@ static int try_open(const struct xml_files *f, const char *name)
 	return rc;
 }
 
-/* What the file is called in that folder; *found: whether it is there. NULL: out of memory. */
+/* Returns the canonical name of the file in that folder and stores whether it exists. NULL if out of memory. */
 static const char *look_in(const struct xml_files *f, const char *folder, const char *written, bool *found)
 {
 	const char *there = canonical(f->arena, folder, written);
@@ -50,9 +50,9 @@ static const char *look_in(const struct xml_files *f, const char *folder, const 
 	return there;
 }
 
-/* As in Mitsuba 3: in the folder of the file that names it, in that of the one which includes this, and so on; the
- * scene's own folder comes after them. A name that leads out of the scene's folder is complained of as it is in the
- * first of them. */
+/* Searches as Mitsuba 3 does: beside the file that names it, then beside the one that includes that file, and so on;
+ * the scene's own folder comes last. If the name leads out of the scene's folder and is not found, *name becomes the
+ * first place tried, for the message. */
 static int look_around(const struct xml_files *f, const char *written, const char **name, bool *found)
 {
 	const char *file = f->file;
@@ -76,8 +76,9 @@ static int look_around(const struct xml_files *f, const char *written, const cha
 	return 0;
 }
 
-/* In the folders of <path>, the last one first, as in Mitsuba 3. If the file is in none that may be read, *name is its
- * path in one that may not: opening it fails, with the --path that would allow it. */
+/* Searches the folders of <path>, the last one first, as in Mitsuba 3. If the file is in no folder that may be read
+ * but perhaps in one that may not, *name becomes its path there: opening it fails with the --path that would allow
+ * it. */
 static int look_along_paths(const struct xml_files *f, const char *written, const char **name, bool *found)
 {
 	const char *outside = NULL;
@@ -95,7 +96,7 @@ static int look_along_paths(const struct xml_files *f, const char *written, cons
 	return 0;
 }
 
-/* The path of a file on another machine: the longest end of it that is a name in the scene's folder. */
+/* For the path of a file on another machine: looks for the longest end of it that is a file in the scene's folder. */
 static int look_by_end(const struct xml_files *f, const char *written, const char **name, bool *found)
 {
 	for (const char *end = strchr(written, '/'); end && !*found; end = strchr(end, '/')) {
@@ -114,7 +115,7 @@ static bool is_absolute(const char *written)
 	return *written == '/' || (letter && written[1] == ':' && written[2] == '/');
 }
 
-/* The first of the folders that has the file; *found: whether one has. */
+/* Finds the first folder that has the file, and stores whether there is one. */
 static int search(struct xml_files *f, const char *written, bool nested, const char **name, bool *found)
 {
 	*found = false;

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * One pass copies the text. It blanks out comments, since "--" may stand in them, writes "&amp;" for an "&" that begins
- * no entity, and blanks out a declaration <?xml ...?> that does not stand at the beginning. The encoding that such a
- * declaration states is lost: the file is taken for UTF-8. What is in <![CDATA[...]]> and <?...?> stays as it is.
+ * One pass copies the text. It blanks out comments, because "--" may occur in them, writes "&amp;" for an "&" that
+ * begins no entity, and blanks out a declaration <?xml ...?> that is not at the beginning. The encoding stated by such
+ * a declaration is lost: the file is read as UTF-8. The contents of <![CDATA[...]]> and <?...?> are kept.
  *
- * Failures: NULL when out of memory. A comment without an end is copied, for expat to complain of.
+ * Returns NULL if out of memory. A comment without an end is copied, and expat reports it.
  */
 #include "worker/render/xml/xml_tidy.h"
 
@@ -21,11 +21,11 @@ struct pass {
 	const char *at, *end;
 	char *out;
 	bool begun; /* something other than comments and blanks has been copied */
-	/* By kind of markup: its closing is not in the rest of the text, which is searched for it only once. */
+	/* For each kind of markup: the rest of the text does not contain its closing, so it is not searched again. */
 	bool endless[4];
 };
 
-/* Markup that is looked at as a whole. */
+/* Markup that is skipped or copied as a whole. */
 enum kind { COMMENT, DECLARATION, CDATA, INSTRUCTION };
 static const struct {
 	const char *opening, *closing;
@@ -37,7 +37,7 @@ static bool starts(const struct pass *p, const char *with)
 	return (size_t)(p->end - p->at) >= n && memcmp(p->at, with, n) == 0;
 }
 
-/* The place behind the markup of this kind that begins here; NULL: none does, or it has no end. */
+/* Returns the position after the markup of this kind that begins here; NULL if none begins here or it has no end. */
 static const char *end_of_markup(struct pass *p, enum kind kind)
 {
 	const char *closing = markup[kind].closing;
@@ -66,7 +66,7 @@ static bool is_entity(const struct pass *p)
 	return false;
 }
 
-/* One piece of markup, or one character. */
+/* Copies one piece of markup or one character. */
 static void step(struct pass *p)
 {
 	const char *to = end_of_markup(p, COMMENT);
@@ -100,8 +100,8 @@ char *xml_tidy(const void *text, size_t *size)
 	if (!bytes)
 		return NULL;
 	p.out = bytes;
-	/* At its proper place the declaration stays: it may state an encoding. UTF-16 has a zero in every other byte,
-	 * and is copied as it is. */
+	/* A declaration at the beginning is kept, because it may state an encoding. UTF-16, recognised by a zero byte
+	 * or a byte order mark, is copied unchanged. */
 	bool wide = *size > 1 && (!p.at[0] || !p.at[1] || (unsigned char)p.at[0] >= 0xfe);
 	p.begun = starts(&p, "<?xml") || starts(&p, "\xef\xbb\xbf");
 	while (p.at < p.end && !wide)
