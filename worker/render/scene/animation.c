@@ -6,8 +6,9 @@
 
 #include <string.h>
 
-/* Distances between times, and times in units of the shutter's, are finite. */
+/* Keeps differences between times, and times in units of the shutter's, finite. */
 #define TIME_MAX 1e30
+/* Smallest size of a transform, and how much more it may stretch in one direction than in another. */
 #define LEAST_SIZE 1e-60
 #define UNEVEN 1e12
 
@@ -35,7 +36,8 @@ static double largest_element(const mat4 *m)
 	return most;
 }
 
-/* Whether it can be decomposed into a rotation and what is left: squares and determinants have a range. */
+/* Checks that the transform can be decomposed into a rotation and a remainder, whose squares and determinant can be
+ * represented. */
 static int check_even(const struct xml_element *el, const struct keyframe *key, struct error *e)
 {
 	mat4 inverse;
@@ -48,7 +50,7 @@ static int check_even(const struct xml_element *el, const struct keyframe *key, 
 	return 0;
 }
 
-/* Whether there is a motion from one keyframe to the next. */
+/* Checks that there is a motion from one keyframe to the next. */
 static int check_step(const struct xml_element *el, const struct keyframe *from, const struct keyframe *to,
 		      struct error *e)
 {

@@ -7,11 +7,12 @@
 #include "worker/render/scene/node.h"
 #include "worker/render/xml/xml.h"
 
-/* Replaces *el, an <animation>, by the first of its transforms. *out: all of them; NULL: they are the same. Errors:
- * times that do not ascend; transforms between which something would be flat. */
+/* Replaces *el, an <animation>, by the first of its transforms. *out becomes the whole animation, or NULL if all
+ * transforms are equal. Errors: times that do not ascend; transforms between which the object would be flat. */
 int animation_read(const struct xml_element **el, struct arena *arena, const struct animation **out, struct error *e);
 
-/* Why a node cannot be animated although its plug-in can, as a noun for the message; NULL: it can. */
+/* Returns, as a noun for the message, the kind of node that cannot be animated although its plug-in can; NULL if it
+ * can. */
 const char *animation_refused(const struct scene_node *n, const struct xml_element *el);
 
 #endif

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The names of the files that a scene refers to, as they are met. One thread; lives in the arena given. */
+/* The names of the files that a scene refers to, in the order in which they are found. One thread; allocated in the
+ * given arena. */
 #ifndef WORKER_RENDER_SCENE_ASSET_LIST_H
 #define WORKER_RENDER_SCENE_ASSET_LIST_H
 
@@ -8,8 +9,8 @@
 
 struct asset_use {
 	const char *name;
-	const struct xml_element *by; /* NULL: no object */
-	size_t at;		      /* in the order in which they are met */
+	const struct xml_element *by; /* the element that names the file; NULL: none */
+	size_t at;		      /* index in order of appearance */
 };
 
 struct asset_list {
@@ -18,10 +19,11 @@ struct asset_list {
 	const char **names, **places; /* once finished; a place is "scene.xml:12: <shape type=\"obj\">", or "" */
 };
 
-/* 0 or -ENOMEM. */
+/* Returns 0 or -ENOMEM. */
 int asset_list_add(struct asset_list *l, const char *name, const struct xml_element *by, struct arena *arena);
 
-/* Sorts them, removes duplicates (the first place that names a file is kept), and removes `but`. 0 or -ENOMEM. */
+/* Sorts the names, removes duplicates (keeping the first place that names a file) and removes the name `but`.
+ * Returns 0 or -ENOMEM. */
 int asset_list_finish(struct asset_list *l, const char *but, struct arena *arena);
 
 #endif

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A range of a file's bytes, as files that hold others need it (glTF): as they stand there, or written in base64. The
- * node says which by `filename`, `first_byte`, `byte_count` and `base64`; without them it is the whole file. What is
- * base64 may begin within a group of four letters: the first `skip_bytes` that are decoded do not belong to it. Or the
- * node has the bytes itself, in base64, as `embedded`. Any thread.
+ * A range of a file's bytes, for files that contain other files (glTF), stored as they are or encoded in base64. The
+ * node gives the range by `filename`, `first_byte`, `byte_count` and `base64`; by default it is the whole file. Data in
+ * base64 may begin in the middle of a group of four characters: the first `skip_bytes` decoded bytes do not belong to
+ * it. Instead of a file, the node may have the bytes themselves, in base64, as `embedded`. Any thread.
  */
 #ifndef WORKER_RENDER_SCENE_ASSET_PART_H
 #define WORKER_RENDER_SCENE_ASSET_PART_H
@@ -11,7 +11,8 @@
 #include "worker/render/asset/asset_range.h"
 #include "worker/render/scene/scene.h"
 
-/* Errors as of asset_range_open, with the node's place. asset_range_close after 0 alone. */
+/* Fails like asset_range_open(); the error begins with the node's place. Call asset_range_close() only after
+ * success. */
 int asset_part_open(struct asset_range *p, const struct scene_node *n, const struct asset_source *assets,
 		    struct error *e);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Pixels of a film that does not say how many: Mitsuba's. */
+/* The size in pixels of a film that states none, as in Mitsuba. */
 #ifndef WORKER_RENDER_SCENE_FILM_H
 #define WORKER_RENDER_SCENE_FILM_H
 

@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define DIAGONAL_35MM 43.266615305567875 /* of 36 mm x 24 mm */
+#define DIAGONAL_35MM 43.266615305567875 /* of a film of 36 mm x 24 mm */
 
 int fov_read(const struct scene_node *n, double *degrees, char axis[FOV_AXIS_MAX], struct error *e)
 {

@@ -78,7 +78,7 @@ static int check_unique(const struct id_table *t, struct report *report, struct 
 	return r;
 }
 
-/* An alias may name an alias before it. */
+/* Adds an alias to the table. It may refer to an earlier alias. */
 static int read_alias(struct id_table *t, const struct xml_element *el, struct error *e)
 {
 	const char *as = xml_attribute(el, "as");

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Objects of a scene by id, aliases included. One thread; allocated in the given arena. */
+/* Looks up objects of a scene, and aliases of them, by id. One thread; allocated in the given arena. */
 #ifndef WORKER_RENDER_SCENE_ID_TABLE_H
 #define WORKER_RENDER_SCENE_ID_TABLE_H
 
@@ -12,28 +12,30 @@ struct id_entry {
 };
 
 struct id_table {
-	struct id_entry *entries; /* sorted */
+	struct id_entry *entries; /* sorted by id */
 	size_t count;
-	bool incomplete; /* a file or an alias that may bring more is not there */
-	size_t compared; /* ids compared for hints so far: bounded, because a file may miss as many as it has */
+	bool incomplete; /* a file or an alias that may define more ids is missing */
+	size_t compared; /* number of ids compared for hints so far; limited, because a file may refer to as many
+			    unknown ids as it defines */
 };
 
-/* Objects may be referred to before they appear in the file, as in 3.x but not in 0.6. A duplicate id, and an alias
- * of nothing, is an error. */
+/* Fills the table. As in 3.x but not in 0.6, objects may be referred to before they appear in the file. A duplicate
+ * id and an alias of an unknown id are errors. */
 int id_table_make(struct id_table *t, const struct xml_tree *tree, struct arena *arena, struct report *report,
 		  struct error *e);
 
-/* Whether it is an element that an id may name: an object, or a spectrum with a type. */
+/* Returns whether an id may name the element: it is an object, or a spectrum with a type. */
 bool id_table_names(const struct xml_element *el);
 
-/* One of those that is never made, subsurface or field: reported where it stands, not where it is referred to. */
+/* Returns whether the element is a <subsurface> or <field>, of which no node is ever made: it is reported where it
+ * stands, not where it is referred to. */
 bool id_table_is_absent(const struct xml_element *el);
 
-/* The object of that id. NULL: none. */
+/* Returns the object with that id, or NULL. */
 struct xml_element *id_table_look(const struct id_table *t, const char *id);
 
-/* The object that el's id names. -ENOENT, with the nearest id, or REPORT_TOLD, where what is missing has been
- * reported. */
+/* Finds the object that el's id refers to. If there is none, returns -ENOENT with the most similar id, or
+ * REPORT_TOLD if the missing file or alias has already been reported. */
 int id_table_find(struct id_table *t, const struct xml_element *el, struct xml_element **out, struct error *e);
 
 #endif

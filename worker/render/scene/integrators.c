@@ -3,10 +3,11 @@
 
 #include "worker/render/scene/depth.h"
 
-/* The integrators of both dialects, and our own. */
+/* The integrators of both dialects, and this program's own. */
 static const struct {
 	const char *type;
-	bool other; /* its image is of something other than all light */
+	bool other; /* Mitsuba's image shows something other than all light */
+	/* Mitsuba's image has no media */
 	bool no_media;
 } types[] = {
 	{"path", false, true},
@@ -46,7 +47,7 @@ static const struct {
 };
 enum { TYPES = sizeof types / sizeof *types };
 
-/* TYPES: unknown. */
+/* Returns the index of the type, or TYPES if it is unknown. */
 static size_t find(const char *type)
 {
 	size_t i = 0;
@@ -86,8 +87,8 @@ const struct scene_node *integrators_inner(const struct scene_node *n)
 	return node_child(n, PLUGIN_INTEGRATOR, 0);
 }
 
-/* -1: no limit. around: of the integrator around it, which holds if it states none. `direct` has no such parameter in
- * Mitsuba: what is stated can only shorten its paths. */
+/* Returns the maximum depth of n; -1: no limit. `around` is the depth of the enclosing integrator, which applies if
+ * n states none. In Mitsuba `direct` has no such parameter, so a stated depth can only shorten its paths. */
 static int64_t depth_of(const struct scene_node *n, int64_t around)
 {
 	int64_t depth = node_int(n, "max_depth", depth_is_prb(n->type) ? SCENE_PRB_DEPTH : around);

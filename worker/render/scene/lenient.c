@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Tables say what stands in for plug-ins of other versions and branches that are known by name. For other names it is
- * guessed from the element: a shape's file, a sensor's name, a material's parameters. What nothing stands in for is
- * left out, or refused.
+ * Tables give replacements for plug-ins of other versions and branches of Mitsuba that are known by name. For other
+ * names the replacement is guessed from the element: from a shape's file, a sensor's name, a material's parameters. An
+ * object without a replacement is left out, or refused.
+ *
+ * Nothing fails here: the caller reports what is replaced, left out or refused.
  */
 #include "worker/render/scene/lenient.h"
 
@@ -21,21 +23,21 @@ static bool is_one_of(const char *name, const char *const *list)
 	return false;
 }
 
-/* Replacements by class. */
+/* Replacements for plug-ins known by name. */
 static const struct {
 	enum plugin_class cls;
 	const char *type, *stand_in;
 } likes[] = {
-	{PLUGIN_BSDF, "measured", "roughplastic"}, /* where its file is missing */
+	{PLUGIN_BSDF, "measured", "roughplastic"}, /* if its file is missing */
 	{PLUGIN_BSDF, "measured_polarized", "roughplastic"},
 	{PLUGIN_BSDF, "dielectric_disp", "dielectric"},
 	{PLUGIN_BSDF, "disney", "principled"},
 	{PLUGIN_BSDF, "openpbr", "principled"},
-	/* 3 p.m. of the first day, instead of all times together */
+	/* shows 3 p.m. of the first day instead of the average over all times */
 	{PLUGIN_EMITTER, "avg_sunsky", "sunsky"},
 };
 
-/* Textures that change the one inside. */
+/* Textures that modify the texture inside them. */
 static const char *const around_texture[] = {"lut", "math", "uv_set_selector", NULL};
 
 enum lenient_way lenient_plugin(enum plugin_class cls, const char *type, const char **stand_in)
@@ -53,13 +55,13 @@ enum lenient_way lenient_plugin(enum plugin_class cls, const char *type, const c
 		*stand_in = "diffuse";
 		return LENIENT_INNER;
 	case PLUGIN_RFILTER:
-		*stand_in = "gaussian"; /* filters with negative lobes are sharper */
+		*stand_in = "gaussian"; /* less sharp than filters with negative lobes */
 		return LENIENT_REPLACE;
 	case PLUGIN_PHASE:
 		*stand_in = "isotropic";
 		return LENIENT_REPLACE;
 	case PLUGIN_FILM:
-		*stand_in = "hdrfilm"; /* with the same size, filter and crop window; other parameters are left out */
+		*stand_in = "hdrfilm"; /* keeps size, filter and crop window; other parameters are left out */
 		return LENIENT_REPLACE;
 	case PLUGIN_SHAPE:
 	case PLUGIN_EMITTER:
@@ -72,7 +74,7 @@ enum lenient_way lenient_plugin(enum plugin_class cls, const char *type, const c
 	}
 }
 
-/* The plug-in for the file that a shape names; NULL: it names none. */
+/* Returns the plug-in for the mesh file that a shape names; NULL if it names none. */
 static const char *mesh_of(const struct xml_element *el)
 {
 	static const char *const formats[] = {"obj", "ply", "serialized"};
@@ -86,7 +88,7 @@ static const char *mesh_of(const struct xml_element *el)
 	return NULL;
 }
 
-/* The first of them that is part of the type's name; NULL: none is. */
+/* Returns the first of `parts` that occurs in the type's name; NULL if none does. */
 static const char *part_of(const char *type, const char *const *parts)
 {
 	while (*parts && !strcasestr(type, *parts))
@@ -94,8 +96,9 @@ static const char *part_of(const char *type, const char *const *parts)
 	return *parts;
 }
 
-/* The camera whose name is part of this one, as in "codedOrthographic" and "thinlens_srf". Others that are called a
- * lens or a camera are taken for one without a lens. NULL: what projects, or measures light, in some other way. */
+/* Returns the camera whose name is part of the type, as in "codedOrthographic" and "thinlens_srf". Other types
+ * called a lens or a camera become a camera without a lens. NULL for types that project, or measure light, in some
+ * other way. */
 static const char *camera_of(const char *type)
 {
 	static const char *const cameras[] = {"perspective", "thinlens",  "orthographic",
@@ -114,7 +117,7 @@ static bool has_parameter(const struct xml_element *el, const char *const *list)
 	return false;
 }
 
-/* Materials are recognised by their parameters, whose names most branches of Mitsuba keep, and glass by its name. */
+/* Guesses a material by its parameters, whose names most branches of Mitsuba keep, and glass by its type's name. */
 static const char *material_of(const struct xml_element *el, const char *type, const char *fallback)
 {
 	static const char *const glass[] = {"dielectric", "glass", NULL}, *const other[] = {"thin", "coat", NULL};
@@ -149,7 +152,7 @@ enum lenient_way lenient_element(const struct xml_element *el, enum plugin_class
 		*stand_in = camera_of(type);
 		return *stand_in ? LENIENT_REPLACE : way;
 	case PLUGIN_SHAPE:
-		/* Mitsuba's own `ellipsoids` have a PLY file too, but of points. */
+		/* Mitsuba's own `ellipsoids` have a PLY file too, but it contains points. */
 		if (plugin_is_mitsubas(cls, type) || !(mesh = mesh_of(el)))
 			return way;
 		*stand_in = mesh;
@@ -204,7 +207,7 @@ bool lenient_says_again(const char *stand_in, const char *name, const struct xml
 	return strcmp(stand_in, "principled") == 0 && strcmp(name, "specular") == 0 && has_parameter(owner, index);
 }
 
-/* By its own name anywhere in the object, or by the same old one before. */
+/* Returns whether an object is also given the parameter by its own name, or earlier by the same old name. */
 static bool is_given(const struct xml_element *el, const char *own, const char *old)
 {
 	bool before = true;
@@ -229,7 +232,7 @@ const struct param *lenient_old_param(const struct plugin_decl *d, bool stands_i
 	return p && !is_given(el, p->name, name) ? p : NULL;
 }
 
-/* Light passes it, or something in it. */
+/* Returns whether the material, or one inside it, lets light through. */
 static bool has_passage(const struct scene_node *n)
 {
 	static const char *const types[] = {"null",	  "polarizer",	     "circular",       "retarder",  "mask",
@@ -289,7 +292,8 @@ const char *lenient_missing(const struct asset_source *assets, const struct xml_
 	return NULL;
 }
 
-/* Glass over something else is its coat: what is below gives the colour. */
+/* Returns whether a material is a clear coat, which has no colour of its own: the material below it gives the
+ * colour. */
 static bool is_coat(const struct xml_element *bsdf)
 {
 	static const char *const clear[] = {"dielectric", "null", NULL};

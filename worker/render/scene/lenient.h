@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Replacements for what is not supported or missing, with --lenient. The reader notes whatever is replaced or left
- * out. Any thread; only lenient_missing opens files.
+ * Replacements, with --lenient, for what is unsupported or missing. The reader notes everything that is replaced or
+ * left out. Any thread; only lenient_missing() opens files.
  */
 #ifndef WORKER_RENDER_SCENE_LENIENT_H
 #define WORKER_RENDER_SCENE_LENIENT_H
@@ -15,49 +15,55 @@
 
 enum lenient_way {
 	LENIENT_REFUSE,	   /* no replacement: most sensors */
-	LENIENT_LEAVE_OUT, /* a medium, a shape, an emitter, a texture (the parameter keeps its default) */
-	LENIENT_REPLACE,   /* by *stand_in of the same class */
-	/* By the one of its class inside; otherwise as LENIENT_REPLACE or, without a stand-in, LENIENT_LEAVE_OUT. */
+	LENIENT_LEAVE_OUT, /* media, shapes, emitters, textures (the parameter keeps its default) */
+	LENIENT_REPLACE,   /* use the plug-in *stand_in of the same class */
+	/* Use the object of the same class inside it; if there is none, as LENIENT_REPLACE or, without a stand-in, as
+	   LENIENT_LEAVE_OUT. */
 	LENIENT_INNER,
 };
 
-/* For a plug-in that no table has. */
+/* Returns what to do about a plug-in that is in no table, judging by its type. */
 enum lenient_way lenient_plugin(enum plugin_class cls, const char *type, const char **stand_in);
 
-/* The same for such an element, by what is inside it: a light in a shape becomes an `area`, a shape with the file of a
- * mesh that mesh, a sensor the one whose name is part of its own, and a material one that has such parameters. */
+/* Like lenient_plugin(), but judges by the element's contents as well: an emitter in a shape becomes an `area`, a
+ * shape with a mesh file that mesh, a sensor the camera whose name is part of its type, and a material the one that has
+ * such parameters. */
 enum lenient_way lenient_element(const struct xml_element *el, enum plugin_class cls, const char *type,
 				 const char **stand_in);
 
-/* The replacement's parameter that corresponds to `name` of the plug-in replaced; `name` itself if there is none. */
+/* Returns the stand-in's parameter that corresponds to the replaced plug-in's `name`; `name` itself if none is
+ * known. */
 const char *lenient_param(const char *stand_in, const char *name);
 
-/* Whether the replacement's parameter `name` goes because another in the `owner` that is replaced says the same. */
+/* Returns whether the stand-in's parameter `name` is dropped because another parameter of the replaced object,
+ * `owner`, says the same. */
 bool lenient_says_again(const char *stand_in, const char *name, const struct xml_element *owner);
 
-/* The parameter that `name` is in 0.6, for files of 3.x; stands_in: d replaces the plug-in that has it. NULL: none, or
- * the object of the element `el` has it by its own name too, or by this one before. */
+/* Returns the parameter that `name`, written as in 0.6, means in a file of 3.x. stands_in: d replaces the plug-in of
+ * the object. NULL if there is none, or if the object of the element `el` is also given it by its own name, or earlier
+ * by this one. */
 const struct param *lenient_old_param(const struct plugin_decl *d, bool stands_in, const struct xml_element *el,
 				      const char *name);
 
-/* The BSDF inside `n` if `n` may only hold opaque ones and holds one that transmits light; NULL: nothing is wrong. */
+/* Returns the BSDF inside `n` if `n` may hold opaque BSDFs only and this one transmits light; NULL if nothing is
+ * wrong. */
 const struct scene_node *lenient_uncovered(const struct scene_node *n);
 
-/* An object that is nothing without the texture inside it. */
+/* Returns whether an object of this type is useless without the texture inside it. */
 bool lenient_needs_texture(const char *type);
 
-/* After a sentence that says that a texture's file is missing. */
+/* Appended to a sentence that says that a texture's file is missing. */
 #define LENIENT_TEXTURE_HINT "; --lenient leaves the texture out"
-const char *lenient_texture_hint(const char *sentence); /* without the semicolon where that is a question */
+const char *lenient_texture_hint(const char *sentence); /* without the semicolon if the sentence is a question */
 
-/* The file of a texture or a measured material that the scene does not come with: it is missing, or its name begins
- * at the root, from which nothing is read. NULL: it is there, or outside the folders that may be read, or it is another
- * kind of object, or it needs no file. Textures of old scenes are often lost; a mesh, or an environment, has no
+/* Returns the file of a texture or a measured material that does not come with the scene: it is missing, or its
+ * absolute path cannot be read. NULL if the file is there or outside the folders that may be read, or if the object is
+ * of another kind or needs no file. Textures of old scenes are often lost; meshes and environments have no
  * replacement. */
 const char *lenient_missing(const struct asset_source *assets, const struct xml_element *el);
 
-/* The first object of the class `wanted` inside one of it that is not supported, of BSDFs rather one that is not clear;
- * NULL: none. */
+/* Returns the first object of the class `wanted` inside an object that is not supported; of BSDFs, preferably one
+ * that is not a clear coat. NULL if there is none. */
 struct xml_element *lenient_inner(struct id_table *ids, const struct xml_element *el, enum plugin_class wanted);
 
 #endif

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * maker_node finds the plug-in of an object by its type, makes the node, and has fill_node read what is inside:
- * read_property reads parameters, read_object reads objects, nested or referred to, which calls maker_node in turn. An
- * element is made once; later references share its node.
+ * maker_node finds the plug-in of an object by its type, makes the node, and has fill_node read its contents:
+ * read_property reads parameters, and read_object reads nested or referenced objects, for which it calls maker_node in
+ * turn. An element is made into a node once; later references share the node.
  *
  * Failures: a problem is reported and reading goes on. With `lenient`, what is not supported is left out or replaced,
- * with a note. References in a circle are an error, and depth and number of objects are bounded (nesting.h).
+ * with a note. Circular references are an error, and the depth and number of objects are limited (nesting.h).
  */
 #include "worker/render/scene/maker.h"
 
@@ -29,13 +29,13 @@
 #include <string.h>
 #include <strings.h>
 
-/* A node while it is being made: its lists grow, which are constant afterwards. */
+/* A node while it is being made: its lists, constant afterwards, still grow. */
 struct draft {
 	struct scene_node *node;
 	const struct plugin_decl *decl;
 	bool stands_in; /* replaces a plug-in that is not supported */
-	bool lacks;	/* something inside it was left out, or is wrong */
-	bool unsure;	/* the same of what decides whether the object itself is sound */
+	bool lacks;	/* something inside it is missing: left out, or already reported as a problem */
+	bool unsure;	/* something that decides whether the object itself is sound is missing or wrong */
 	bool flat;	/* its transform has no inverse */
 	struct property *properties;
 	const struct scene_node **children;
@@ -82,7 +82,7 @@ static int add_property(struct maker *m, struct draft *d, const struct xml_eleme
 	return 0;
 }
 
-/* Whether another plug-in of the class has it, by this name or, as in 0.6, by one with capitals. */
+/* Returns whether another plug-in of the class has the parameter, by this name or converted from 0.6's camelCase. */
 static bool is_of_another(const struct maker *m, enum plugin_class cls, const char *name)
 {
 	char snake[128] = "";
@@ -94,17 +94,18 @@ static bool is_of_another(const struct maker *m, enum plugin_class cls, const ch
 	return false;
 }
 
-/* Forks of Mitsuba add parameters. A name that resembles none in the table with an effect, and in 3.x no other plug-in
- * of the class has, is taken for one of these; other unknown names are mistakes. Materials, textures, media and filters
- * are visible in the image, so in 3.x more is taken for a mistake there than a spelling. In files of 0.6 an object may
- * have the parameter of another, left there when its type was changed. What glTF names is its own, and what stands in
- * for a plug-in has other names. */
+/* Returns whether an unknown name is taken for a parameter of some fork of Mitsuba, which is ignored, and not for a
+ * mistake. It must not resemble a parameter that has an effect and, in 3.x, no other plug-in of the class may have it.
+ * In files of 0.6 an object may have kept parameters of a type that it had before. The parameters of materials,
+ * textures, media and filters show in the image; so in 3.x a name counts as a mistake there not only if it may be
+ * misspelt, but whenever it may mean one of the table (meant_parameter), and if the object comes from a glTF file or
+ * stands in for another plug-in. */
 static bool is_foreign_parameter(const struct maker *m, const struct draft *d, const struct xml_element *el,
 				 const char *name)
 {
 	enum plugin_class cls = d->node->cls;
 	bool hidden = cls == PLUGIN_SENSOR || cls == PLUGIN_FILM || cls == PLUGIN_SHAPE || cls == PLUGIN_EMITTER;
-	/* Shapes of Mitsuba 3 may hold textures of any name, for whoever asks for attributes. */
+	/* In Mitsuba 3 a shape may hold textures of any name, which others read as its attributes. */
 	bool attribute = cls == PLUGIN_SHAPE && (strcmp(el->name, "texture") == 0 || strcmp(el->name, "ref") == 0);
 	if (!value_is_element(el->name) && !(attribute && !el->snake))
 		return false;
@@ -120,9 +121,8 @@ static bool is_foreign_parameter(const struct maker *m, const struct draft *d, c
 	return meant->status == PARAM_IGNORED;
 }
 
-/* Of an integrator or sampler all is ignored but a few parameters: a name that resembles one of these may be meant for
- * it.
- */
+/* Of an integrator or a sampler, everything but a few parameters is ignored. A name that resembles one of these may
+ * be a misspelling of it, which is noted. */
 static int note_resembling(const struct maker *m, const struct draft *d, const struct xml_element *owner,
 			   const struct xml_element *el, const char *name)
 {
@@ -135,7 +135,8 @@ static int note_resembling(const struct maker *m, const struct draft *d, const s
 	return note_parameter(&m->notes, owner, el, element_spelling(el, name), text);
 }
 
-/* Looks up a name in the table: *p is its parameter, or NULL if it was dealt with here (ignored, or an error). */
+/* Looks up a name in the table. *p is its parameter, or NULL if nothing more is to be done: it was ignored, or is an
+ * error. */
 static int look_up(struct maker *m, const struct draft *d, const struct xml_element *owner,
 		   const struct xml_element *el, const char *name, const struct param **p)
 {
@@ -150,7 +151,8 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 	}
 	if (!found && m->lenient && !el->snake && (found = lenient_old_param(d->decl, d->stands_in, el, name)))
 		r = note_old_name(&m->notes, owner, el, found->name);
-	/* All BSDFs of 0.6 have it; those whose reflectances can add up to more than 1 have it in their tables. */
+	/* In 0.6 every BSDF has this parameter; those whose reflectances can add up to more than 1 have it in their
+	 * tables. */
 	if (!found && el->snake && d->node->cls == PLUGIN_BSDF && strcmp(name, "ensure_energy_conservation") == 0)
 		return note_no_effect(&m->notes, owner, el, written);
 	if (!found && is_foreign_parameter(m, d, el, name))
@@ -173,8 +175,8 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 	return r;
 }
 
-/* What a value means where Mitsuba, or `lenient`, takes it for another one. Of what stands in for a plug-in that has
- * the parameter in other units, the value is left out instead. */
+/* Replaces a value that Mitsuba, or a lenient reader, reads as another one. A value above 1 is not replaced in a
+ * stand-in: the replaced plug-in may have the parameter in other units, so that the caller leaves the value out. */
 static int adjust_value(struct maker *m, const struct draft *d, const struct xml_element *owner,
 			const struct xml_element *el, const struct param *p, struct value *v)
 {
@@ -237,14 +239,15 @@ static int read_property(struct maker *m, struct draft *d, const struct xml_elem
 	return r || !file ? r : maker_add_asset(m, file, el);
 }
 
-/* An object nested in another, or referred to there: by its name if the table has it, otherwise by its class. */
+/* Reads an object that is nested in another or referred to there: as a parameter if the table has its name,
+ * otherwise as a child of its class. */
 static int read_object(struct maker *m, struct draft *d, const struct xml_element *owner, const struct xml_element *el,
 		       struct xml_element *target)
 {
 	enum plugin_class cls;
 	bool is_class = plugin_class_find(target->name, &cls);
 	assert(is_class);
-	if (cls == PLUGIN_MEDIUM && d->node->cls == PLUGIN_EMITTER) /* the world finds out where it stands */
+	if (cls == PLUGIN_MEDIUM && d->node->cls == PLUGIN_EMITTER) /* the world finds the medium it is in */
 		return 0;
 	const char *written = xml_attribute(el, "name");
 	const struct param *p = NULL;
@@ -328,12 +331,12 @@ static int read_content(struct maker *m, struct draft *d, const struct xml_eleme
 	int r = element_check(el, "id|name", false, m->error);
 	if (!r)
 		r = id_table_find(&m->ids, el, &target, m->error);
-	if (!r && id_table_is_absent(target)) /* which is reported where it stands */
+	if (!r && id_table_is_absent(target)) /* has been reported where it stands */
 		return REPORT_TOLD;
 	return r ? r : read_object(m, d, owner, el, target);
 }
 
-/* Motion of what cannot move is an error; a lenient reader keeps the first transform. */
+/* Refuses the motion of an object that cannot move; a lenient reader keeps the first transform instead. */
 static int hold_still(struct maker *m, struct draft *d, const struct xml_element *el)
 {
 	for (uint32_t i = 0; i < d->node->property_count; i++) {
@@ -352,14 +355,14 @@ static int hold_still(struct maker *m, struct draft *d, const struct xml_element
 	return 0;
 }
 
-/* Whether an object may be refused for want of what an element in it gives. Shapes do without materials and the like.
- */
+/* Returns whether the object may be refused merely because this element in it is missing or wrong. A shape, other
+ * than an instance, is judged without its material and other objects. */
 static bool decides(const struct scene_node *n, const struct xml_element *c)
 {
 	return n->cls != PLUGIN_SHAPE || strcmp(n->type, "instance") == 0 || value_is_element(c->name);
 }
 
-/* A node that holds a flawed one, such as a shape with a flawed texture, is flawed. */
+/* Returns whether the node holds a flawed one, as a shape with a flawed texture does: then it is flawed itself. */
 static bool holds_flawed(const struct scene_node *n)
 {
 	bool with_children = n->cls != PLUGIN_SHAPE || strcmp(n->type, "instance") == 0;
@@ -372,11 +375,12 @@ static bool holds_flawed(const struct scene_node *n)
 	return false;
 }
 
+/* Marks the node as flawed and adds it to the scene's list of these. */
 static int note_flaw(struct maker *m, struct scene_node *n)
 {
 	uint32_t count = m->flawed_count;
 	n->flawed = true;
-	if ((count & (count - 1)) == 0) { /* 0 or a power of two: there is no room */
+	if ((count & (count - 1)) == 0) { /* 0 or a power of two: the list is full */
 		const struct scene_node **more = arena_alloc(m->arena, count ? 2 * (size_t)count : 1, sizeof *more);
 		if (!more)
 			return maker_out_of_memory(m);
@@ -411,7 +415,7 @@ static int fill_node(struct maker *m, struct draft *d, struct xml_element *el)
 	return 0;
 }
 
-/* The node of `inner`, which stands in for el. */
+/* Makes the node of `inner`, which stands in for el. */
 static int make_inner(struct maker *m, struct xml_element *el, struct xml_element *inner, const struct scene_node **out)
 {
 	el->busy = true;
@@ -423,7 +427,7 @@ static int make_inner(struct maker *m, struct xml_element *el, struct xml_elemen
 	return r;
 }
 
-/* A parameter of an object whose type is not known: whether its value is well formed. */
+/* Checks that the value of a parameter is well formed, in an object of unknown type. */
 static int read_unknown(struct maker *m, const struct xml_element *el)
 {
 	const struct animation *moves;
@@ -436,8 +440,8 @@ static int read_unknown(struct maker *m, const struct xml_element *el)
 	return transform_report(whole, r, &m->report, m->error);
 }
 
-/* What is wrong inside an object that is refused: in its objects, such as the film of a sensor of an unknown type, and
- * in how its values are written. Which parameters it may have is not known. */
+/* Reports the problems inside an object that is refused: in its objects, such as the film of a sensor of unknown
+ * type, and in how its values are written. Which parameters it may have is not known. */
 static int read_inside(struct maker *m, struct xml_element *el, int refused)
 {
 	if (refused >= 0 || (refused = report_problem(&m->report, refused, m->error)))
@@ -460,7 +464,7 @@ static int read_inside(struct maker *m, struct xml_element *el, int refused)
 	return r ? r : REPORT_TOLD;
 }
 
-/* Fills in d's node from el's content, and notes whether it may be wrong. */
+/* Fills in d's node from el's contents, and records whether it may be flawed. */
 static int fill_draft(struct maker *m, struct draft *d, struct xml_element *el)
 {
 	el->busy = true;
@@ -476,7 +480,7 @@ static int fill_draft(struct maker *m, struct draft *d, struct xml_element *el)
 	return r;
 }
 
-/* Adds the remarks on a complete node, and makes the replacements of a lenient reader, which may change *out. */
+/* Adds the remarks on a complete node and makes a lenient reader's replacements, which may change *out. */
 static int finish_node(struct maker *m, const struct draft *d, struct xml_element *el, const struct scene_node **out)
 {
 	if (d->flat && m->lenient) {
@@ -495,8 +499,8 @@ static int finish_node(struct maker *m, const struct draft *d, struct xml_elemen
 	return r;
 }
 
-/* An object with errors inside still becomes a node, so that all errors are found. One that is not an object of any
- * kind does not, and is reported once. */
+/* An object with errors inside still becomes a node, so that all errors are found. An element that cannot become a
+ * node, for example because its type is unknown, is reported once. */
 int maker_node(struct maker *m, struct xml_element *el, const struct scene_node **out)
 {
 	if (el->node) {

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The state of reading one scene, which all its objects share, and the making of nodes: that of an object, with all
- * that is inside it. A problem is reported with file and line, and an object with problems inside still becomes a node
- * (report.h), so that one run finds all of them. -ENOMEM ends the reading. One thread.
+ * The state of reading one scene, shared by all its objects, and the making of nodes: of an object and everything
+ * inside it. A problem is reported with file and line, and an object with problems inside still becomes a node
+ * (report.h), so that one run finds all problems. -ENOMEM ends the reading. One thread.
  */
 #ifndef WORKER_RENDER_SCENE_MAKER_H
 #define WORKER_RENDER_SCENE_MAKER_H
@@ -15,7 +15,7 @@
 
 struct scene;
 
-/* All pointers lead into the arena, which is the scene's. */
+/* All pointers point into the arena, which belongs to the scene. */
 struct maker {
 	struct scene *scene; /* the result, filled in by scene.c */
 	struct arena *arena;
@@ -28,22 +28,22 @@ struct maker {
 	struct report report;
 	struct notes notes;
 	struct asset_list assets;
-	uint64_t objects; /* made so far, counted once for each reference: bounded by nesting.h */
+	uint64_t objects; /* objects made so far, with all references followed; limited by nesting.h */
 	int depth;
 	uint32_t flawed_count;
-	const struct scene_node **flawed; /* as in the scene */
-	uint32_t flat_shapes;		  /* left out, because their transforms have no inverses */
+	const struct scene_node **flawed; /* like scene.flawed */
+	uint32_t flat_shapes;		  /* number of shapes left out because their transforms have no inverse */
 	const struct xml_element *first_flat;
 	bool lenient;
 };
 
-int maker_out_of_memory(struct maker *m); /* -ENOMEM, with its text */
-/* by: the element that names the file; NULL: an included file. */
+int maker_out_of_memory(struct maker *m); /* returns -ENOMEM and sets the message */
+/* Lists a file. by: the element that names it; NULL for an included file. */
 int maker_add_asset(struct maker *m, const char *name, const struct xml_element *by);
 
-/* The node of an element that is an object. It is made at the first call; references to the element share it. */
+/* Stores the node of an element that is an object. It is made at the first call; references to the element share it. */
 int maker_node(struct maker *m, struct xml_element *el, const struct scene_node **out);
-/* Refuses an element that means nothing where it stands; with `lenient`, leaves it out with a note. */
+/* Refuses an element that has no meaning where it stands; with `lenient`, leaves it out with a note. */
 int maker_foreign(struct maker *m, const struct xml_element *el);
 
 #endif

@@ -2,13 +2,13 @@
 /*
  * Reads .mtl files and makes scene elements of their materials.
  *
- * mtl_read reads a file line by line. `newmtl` begins a material, a keyword of the table sets one of its values, and
- * the last value given counts. mtl_put writes a material as elements: a mask if it is not opaque, in it a bumpmap if
- * there is one, in it the BSDF that `illum` selects. The elements are then read like those of the scene file, so
- * values that are not numbers are reported there, with the line in the .mtl file.
+ * mtl_read reads a file line by line. `newmtl` begins a material, a keyword of the table sets one of its values, and of
+ * several values the last one counts. mtl_put writes a material as elements: a mask if it is not opaque, inside it a
+ * bumpmap if there is one, inside that the BSDF that `illum` selects. The elements are then read like those of the
+ * scene file, so values that are not numbers are reported there, with the line in the .mtl file.
  *
- * A file that cannot be opened has no materials. A keyword that is not supported but would change the image is kept in
- * mtl.unread, for the caller to report. -E2BIG: too many materials; -ENOMEM.
+ * A file that cannot be opened has no materials. A keyword that would change the image but is not supported is stored
+ * in mtl.unread, for the caller to report. Too many materials give -E2BIG, lack of memory -ENOMEM.
  */
 #include "worker/render/scene/mtl.h"
 
@@ -59,7 +59,7 @@ const char *mtl_file(const struct asset_source *assets, const char *other, const
 	if (!written)
 		return NULL;
 	for (char *p = written; *p; p++)
-		*p = *p == '\\' ? '/' : *p; /* files written on Windows have it */
+		*p = *p == '\\' ? '/' : *p; /* as written on Windows */
 	const char *last = strrchr(written, '/'), *out = name_beside(other, written, arena);
 	return !out || !last || can_open(assets, out) ? out : name_beside(other, last + 1, arena);
 }
@@ -68,7 +68,7 @@ const char *mtl_file(const struct asset_source *assets, const char *other, const
 
 static const struct keyword {
 	const char *word;
-	size_t at; /* index into mtl_value */
+	size_t at; /* offset of the mtl_value in struct mtl_material */
 	bool file;
 } keywords[] = {
 	{"Kd", offsetof(struct mtl_material, diffuse), false},
@@ -82,7 +82,7 @@ static const struct keyword {
 	{"bump", offsetof(struct mtl_material, bump), true},
 };
 
-/* Mitsuba does not read these either. */
+/* Keywords that would change the image but are not read; Mitsuba does not read them either. */
 static const char *const unread[] = {"Ke",	 "map_Ke", "Tr",       "Tf",	 "map_Ns", "map_bump",
 				     "map_Bump", "norm",   "disp",     "Pr",	 "Pm",	   "map_Pr",
 				     "map_Pm",	 "refl",   "map_refl", "map_Tr", "decal",  NULL};
@@ -166,7 +166,7 @@ const struct mtl_material *mtl_find(const struct mtl *m, const char *name)
 struct element_builder {
 	const struct mtl *m;
 	struct arena *arena;
-	int count; /* of elements; negative: out of memory */
+	int count; /* number of elements made; negative: out of memory */
 };
 
 static struct xml_element *make_element(struct element_builder *k, struct xml_element *in, const char *element,
@@ -207,7 +207,7 @@ static void put_picture(struct element_builder *k, struct xml_element *in, const
 		property(k, texture, "float", "gamma", &(struct mtl_value){v->line, "1"});
 }
 
-/* A colour, in sRGB as in Mitsuba, or the image given last. */
+/* Puts a colour, in sRGB as in Mitsuba, or an image, whichever is given last. */
 static void colour(struct element_builder *k, struct xml_element *in, const char *name, int line,
 		   const struct mtl_value *v, const struct mtl_value *map)
 {

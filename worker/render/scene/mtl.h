@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The materials of Wavefront .mtl files, as the scene elements that Mitsuba 0.6 makes from them: by `illum` a diffuse,
- * phong, dielectric or conductor BSDF, inside a bumpmap and a mask if given. One thread; everything is allocated in the
- * given arena.
+ * The materials of Wavefront .mtl files, as the scene elements that Mitsuba 0.6 makes from them: `illum` selects a
+ * diffuse, phong, dielectric or conductor BSDF, inside a bumpmap and a mask if the material has them. One thread;
+ * everything is allocated in the given arena.
  */
 #ifndef WORKER_RENDER_SCENE_MTL_H
 #define WORKER_RENDER_SCENE_MTL_H
@@ -12,7 +12,7 @@
 #include "worker/render/xml/element.h"
 
 struct mtl_value {
-	int line;	  /* 0: not given */
+	int line;	  /* line in the .mtl file; 0: not given */
 	const char *text; /* as written; for a file, its name relative to the scene's folder */
 };
 
@@ -26,24 +26,25 @@ struct mtl_material {
 
 struct mtl {
 	const char *file;
-	bool there; /* can be opened */
+	bool there; /* the file can be opened */
 	const struct mtl_material *last;
-	struct mtl_value unread; /* the first keyword that would change the image and is not supported */
+	struct mtl_value unread; /* the first keyword that would change the image but is not supported */
 };
 
 enum { MTL_MATERIALS_MAX = 4096 };
 
-/* `file` is a canonical name (asset_name.h). A file that cannot be opened has no materials. -E2BIG, -ENOMEM. */
+/* Reads a file. `file` is a canonical name (asset_name.h). A file that cannot be opened has no materials. Returns 0,
+ * -E2BIG or -ENOMEM. */
 int mtl_read(struct mtl *m, const struct asset_source *assets, const char *file, struct arena *arena, struct error *e);
 
-/* The last one of that name; NULL: none. */
+/* Returns the last material of that name, or NULL. */
 const struct mtl_material *mtl_find(const struct mtl *m, const char *name);
 
-/* Adds its <bsdf> to `shape`. Returns the number of elements made, or -ENOMEM. */
+/* Adds the material's <bsdf> to `shape`. Returns the number of elements made, or -ENOMEM. */
 int mtl_put(const struct mtl *m, const struct mtl_material *of, struct xml_element *shape, struct arena *arena);
 
-/* `name` in the folder of `beside`, canonical; if there is no such file, the file of that name without its folders.
- * NULL: out of memory. */
+/* Returns the canonical name of `name` in the folder of `beside`. If `name` has folders and there is no such file,
+ * the folders are dropped. NULL if out of memory. */
 const char *mtl_file(const struct asset_source *assets, const char *beside, const char *name, size_t length,
 		     struct arena *arena);
 
