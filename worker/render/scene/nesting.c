@@ -8,7 +8,7 @@ int nesting_take(struct xml_nesting *owner, enum plugin_class cls, const struct 
 {
 	bool evaluated = cls == PLUGIN_BSDF || cls == PLUGIN_TEXTURE || cls == PLUGIN_PHASE;
 	uint64_t limit = evaluated ? NESTING_PARTS_MAX : NESTING_OBJECTS_MAX;
-	/* Cannot overflow: the operand is within the limit, too. */
+	/* Cannot overflow: both terms are within the limit. */
 	uint64_t objects = owner->objects + (once ? 0 : taken->nesting.objects);
 	uint32_t height = taken->nesting.height + 1;
 	if (height > NESTING_HEIGHT_MAX)

@@ -123,7 +123,8 @@ static bool same_values(const struct value *a, const struct value *b, uint32_t *
 	return false;
 }
 
-/* left: how many more are visited, because a few lines can nest objects in each other over and over. */
+/* left: how many more objects may be compared; limited, because a few lines can nest objects in each other many
+ * times over. */
 static bool same_objects(const struct scene_node *a, const struct scene_node *b, uint32_t *left)
 {
 	if (a == b)
@@ -162,10 +163,10 @@ int node_error(const struct scene_node *n, struct error *e, int errno_value, con
 
 const char *node_place(const struct scene_node *n, char text[NODE_PLACE_MAX])
 {
-	enum { MOST = NODE_PLACE_MAX - 16 }; /* beside "...", ":", a line and the end of the string */
+	enum { MOST = NODE_PLACE_MAX - 16 }; /* leaves room for "...", ":", a line number and the terminating 0 */
 	size_t length = strlen(n->file);
 	const char *end = n->file + (length > MOST ? length - MOST : 0);
-	while (end > n->file && ((unsigned char)*end & 0xC0) == 0x80) /* within a character of UTF-8 */
+	while (end > n->file && ((unsigned char)*end & 0xC0) == 0x80) /* in the middle of a UTF-8 character */
 		end++;
 	snprintf(text, NODE_PLACE_MAX, "%s%s:%d", length > MOST ? "..." : "", end, n->line);
 	return text;

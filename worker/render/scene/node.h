@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A node of a scene's description and its properties: typed values that match their tables. */
+/* A node of the scene description and its properties: typed values that conform to the plug-in's table. */
 #ifndef WORKER_RENDER_SCENE_NODE_H
 #define WORKER_RENDER_SCENE_NODE_H
 
@@ -29,7 +29,7 @@ struct value {
 		mat4 transform;
 		const struct scene_node *node;
 	} as;
-	const struct animation *animation; /* VALUE_TRANSFORM: how it moves on from there; NULL: it is still */
+	const struct animation *animation; /* the motion of a VALUE_TRANSFORM, which starts there; NULL: none */
 };
 
 struct property {
@@ -45,42 +45,43 @@ struct scene_node {
 	const char *file; /* as the user named it */
 	int line;
 	const struct plugin_decl *decl;
-	bool shines; /* an emitter, or a shape that holds one, however deep */
-	bool flawed; /* it lacks what was refused: what else is wrong with it may only follow from that */
+	bool shines; /* an emitter, or a shape that contains one at any depth */
+	bool flawed; /* something inside it was refused: any other problem of the node may be only a consequence */
 	uint32_t property_count, child_count;
 	const struct property *properties;
 	const struct scene_node *const *children; /* nested objects without a name */
 };
 
-/* Look-ups, with defaults by the caller. An existing property has the type and range of its table. */
+/* Look-ups; the caller gives the default. A property that exists has the type and range stated in its table. */
 const struct property *node_find(const struct scene_node *n, const char *name);
-double node_float(const struct scene_node *n, const char *name, double fallback); /* ints convert */
+double node_float(const struct scene_node *n, const char *name, double fallback); /* converts integers */
 int64_t node_int(const struct scene_node *n, const char *name, int64_t fallback);
 bool node_bool(const struct scene_node *n, const char *name, bool fallback);
 const char *node_string(const struct scene_node *n, const char *name, const char *fallback);
-mat4 node_transform(const struct scene_node *n, const char *name);  /* identity if absent; the first if it moves */
-const struct animation *node_animation(const struct scene_node *n); /* of its to_world; NULL: it is still */
+mat4 node_transform(const struct scene_node *n, const char *name);  /* identity if absent; first of an animation */
+const struct animation *node_animation(const struct scene_node *n); /* of to_world; NULL: no motion */
 const struct scene_node *node_child(const struct scene_node *n, enum plugin_class cls, uint32_t index); /* NULL: none */
-const struct scene_node *node_ref(const struct scene_node *n, const char *name); /* VALUE_NODE or NULL */
+const struct scene_node *node_ref(const struct scene_node *n, const char *name); /* the object, or NULL */
 
-/* A copy in which the property has this value, whether n has it or not. NULL: no memory. */
+/* Returns a copy of n in which the property has this value, whether or not n has the property. NULL if out of
+ * memory. */
 const struct scene_node *node_with(const struct scene_node *n, const char *name, struct value v, struct arena *arena);
 
-/* Whether both say the same: type, parameters and what they hold, wherever they stand. Of more than NODE_SAME_MOST
- * objects it is not found out: false. */
+/* Returns whether both nodes have the same type, parameters and contents, regardless of where they stand in the
+ * file. False if that takes comparing more than NODE_SAME_MOST objects. */
 enum { NODE_SAME_MOST = 1000 };
 bool node_same(const struct scene_node *a, const struct scene_node *b);
 
-/* "room.xml:3"; of a long file name the end. Returns text. */
+/* Writes "room.xml:3", with only the end of a long file name. Returns text. */
 enum { NODE_PLACE_MAX = 64 };
 const char *node_place(const struct scene_node *n, char text[NODE_PLACE_MAX]);
 
-/* "`lamp` (room.xml:3)" for a node that has an id, otherwise "the obj in room.xml:3", with the material whose faces it
- * has. Returns text. */
+/* Writes "`lamp` (room.xml:3)" for a node that has an id, and otherwise "the obj in room.xml:3", followed by the
+ * material of a shape that states one. Returns text. */
 enum { NODE_TITLE_MAX = 160 };
 const char *node_title(const struct scene_node *n, char text[NODE_TITLE_MAX]);
 
-/* error_set with "file:line: <element>: " before the text. */
+/* Like error_set(), with "file:line: <element>: " before the text. */
 __attribute__((format(printf, 4, 5))) int node_error(const struct scene_node *n, struct error *e, int errno_value,
 						     const char *format, ...);
 

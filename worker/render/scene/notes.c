@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* One note for each kind of thing, where it is met first. */
+/* Adds one note for each kind of thing, at its first occurrence. */
 int note(const struct notes *t, const struct xml_element *el, const char *type, const char *property,
 	 const char *format, ...)
 {
@@ -77,7 +77,8 @@ int note_guide(const struct notes *t, const struct xml_element *el)
 		    el->file, el->line, el->name, type);
 }
 
-/* Without capitals and underscores, as other renderers' settings are written. */
+/* Returns whether the name is "maxdepth", ignoring capitals and underscores: other renderers spell their settings in
+ * various ways. */
 static bool is_depth(const char *name)
 {
 	const char *want = "maxdepth";
@@ -87,7 +88,7 @@ static bool is_depth(const char *name)
 	return !*want;
 }
 
-/* The depth that another renderer would take from its settings; NULL: none. */
+/* Returns the element with the depth that another renderer would take from these settings; NULL if there is none. */
 static const struct xml_element *stated_depth(const struct xml_element *el)
 {
 	for (el = el->first; el; el = el->next) {
@@ -129,7 +130,8 @@ int note_old_name(const struct notes *t, const struct xml_element *owner, const 
 		    el->file, el->line, owner->name, type, written, name);
 }
 
-/* Samples are independent here: with their number alone, nothing of such a sampler is ignored. */
+/* Returns whether the sampler is `independent` with nothing but a sample count: samples are independent here too, so
+ * that nothing of it is ignored. */
 static bool says_what_is_done(const struct xml_element *el, const char *type)
 {
 	if (strcmp(el->name, "sampler") != 0 || strcasecmp(type, "independent") != 0)
@@ -142,7 +144,7 @@ static bool says_what_is_done(const struct xml_element *el, const char *type)
 	return true;
 }
 
-/* The values of an object of which its table understands only some. */
+/* Lists the parameters of an object that its table does not understand. */
 static void list_ignored(const struct xml_element *el, const struct plugin_decl *decl, char *list, size_t size)
 {
 	*list = '\0';

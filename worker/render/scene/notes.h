@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The sentences for what is left out of a scene, ignored or replaced: each kind of thing once, where it is met first.
- * Each returns 0 or -ENOMEM. One thread.
+ * The notes on what is left out of a scene, ignored or replaced: one for each kind of thing, at its first occurrence.
+ * Each function returns 0 or -ENOMEM. One thread.
  */
 #ifndef WORKER_RENDER_SCENE_NOTES_H
 #define WORKER_RENDER_SCENE_NOTES_H
@@ -13,28 +13,29 @@
 struct notes {
 	struct report *report;
 	struct error *error;
-	const struct xml_element *owner; /* the object whose parameters without effect were noted last; NULL: none */
-	uint32_t at;			 /* which note that is */
-	int line;			 /* its place */
-	char names[256];		 /* the parameters in it */
+	const struct xml_element *owner; /* the object whose parameters without effect were noted last, or NULL */
+	uint32_t at;			 /* the index of that note */
+	int line;			 /* its line */
+	char names[256];		 /* the parameters that it lists */
 };
 
-/* type, property: with the element's name the kind of thing. */
+/* Adds a note. The element's name, `type` and `property` together identify the kind of thing. */
 __attribute__((format(printf, 5, 6))) int note(const struct notes *t, const struct xml_element *el, const char *type,
 					       const char *property, const char *format, ...);
-/* What becomes of a parameter: "is ignored". */
+/* Notes what happens to a parameter; what: "is ignored", for example. */
 int note_parameter(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 		   const char *name, const char *what);
-/* A parameter without effect on light; all of one object share a line. */
+/* Notes that a parameter has no effect on light; those of one object share a note. */
 int note_no_effect(struct notes *t, const struct xml_element *owner, const struct xml_element *el, const char *name);
-/* A parameter that would change the light a little. */
+/* Notes that a parameter which is not supported would change the light a little. */
 int note_difference(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 		    const char *name);
-/* A name of 0.6 in a file of 3.x. */
+/* Notes that a name of 0.6 in a file of 3.x is read as a name of 3.x. */
 int note_old_name(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 		  const char *name);
-int note_guide(const struct notes *t, const struct xml_element *el); /* plugin_is_guide */
-/* An element that is ignored with everything inside it; and an object of which only what its table lists is kept. */
+int note_guide(const struct notes *t, const struct xml_element *el); /* an object for which plugin_is_guide() is true */
+/* The first is for an element that is ignored with everything inside it, the second for an object of which only the
+ * parameters in its table are used. */
 int note_foreign(const struct notes *t, const struct xml_element *el);
 int note_ignored_plugin(const struct notes *t, const struct xml_element *el, const struct plugin_decl *decl);
 /* Leaves out an element that is not supported, with a note. */

@@ -2,13 +2,13 @@
 /*
  * Splits OBJ shapes with several materials into shapes with one material each.
  *
- * The walk visits each OBJ shape of the tree. For one that may have several materials, it reads the names of materials
- * in the file, then the .mtl file, and chooses for each name the BSDF of the shape or the entry of the .mtl file. If
- * any was found, the element becomes a `merge` with a copy of the shape for each material. Otherwise it stays as it
- * is. Scenes of the 3.x format do not have this feature and are not changed.
+ * The walk visits each OBJ shape of the tree. For a shape that may have several materials, it reads the names of
+ * materials in the file, then the .mtl file, and chooses for each name the BSDF of the shape or the entry of the .mtl
+ * file. If it finds any, the element becomes a `merge` with a copy of the shape for each material. Otherwise the
+ * element stays as it is. The 3.x format does not have this feature: its scenes are not changed.
  *
- * A file that is missing is an error here only if the shape has several BSDFs; otherwise it is reported when the shape
- * is built. Problems go to the report, and the walk continues with the next shape. -ENOMEM ends it.
+ * A missing OBJ file is an error here only if the shape has several BSDFs; otherwise it is reported when the shape is
+ * built. Problems go to the report, and the walk continues with the next shape. -ENOMEM ends it.
  */
 #include "worker/render/scene/obj_materials.h"
 
@@ -34,33 +34,33 @@ struct spread {
 	uint32_t *places;
 };
 
-/* An element in a shape. */
+/* An element inside a shape. */
 struct child {
 	const struct xml_element *el;
 	bool bsdf;
-	const char *name; /* of a BSDF; NULL: none */
+	const char *name; /* of a BSDF that has one; otherwise NULL */
 };
 
 struct material {
 	const char *name;
 	size_t length;
 	bool has_faces;
-	const struct xml_element *bsdf; /* in the shape; NULL: none */
-	const struct mtl_material *mtl; /* where there is no bsdf; NULL: none */
+	const struct xml_element *bsdf; /* the BSDF given in the shape, or NULL */
+	const struct mtl_material *mtl; /* if there is no bsdf: the entry of the .mtl file, or NULL */
 };
 
 /* The current shape. */
 struct obj_shape {
 	struct xml_element *el;
-	const char *file; /* NULL: none given */
+	const char *file; /* NULL: the shape names none */
 	struct asset bytes;
 	struct child *children;
-	size_t child_count, plain, named; /* BSDFs without a name, and with one */
-	bool load, fixed; /* load: it asks for the .mtl file; fixed: it emits, or states itself which faces it wants */
-	struct material *materials; /* OBJ_MATERIALS_MAX */
-	uint32_t *places;	    /* PLACES: 1 + index, by the hash of the name; 0: free */
+	size_t child_count, plain, named; /* plain, named: number of BSDFs without and with a name */
+	bool load, fixed; /* load: the shape asks for the .mtl file; fixed: it states itself which faces it wants */
+	struct material *materials; /* [OBJ_MATERIALS_MAX] */
+	uint32_t *places;	    /* hash table of PLACES entries by name: 1 + index, or 0 if free */
 	size_t count;
-	const char *library; /* of the last mtllib; NULL: none */
+	const char *library; /* name in the last mtllib, or NULL */
 	size_t library_length;
 	struct mtl mtl;
 };
@@ -72,7 +72,7 @@ static int out_of_memory(const struct spread *s)
 	return error_set(s->error, ENOMEM, "out of memory while reading the materials of an OBJ file");
 }
 
-/* ---- what a shape says */
+/* ---- what a shape states */
 
 static bool is_property(const struct xml_element *el, const char *element, const char *name, const char *snake)
 {
@@ -80,7 +80,7 @@ static bool is_property(const struct xml_element *el, const char *element, const
 	return strcmp(el->name, element) == 0 && written && (strcmp(written, name) == 0 || strcmp(written, snake) == 0);
 }
 
-/* What an element in a shape is, with references followed: "bsdf", "emitter" and so on. */
+/* Returns what an element inside a shape is, with references followed: "bsdf", "emitter" and so on. */
 static const char *kind_of(const struct spread *s, const struct xml_element *el)
 {
 	struct error unused;
@@ -115,9 +115,9 @@ static int read_children(const struct spread *s, struct obj_shape *o)
 	return 0;
 }
 
-/* ---- what the file says */
+/* ---- what the OBJ file states */
 
-/* NULL: too many. */
+/* Returns the entry for a name, added if necessary; NULL if there are too many materials. */
 static struct material *material_of(struct obj_shape *o, const char *name, size_t length)
 {
 	uint32_t at = (uint32_t)(fnv_add(FNV_BEGIN, name, length) % PLACES);
@@ -169,9 +169,10 @@ static int read_library(const struct spread *s, struct obj_shape *o)
 	return r;
 }
 
-/* ---- which material each has */
+/* ---- the choice of materials */
 
-/* The last BSDF in the shape that applies to it is used. *found: how many have a BSDF or an entry in the .mtl file. */
+/* Chooses the last applicable BSDF of the shape for each material. *found: the number of materials with faces that
+ * have a BSDF or an entry in the .mtl file. */
 static int choose(const struct spread *s, struct obj_shape *o, size_t *found)
 {
 	*found = 0;
@@ -195,7 +196,8 @@ static int choose(const struct spread *s, struct obj_shape *o, size_t *found)
 	return 0;
 }
 
-/* A single BSDF whose name is not a material of the file applies to the whole shape. */
+/* Returns whether the shape has a single BSDF, with a name that is not a material of the file: it applies to all
+ * faces. */
 static bool is_for_all(struct obj_shape *o)
 {
 	for (size_t k = 0; k < o->child_count && o->named == 1 && o->plain == 0; k++) {
@@ -207,7 +209,7 @@ static bool is_for_all(struct obj_shape *o)
 	return false;
 }
 
-/* ---- the shapes that it becomes */
+/* ---- splitting the shape */
 
 static int count_elements(const struct spread *s, const struct xml_element *at, int made)
 {
@@ -220,7 +222,7 @@ static int count_elements(const struct spread *s, const struct xml_element *at, 
 	return 0;
 }
 
-/* A copy of the element, inside another; `unnamed`: without its name. */
+/* Appends a copy of `el` to `in`; unnamed: without its name. */
 static struct xml_element *copy_into(const struct spread *s, struct xml_element *in, const struct xml_element *el,
 				     bool unnamed)
 {
@@ -262,7 +264,7 @@ static int put_part(const struct spread *s, const struct obj_shape *o, struct xm
 	return r || !m->mtl ? r : count_elements(s, o->el, mtl_put(&o->mtl, m->mtl, part, s->arena));
 }
 
-/* The element itself becomes the merge, so that references to it find all of its shapes. */
+/* Turns the element itself into the merge, so that references to it find all of its shapes. */
 static int replace(const struct spread *s, const struct obj_shape *o)
 {
 	struct xml_element *merge = element_make(NULL, o->el->name, o->el->file, o->el->line, s->arena);
@@ -287,7 +289,7 @@ static int replace(const struct spread *s, const struct obj_shape *o)
 	return 0;
 }
 
-/* ---- what is said of it */
+/* ---- notes */
 
 __attribute__((format(printf, 3, 4))) static int say(const struct spread *s, const struct obj_shape *o,
 						     const char *format, ...)
@@ -342,7 +344,7 @@ static int spread_open(const struct spread *s, struct obj_shape *o)
 	if (!r)
 		r = choose(s, o, &found);
 	if (r || (found == 0 && o->named < 2))
-		return r; /* the world's builder counts those whose materials are not read */
+		return r; /* shapes whose materials are not read are counted by the world's builder */
 	r = note_all(s, o);
 	return r ? r : replace(s, o);
 }

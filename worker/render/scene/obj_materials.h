@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * OBJ shapes of Mitsuba 0.6 whose file names materials. A BSDF with a name applies to the faces after `usemtl` of that
- * name, one without a name to all faces; faces without either have the material of the .mtl file. Such a shape becomes
- * a `merge` of shapes with one material each. Works on the tree of elements; one thread.
+ * OBJ shapes of Mitsuba 0.6 whose file names materials. A BSDF with a name applies to the faces that follow `usemtl`
+ * with that name, one without a name to all faces; faces with neither get the material of the .mtl file. Such a shape
+ * becomes a `merge` of shapes with one material each. Works on the tree of elements; one thread.
  */
 #ifndef WORKER_RENDER_SCENE_OBJ_MATERIALS_H
 #define WORKER_RENDER_SCENE_OBJ_MATERIALS_H
@@ -12,9 +12,10 @@
 #include "worker/render/scene/report.h"
 #include "worker/render/xml/xml.h"
 
-enum { OBJ_MATERIALS_MAX = 4096 }; /* of a file */
+enum { OBJ_MATERIALS_MAX = 4096 }; /* per file */
 
-/* Lists the .mtl files in `files`. Problems are added to the report. 0, -ENOMEM or REPORT_FULL. */
+/* Splits all such shapes of the tree. Adds the .mtl files to `files` and problems to the report. Returns 0, -ENOMEM
+ * or REPORT_FULL. */
 int obj_materials_spread(struct xml_tree *t, struct id_table *ids, const struct asset_source *assets,
 			 struct asset_list *files, struct arena *arena, struct report *report, struct error *e);
 

@@ -6,7 +6,7 @@
 #include <string.h>
 #include <strings.h>
 
-/* Mitsuba's margin: a material that reflects all of the light would never let a path end. */
+/* The reflectance to which Mitsuba scales: if a material reflected all light, its paths would never end. */
 static const double scaled_to = 0.99;
 
 static bool must_conserve_energy(const struct xml_element *owner)
@@ -94,7 +94,7 @@ static int replace_distribution(const struct notes *t, const struct xml_element 
 		el->file, el->line, owner->name, xml_attribute(owner, "type"), given);
 }
 
-/* For words of which a table lists the choices: Mitsuba 0.6 ignores the case of most of them. */
+/* Converts a word that its table restricts to a list: Mitsuba 0.6 ignores the case of most of these. */
 static int to_lower(struct value *v, struct arena *arena)
 {
 	char *word = arena_strdup(arena, v->as.string);

@@ -10,13 +10,14 @@
 #include "worker/render/scene/notes.h"
 
 /*
- * v: the value of parameter p, of the element el inside `owner`, which is an object of class cls; of a file of version
- * < 2. Its range and choices have not been checked yet. 0, whether or not it was replaced, or -ENOMEM.
+ * Replaces *v, the value of parameter p, if need be. It is given by the element el inside `owner`, an object of class
+ * cls, in a file of version < 2; its range and choices have not been checked yet. Returns 0, whether or not the value
+ * was replaced, or -ENOMEM.
  *
- * - Words of which there is a list lose their capitals.
+ * - Words that must be one of a list are converted to lower case.
  * - Reflectances, transmittances and opacities above 1 are scaled to at most 0.99, as Mitsuba does, unless the material
- *   says that it need not conserve energy.
- * - The components of the complex index of a metal lose their signs, on which nothing depends.
+ *   states that it need not conserve energy.
+ * - The components of a metal's complex index of refraction lose their signs, on which nothing depends.
  * - The microfacet distributions `phong` and `as` become `beckmann` of the same roughness.
  */
 int old_value(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,

@@ -14,7 +14,7 @@ static bool is_share(enum plugin_class cls, const struct param *p)
 	return (p->types & VALUE_FLOAT) && (cls == PLUGIN_BSDF || colour) && p->min == 0 && p->max == 1;
 }
 
-/* The largest number, if all are finite and none is below 0; otherwise 0. */
+/* Returns the largest number of a value if all are finite and none is below 0; otherwise 0. */
 static double largest_value(const struct value *v)
 {
 	double scratch[3], most = 0;
@@ -71,13 +71,14 @@ int over_one_value(const struct notes *t, const struct xml_element *owner, const
 		    owner->name, type, element_spelling(el, p->name), most);
 }
 
-/* Textures that are made of colours, or of others. What `scale` makes of its own is limited where it is used. */
+/* Textures made of colours, or of other textures. What a `scale` texture makes of its colours is limited where it is
+ * used. */
 static bool is_pattern(const char *type)
 {
 	return strcmp(type, "checkerboard") == 0 || strcmp(type, "gridtexture") == 0;
 }
 
-/* A colour of a texture, which is refused once, however many materials have it. */
+/* Refuses a colour of a texture, but only once, however many materials use the texture. */
 static int refuse_colour(const struct notes *t, const struct scene_node *texture, const struct property *p, double most)
 {
 	error_set(t->error, ERANGE, "%s:%d: <texture type=\"%.64s\">: %s=%g is above 1, which no reflectance is%s",
@@ -88,7 +89,7 @@ static int refuse_colour(const struct notes *t, const struct scene_node *texture
 	return -ERANGE;
 }
 
-/* Makes v, a colour of a texture that is above 1, 1 where it is more. */
+/* Limits v, a colour of a texture, to 1. */
 static int limit_colour(const struct notes *t, bool lenient, struct arena *arena, const struct xml_element *el,
 			const struct scene_node *texture, const struct property *p, struct value *v)
 {

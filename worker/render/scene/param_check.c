@@ -47,7 +47,7 @@ static int check_range(const struct xml_element *el, const struct param *p, cons
 	return 0;
 }
 
-/* A colour that is constant is accepted as a number: exporters write roughness as a colour. */
+/* Accepts a colour with three equal components as a number: exporters write roughness as a colour. */
 static void number_of_color(const struct param *p, struct value *v)
 {
 	if (!(p->types & VALUE_FLOAT) || (p->types & v->type))
@@ -87,7 +87,7 @@ int param_check(const struct xml_element *el, const struct param *p, struct valu
 	return 0;
 }
 
-/* ---- out of range, but not refused ---- */
+/* ---- out of range, but not refused */
 
 int clip_value(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 	       const struct param *p, struct value *v)
@@ -112,14 +112,14 @@ int clip_value(const struct notes *t, const struct xml_element *owner, const str
 		    owner->name, type, element_spelling(el, p->name), outside, p->min, p->max, end);
 }
 
-/* ---- given a second time ---- */
+/* ---- given a second time */
 
 int given_twice(const struct xml_element *el, const struct property *before, struct error *e)
 {
 	return xml_error(el, e, EINVAL, "`%s` is given twice (first in line %d)", before->name, before->line);
 }
 
-/* The name under which an earlier element of the object gives the property. */
+/* Returns the name under which an earlier element of the object gives the property. */
 static const char *earlier_name(const struct plugin_decl *decl, const struct xml_element *el, const char *property)
 {
 	char name[256];
@@ -134,7 +134,8 @@ static const char *earlier_name(const struct plugin_decl *decl, const struct xml
 	return property;
 }
 
-/* The last one counts, but a texture has the place of a value in whichever order, and names of 3.x mean nothing. */
+/* The last value counts, except that a texture replaces a value in whichever order they come, and that names of 3.x
+ * have no effect. */
 int given_again(const struct notes *t, const struct plugin_decl *decl, const struct xml_element *el,
 		struct property *before, struct value v)
 {

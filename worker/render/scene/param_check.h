@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Checks a value against its parameter: type, range, choice, and whether it is the first one. Any thread; allocates
+/* Checks a value against its parameter: type, range, choice, and whether it was given before. Any thread; allocates
  * nothing but notes. */
 #ifndef WORKER_RENDER_SCENE_PARAM_CHECK_H
 #define WORKER_RENDER_SCENE_PARAM_CHECK_H
@@ -8,20 +8,22 @@
 #include "worker/render/scene/notes.h"
 #include "worker/render/plugin/param.h"
 
-/* Converts v to a number if p takes no colour and v is an integer or a colour without hue. Errors have the place of
- * el: EINVAL for a wrong type or choice, with what is supported; ERANGE. */
+/* Checks *v. If p takes no colour, a colour with three equal components is converted to a number; if p takes no
+ * integer, an integer is. Errors have the place of el: -EINVAL for a wrong type or choice, with what is supported;
+ * -ERANGE for a value outside the range. */
 int param_check(const struct xml_element *el, const struct param *p, struct value *v, struct error *e);
 
-/* Of VALUE_CLIPPED, which Mitsuba limits to its range: moves a number, or each component of a colour, that is outside
- * the range of p to the nearer end, with a note. Spectra stay as they are. 0 or -ENOMEM. */
+/* For parameters with VALUE_CLIPPED, which Mitsuba limits to their range: moves a number, or each component of a
+ * colour, that is outside the range of p to the nearer end, with a note. Spectra stay as they are. Returns 0 or
+ * -ENOMEM. */
 int clip_value(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 	       const struct param *p, struct value *v);
 
-/* Refuses a property that an object is given a second time: -EINVAL. */
+/* Refuses a property that an object is given a second time. Returns -EINVAL. */
 int given_twice(const struct xml_element *el, const struct property *before, struct error *e);
 
-/* In files of 0.6: sets *before to the value that counts there, with a note. -EINVAL: two names of 0.6 for one thing.
- */
+/* For files of 0.6: sets *before to the value that counts in Mitsuba 0.6, with a note. Returns -EINVAL if two names
+ * of 0.6 that mean the same parameter are given. */
 int given_again(const struct notes *t, const struct plugin_decl *decl, const struct xml_element *el,
 		struct property *before, struct value v);
 

@@ -10,7 +10,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* "; --lenient ..." or "": what --lenient does instead. */
+/* Writes what --lenient does instead, as "; --lenient ...", or "". */
 static const char *lenient_hint(const struct xml_element *el, enum plugin_class cls, const char *type, char *text,
 				size_t size)
 {
@@ -32,7 +32,7 @@ static const char *lenient_hint(const struct xml_element *el, enum plugin_class 
 	return text;
 }
 
-/* What other programs' files and people call an element; NULL: none that is known. */
+/* Returns the name here of an element that other programs, or people, call differently; NULL if none is known. */
 static const char *usual_name(const char *name)
 {
 	static const struct {
@@ -70,7 +70,7 @@ int refuse_element(const struct xml_element *el, struct error *e)
 	const char *usual = usual_name(el->name), *around = el->parent ? el->parent->name : "";
 	if (usual)
 		s.best = usual;
-	else if (s.best && strcmp(s.best, el->name) == 0) /* the right name in the wrong place */
+	else if (s.best && strcmp(s.best, el->name) == 0) /* right name, wrong place */
 		return xml_error(el, e, EINVAL, "has no place in <%.64s>", around);
 	return xml_error(el, e, EINVAL, "there is no element of this name%s",
 			 s.best ? spelling_hint(&s, hint, sizeof hint) : "; --lenient leaves it out");
@@ -81,7 +81,7 @@ int refuse_type(const struct plugin_decl *decls, const struct xml_element *el, e
 {
 	char hint[128], near[128] = "", list[512];
 	struct spelling s = {.wanted = type};
-	if (cls == PLUGIN_TEXTURE && gltf_is(el->file)) /* an extension, which names the format of an image */
+	if (cls == PLUGIN_TEXTURE && gltf_is(el->file)) /* an extension, whose name is the image's format */
 		return xml_error(el, e, ENOTSUP, "images of %.64s are not supported; export PNG, JPEG or WebP%s", type,
 				 LENIENT_TEXTURE_HINT);
 	plugin_offer_types(decls, cls, &s);
@@ -92,10 +92,11 @@ int refuse_type(const struct plugin_decl *decls, const struct xml_element *el, e
 	spelling_hint(&s, near, sizeof near);
 	const char *lenient = lenient_hint(el, cls, type, hint, sizeof hint);
 	return xml_error(el, e, EINVAL, "there is no %s of this type%s%s (supported: %s)", plugin_class_name(cls), near,
-			 *near && *lenient ? lenient + 1 : lenient, list); /* after "?" without ";" */
+			 *near && *lenient ? lenient + 1 : lenient, list); /* after a "?", no ";" */
 }
 
-/* Whether the shorter of two names is the first or the last words of the longer one, as `ior` is of `int_ior`. */
+/* Returns whether the shorter of two names is the first or the last words of the longer one, as `ior` is of
+ * `int_ior`. */
 static bool is_part(const char *a, const char *b)
 {
 	size_t n = strlen(a), m = strlen(b);

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Looks at each object, or at all of a scene, for what is known to differ, and adds a sentence about it to the report.
+ * Looks at each object, or at the scene as a whole, for things that are known to be rendered differently, and adds a
+ * sentence about each to the report.
  *
- * Failures: -ENOMEM only.
+ * The only failure is -ENOMEM.
  */
 #include "worker/render/scene/remarks.h"
 
@@ -26,7 +27,7 @@ __attribute__((format(printf, 4, 5))) static int remark(struct report *r, const 
 	return report_text(r, n->file, text, text, e);
 }
 
-/* A scene without a limit expects some limit; one with a number gets another number, which is noted. */
+/* Notes a max_depth above the limit. A scene without max_depth must expect some limit, which is not noted. */
 static int on_depth(struct report *r, const struct scene_node *n, struct error *e)
 {
 	int64_t depth = node_int(n, "max_depth", -1);
@@ -36,7 +37,7 @@ static int on_depth(struct report *r, const struct scene_node *n, struct error *
 		      SCENE_MAX_DEPTH);
 }
 
-/* A scene that asks for a part of the light, or for something other than light, gets another image, which is noted. */
+/* Notes that an integrator which shows a part of the light, or something other than light, gives another image here. */
 static int on_integrator(struct report *r, const struct scene_node *n, struct error *e)
 {
 	const struct scene_node *inner = integrators_inner(n);
@@ -64,7 +65,7 @@ static int on_integrator(struct report *r, const struct scene_node *n, struct er
 	return rc ? rc : on_depth(r, n, e);
 }
 
-/* Emitters that a path of one edge meets: all that are not a point, nor at a single direction. */
+/* Returns whether a path of one edge can hit the emitter: not if it is a point or shines in a single direction. */
 static bool is_seen(const struct scene_node *n)
 {
 	static const char *const unseen[] = {"point", "spot", "projector", "directional"};
@@ -102,7 +103,7 @@ static bool has_medium(const struct scene_node *n)
 				      : n->cls == PLUGIN_SENSOR && node_child(n, PLUGIN_MEDIUM, 0);
 }
 
-/* Easily forgotten, and the medium is never seen. In 0.6 light passes such a shape. */
+/* A BSDF is easily forgotten, and the medium is then never seen. In 0.6 light passes through such a shape. */
 static int on_boundary(struct report *r, const struct scene_node *n, bool dialect_3, struct error *e)
 {
 	if (!dialect_3 || !node_ref(n, "interior") || n->shines || node_child(n, PLUGIN_BSDF, 0))
@@ -113,7 +114,7 @@ static int on_boundary(struct report *r, const struct scene_node *n, bool dialec
 		"lets light through");
 }
 
-/* Which of the two, the setting `media` may have the last word. */
+/* Notes that Mitsuba's integrator shows no media. Whether the image has them depends on the setting `media`. */
 static int on_media(struct report *r, const struct scene_node *integrator, struct error *e)
 {
 	const struct scene_node *n = integrators_without_media(integrator);
@@ -149,8 +150,8 @@ static int on_emitter(struct report *r, const struct scene_node *n, bool dialect
 		"in clear air, half as bright at a turbidity of 8 when it is low; `sun_scale` makes up for it");
 }
 
-/* Mitsuba has two tables for most metals, and those of which here is one, the first, are listed. Of Na, Ni and V it has
- * one, under the second name. */
+/* Mitsuba has two tables for most metals; `doubled` lists those of which only the first is here. Of Na, Ni and V
+ * Mitsuba has only one table, under the second name. */
 static int on_metal(struct report *r, const struct scene_node *n, struct error *e)
 {
 	static const char *const doubled[] = {"Be", "Cu", "Cu2O", "CuO",  "Hg", "HgTe", "Ir",  "K",   "Li", "Mo",
@@ -162,7 +163,7 @@ static int on_metal(struct report *r, const struct scene_node *n, struct error *
 	return 0;
 }
 
-/* Where the shutter is open for some time. */
+/* Notes how a rolling shutter is understood, if the shutter is open for some time. */
 static int on_sensor(struct report *r, const struct scene_node *n, struct error *e)
 {
 	if (strcmp(node_string(n, "rolling_shutter_type", "none"), "none") == 0 ||
@@ -174,8 +175,8 @@ static int on_sensor(struct report *r, const struct scene_node *n, struct error 
 		"does by these names; it was not compared with Mitsuba");
 }
 
-/* Filters that depend on how much of the texture a pixel sees: once for all textures. `ewa` is what Mitsuba 0.6 does
- * without being asked, and not noted either. */
+/* Notes filters that depend on how much of the texture a pixel covers: once for all textures. `ewa` is not noted,
+ * because it is Mitsuba 0.6's default. */
 static int on_filter(struct report *r, const struct scene_node *n, struct error *e)
 {
 	static const char *const wide[] = {"trilinear", "anisotropic"};
@@ -190,7 +191,8 @@ static int on_filter(struct report *r, const struct scene_node *n, struct error 
 	return report_text(r, n->file, filter, text, e);
 }
 
-/* Mitsuba 0.6 takes both for what is to be scaled, and the last one read is the texture inside. */
+/* Notes a `scale` with both a value and a texture: Mitsuba 0.6 takes each of them for what is to be scaled and uses
+ * the one read last, which is the texture inside. */
 static int on_texture(struct report *r, const struct scene_node *n, struct error *e)
 {
 	if (strcmp(n->type, "bitmap") == 0)
