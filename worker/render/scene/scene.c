@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Turns the tree of XML elements (or glTF read as such) into a tree of typed nodes, by the tables of the plug-ins.
+ * Turns the tree of XML elements (or glTF read as such) into a tree of typed nodes, using the tables of the plug-ins.
  *
- * Happy path: read_all parses the file. make_scene lists all ids and walks the top level, and maker.c makes a node of
- * each object there with all that is inside it. list_assets collects the names of all files.
+ * Happy path: read_all parses the file. make_scene lists all ids and walks over the top level, and maker.c makes a node
+ * of each object there, with everything inside it. list_assets collects the names of all files.
  *
- * Failures: a problem is reported with file and line and reading goes on, so that one run lists all problems
- * (report.h). scene_read fails with the first problem, scene_read_all returns the list. -ENOMEM ends the reading.
+ * Failures: a problem is reported with file and line and reading goes on, so that one run finds all problems
+ * (report.h). scene_read fails with the first problem; scene_read_all returns all of them. -ENOMEM ends the reading.
  */
 #include "worker/render/scene/scene.h"
 
@@ -52,15 +52,15 @@ static int read_include(struct maker *m, const struct xml_element *el, const str
 	return r ? r : read_top(m, strcmp(el->first->name, "scene") == 0 ? el->first : el, objects);
 }
 
-/* A value directly in <scene>, in 3.x, that means nothing: no spectrum for others, and none of a plug-in's parameters
- * in the wrong place. 0.6 ignores all. */
+/* Returns whether a value directly in <scene>, in 3.x, has no meaning: it is not a spectrum that others refer to,
+ * nor a plug-in's parameter in the wrong place. In 0.6 no such value has a meaning. */
 static bool is_foreign_value(const struct maker *m, const struct xml_element *el)
 {
 	const char *name = xml_attribute(el, "name");
 	return name && !id_table_names(el) && !plugin_any_has(m->decls, name);
 }
 
-/* An element that stands directly in <scene>, or alone in a file that is included there. */
+/* Reads an element that is directly in <scene>, or the only one of a file included there. */
 static int read_top_element(struct maker *m, struct xml_element *el, const struct scene_node **objects)
 {
 	enum plugin_class cls;
@@ -81,7 +81,7 @@ static int read_top_element(struct maker *m, struct xml_element *el, const struc
 	if (el->unset)
 		return 0;
 	struct value unused;
-	if (id_table_names(el) && value_is_element(el->name)) /* a spectrum; those who refer to it hold it */
+	if (id_table_names(el) && value_is_element(el->name)) /* a spectrum: each reference to it makes a copy */
 		return value_read(el, m->assets_from, m->arena, &unused, m->error);
 	return strcmp(el->name, "alias") == 0 ? 0 : maker_foreign(m, el);
 }
@@ -118,8 +118,8 @@ static bool has_child(const struct xml_element *around, const char *name)
 	return false;
 }
 
-/* Neither realistic nor meant to be: the sun is large and the sky goes on below the horizon, so that any model can be
- * seen. */
+/* Adds the default light. It is not meant to be realistic: the sun is large, and the sky extends below the horizon,
+ * so that any model can be seen. */
 static bool make_daylight(struct xml_element *scene, struct arena *arena)
 {
 	struct xml_element *light = element_make(scene, "emitter", scene->file, scene->line, arena), *place, *turn;
@@ -138,8 +138,8 @@ static bool make_daylight(struct xml_element *scene, struct arena *arena)
 	return true;
 }
 
-/* Adds the sun and sky of Mitsuba 0.5 and 0.6 to a file of theirs that has shapes and no emitter, with a note. False:
- * out of memory. decls: where these are not known nothing is added. */
+/* Adds the default sun and sky of Mitsuba 0.5 and 0.6 to a scene in their format that has shapes but no emitter,
+ * with a note. Adds nothing if decls has no sunsky. Returns false if out of memory. */
 static bool add_default_light(struct xml_tree *t, const struct plugin_decl *decls, struct arena *arena)
 {
 	if (t->dialect_3 || t->holes || has_child(t->root, "emitter") || !has_child(t->root, "shape") ||
@@ -150,7 +150,7 @@ static bool add_default_light(struct xml_tree *t, const struct plugin_decl *decl
 	return make_daylight(t->root, arena);
 }
 
-/* Shapes that `lenient` leaves out together. */
+/* Notes, in one sentence, all shapes that `lenient` leaves out because their transforms have no inverse. */
 static int note_flat(const struct maker *m)
 {
 	const struct xml_element *first = m->first_flat;
@@ -197,7 +197,7 @@ static int make_scene(struct maker *m)
 	return r ? r : list_assets(m);
 }
 
-/* Names without a value and files that are not there. */
+/* Reports names without a value and missing files. */
 static int report_missing(struct maker *m)
 {
 	int r = 0;
@@ -233,7 +233,7 @@ static int read_all(struct scene *s, const struct asset_source *assets, const ch
 				 : gltf_read(m->tree, assets, name, &s->arena, m->error);
 	else
 		r = xml_read(m->tree, assets, name, defines, define_count, &s->arena, m->error);
-	int told = report_missing(m); /* also where the reading ended early */
+	int told = report_missing(m); /* also if reading ended early */
 	if (told)
 		r = told;
 	else if (r)
@@ -260,7 +260,7 @@ int scene_read_all(struct scene *s, const struct asset_source *assets, const cha
 	return r;
 }
 
-/* Files that cannot be opened, which are no problems of the description itself. */
+/* Returns the number of files that cannot be opened; they are not problems of the description itself. */
 static uint32_t count_missing(const struct scene *s, const struct asset_source *assets)
 {
 	uint32_t missing = 0;

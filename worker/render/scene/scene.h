@@ -20,40 +20,41 @@ struct scene {
 	struct arena arena;
 	const char *file;   /* as it was opened */
 	bool dialect_3;	    /* version >= 2: Mitsuba 3 rules */
-	bool black_backs;   /* of opaque materials without twosided, unless the setting `backs` says otherwise */
-	bool without_media; /* Mitsuba's image has none, unless the setting `media` says otherwise */
+	bool black_backs;   /* backs of opaque one-sided materials are black, unless the setting `backs` differs */
+	bool without_media; /* Mitsuba's image has no media, unless the setting `media` says otherwise */
 	uint32_t object_count;
-	const struct scene_node *const *objects; /* top level, in file order */
+	const struct scene_node *const *objects; /* top-level objects, in file order */
 	uint32_t asset_count;
 	const char *const *assets; /* names of all files that the description refers to, each once, without the scene
 				      file itself */
-	const char *const *asset_places; /* "scene.xml:12: <shape type=\"obj\">" the place that names it first; or "" */
-	uint32_t problem_count;		 /* 0 except after scene_read_all */
 	const char *const
-		*problems; /* "scene.xml:12: <bsdf>: ..." all that is wrong or not supported, in the file's order */
+		*asset_places;	     /* "scene.xml:12: <shape type=\"obj\">", the first place that names it; or "" */
+	uint32_t problem_count;	     /* 0 except after scene_read_all */
+	const char *const *problems; /* "scene.xml:12: <bsdf>: ...", in file order */
 	uint32_t flawed_count;
-	const struct scene_node *const *flawed; /* those nodes, however deep; what they hold need not be among them */
+	const struct scene_node *const *flawed; /* the nodes with scene_node.flawed, at any depth */
 	uint32_t note_count;
-	const char *const *notes; /* "scene.xml:12: ignored ...": each once, for the log */
+	const char *const *notes; /* "scene.xml:12: ignored ...", each once, for the log */
 };
 
-/* Reads `name` through `assets`. decls ends with a NULL type. On failure the error names file, line and element and
- * *s is empty. One thread; allocates in the scene's arena only. */
+/* Reads the scene file `name` through `assets`. decls ends with a NULL type. On failure the error names file, line
+ * and element, and *s is empty. One thread; allocates only in the scene's arena. */
 int scene_read(struct scene *s, const struct asset_source *assets, const char *name, const struct plugin_decl *decls,
 	       const struct scene_define *defines, size_t define_count, struct error *e);
 void scene_fini(struct scene *s);
 
-/* The same, but what is not supported is left out or replaced (lenient.h), with a note each. */
+/* Like scene_read(), but what is not supported is left out or replaced (lenient.h), with a note each. */
 int scene_read_lenient(struct scene *s, const struct asset_source *assets, const char *name,
 		       const struct plugin_decl *decls, const struct scene_define *defines, size_t define_count,
 		       struct error *e);
 
-/* Returns code, the failure of building a scene that was read. If it is -ENOENT, a file that is not there, adds to *e
- * how many others cannot be opened either. */
+/* Returns code, the failure of building a scene that was read. If it is -ENOENT, for a missing file, adds to *e how
+ * many others cannot be opened either. */
 int scene_missing(const struct scene *s, const struct asset_source *assets, int code, struct error *e);
 
-/* The same, but errors in the scene are not a failure: it is read as far as possible, and s->problems has all of
- * them. If there are any, it must not be rendered. -ENOMEM. */
+/* Like scene_read(), or with `lenient` like scene_read_lenient(), but errors in the scene are not a failure: it is
+ * read as far as possible, and s->problems lists them all. If there are any, the scene must not be rendered. Returns 0
+ * or -ENOMEM. */
 int scene_read_all(struct scene *s, const struct asset_source *assets, const char *name,
 		   const struct plugin_decl *decls, const struct scene_define *defines, size_t define_count,
 		   bool lenient, struct error *e);

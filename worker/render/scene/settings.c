@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Finds sensor (the selected one), film, filter and integrator among the objects, and translates each into numbers of
- * struct scene_settings, with Mitsuba's defaults.
+ * Finds the selected sensor, its film and filter, and the integrator, and translates each into numbers of struct
+ * scene_settings, with Mitsuba's defaults.
  *
- * Failures have the object's place: a second film, a crop window outside the film, a camera that to_world flattens,
- * invalid angles.
+ * Failures have the object's place: a second integrator, a crop window outside the film, a camera that to_world
+ * flattens, invalid angles.
  */
 #include "worker/render/scene/settings.h"
 #include "worker/render/scene/fov.h"
@@ -20,19 +20,20 @@
 #include <string.h>
 
 enum { FILM_PIXELS_MAX = PLAN_MAX_FILM, RADIUS_MAX = 64 };
-enum { ROULETTE_DEPTH = 5 }; /* Mitsuba's */
+enum { ROULETTE_DEPTH = 5 }; /* as in Mitsuba */
 #define KC_MAX 1e6
 
 #define RANGE(types, min, max) types, PARAM_UNDERSTOOD, min, max, NULL
 
-/* Times, if something moves. The duration matters with a rolling shutter only, and is checked there. */
+/* Times matter if something moves. The duration matters only with a rolling shutter, and is checked there. */
 #define SHUTTER_PARAMS                                                                                         \
 	{"shutter_open", RANGE(VALUE_FLOAT, -1e30, 1e30)}, {"shutter_close", RANGE(VALUE_FLOAT, -1e30, 1e30)}, \
 		{"rolling_shutter_type", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, "none|top|bottom|left|right"},  \
 	{                                                                                                      \
 		"rolling_shutter_duration", RANGE(VALUE_FLOAT, -1e30, 1e30)                                    \
 	}
-/* For both cameras. Pixels are sampled all over, and textures are not filtered, whatever jitter and cone_scale say. */
+/* For the perspective cameras. Whatever jitter and cone_scale say, samples are spread over the whole pixel and
+ * textures are not filtered. */
 #define CAMERA_PARAMS                                                                                   \
 	{"to_world", UNDERSTOOD(VALUE_PLACE)}, {"fov", RANGE(VALUE_FLOAT, 1e-4, 179.9)},                \
 		{"fov_axis", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, "x|y|diagonal|smaller|larger"},      \
@@ -45,6 +46,7 @@ enum { ROULETTE_DEPTH = 5 }; /* Mitsuba's */
 		"srf", REFUSED                                                                          \
 	}
 
+/* For the orthographic cameras. */
 #define FAR_PARAMS                                                                              \
 	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)}, {"near_clip", RANGE(VALUE_FLOAT, 0, 1e30)},  \
 		{"far_clip", RANGE(VALUE_FLOAT, 0, 1e30)}, SHUTTER_PARAMS, {"jitter", IGNORED}, \
@@ -86,7 +88,7 @@ static const struct param film_params[] = {
 
 const struct plugin_decl setting_decls[] = {
 	{PLUGIN_SENSOR, "perspective",
-	 /* a pinhole has no focus, but exporters write one; thinlens has an aperture */
+	 /* A pinhole has no focus, but exporters write one. thinlens has an aperture. */
 	 PARAMS(CAMERA_PARAMS, {"focus_distance", IGNORED}, {"aperture_radius", REFUSED}), CAMERA_HOLDS,
 	 PARAM_UNDERSTOOD},
 	{PLUGIN_SENSOR, "thinlens",
@@ -99,7 +101,7 @@ const struct plugin_decl setting_decls[] = {
 	 PARAMS(FAR_PARAMS, {"focus_distance", RANGE(VALUE_FLOAT, 1e-30, 1e30)},
 		{"aperture_radius", RANGE(VALUE_FLOAT, 0, 1e30)}),
 	 CAMERA_HOLDS, PARAM_UNDERSTOOD},
-	/* Exporters write planes and a focus for all cameras; this one has none. */
+	/* Exporters write clipping planes and a focus for all cameras; this one has neither. */
 	{PLUGIN_SENSOR, "spherical",
 	 PARAMS({"to_world", UNDERSTOOD(VALUE_PLACE)}, {"near_clip", IGNORED}, {"far_clip", IGNORED},
 		{"focus_distance", IGNORED}, SHUTTER_PARAMS, {"srf", REFUSED}),
@@ -108,7 +110,7 @@ const struct plugin_decl setting_decls[] = {
 	 PARAMS(CAMERA_PARAMS, {"focus_distance", IGNORED}, {"aperture_radius", REFUSED},
 		{"kc", UNDERSTOOD(VALUE_STRING)}),
 	 CAMERA_HOLDS, PARAM_UNDERSTOOD},
-	/* Its cameras have shutters of their own. */
+	/* Its sensors have shutters of their own. */
 	{PLUGIN_SENSOR, "batch",
 	 PARAMS({"shutter_open", IGNORED}, {"shutter_close", IGNORED}, {"rolling_shutter_type", IGNORED},
 		{"rolling_shutter_duration", IGNORED}, {"srf", REFUSED}),
@@ -117,7 +119,7 @@ const struct plugin_decl setting_decls[] = {
 	{PLUGIN_FILM, "mfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
 	{PLUGIN_FILM, "tiledhdrfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
 	{PLUGIN_FILM, "ldrfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
-	/* `radius` of `gaussian`, and in 3.x that of `box`, are ours. */
+	/* Mitsuba has no `radius` of `gaussian`, nor in 3.x of `box`. */
 	PLUGIN(RFILTER, "box", {"radius", RANGE(VALUE_FLOAT, 0.25, RADIUS_MAX)}),
 	PLUGIN(RFILTER, "tent", {"radius", RANGE(VALUE_FLOAT | VALUE_OF_3, 0.25, RADIUS_MAX)}),
 	PLUGIN(RFILTER, "gaussian", {"stddev", RANGE(VALUE_FLOAT, 0.01, RADIUS_MAX / 4)},
@@ -127,8 +129,8 @@ const struct plugin_decl setting_decls[] = {
 	{PLUGIN_RFILTER, "catmullrom", NULL, 0, PARAM_UNDERSTOOD},
 	PLUGIN(RFILTER, "lanczos", {"lobes", RANGE(VALUE_INT, 1, 16)}),
 	{PLUGIN_SAMPLER, "*", PARAMS({"sample_count", RANGE(VALUE_INT, 1, 1 << 30)}, {"*", IGNORED}), 0, PARAM_IGNORED},
-	/* irrcache, adaptive, aov and others contain the integrator with the depth, multichannel and aov also several.
-	 */
+	/* irrcache, adaptive, aov and others contain the integrator that states the depth; multichannel and aov may
+	   contain several. */
 	{PLUGIN_INTEGRATOR, "*",
 	 PARAMS({"max_depth", RANGE(VALUE_INT, -1, 1 << 30)}, {"rr_depth", RANGE(VALUE_INT, 1, 1 << 30)},
 		{"hide_emitters", UNDERSTOOD(VALUE_BOOL)}, {"*", IGNORED}),
@@ -136,7 +138,7 @@ const struct plugin_decl setting_decls[] = {
 	{0, NULL, NULL, 0, 0},
 };
 
-/* The n-th of its class, from 1 on; count: the total. */
+/* Returns the n-th object of its class, from 1 on, or NULL; *count: their total number. */
 static const struct scene_node *find_object(const struct scene *s, enum plugin_class cls, uint32_t n, uint32_t *count)
 {
 	const struct scene_node *found = NULL;
@@ -147,7 +149,7 @@ static const struct scene_node *find_object(const struct scene *s, enum plugin_c
 	return found;
 }
 
-/* A window that covers the whole film is no window. */
+/* Reads the crop window. One that covers the whole film counts as none. */
 static int read_crop(const struct scene_node *film, struct scene_settings *out, struct error *e)
 {
 	uint64_t x = (uint64_t)node_int(film, "crop_offset_x", 0), y = (uint64_t)node_int(film, "crop_offset_y", 0);
@@ -167,7 +169,7 @@ static int read_crop(const struct scene_node *film, struct scene_settings *out, 
 	return 0;
 }
 
-/* Mitsuba 0.6's film for experiments: unless it says otherwise, it has one pixel and a box filter. */
+/* Mitsuba 0.6's film for experiments: by default it has one pixel and a box filter. */
 static bool is_mfilm(const struct scene_node *film)
 {
 	return film && strcmp(film->type, "mfilm") == 0;
@@ -180,7 +182,7 @@ static int read_film(const struct scene_node *sensor, uint32_t width, uint32_t h
 	bool one = is_mfilm(film);
 	out->width = film ? (uint32_t)node_int(film, "width", one ? 1 : SCENE_FILM_WIDTH) : SCENE_FILM_WIDTH;
 	out->height = film ? (uint32_t)node_int(film, "height", one ? 1 : SCENE_FILM_HEIGHT) : SCENE_FILM_HEIGHT;
-	if (width && !height) /* the film keeps its aspect */
+	if (width && !height) /* keeps the film's aspect ratio */
 		out->height = (uint32_t)fmin(fmax(floor((double)width * out->height / out->width + 0.5), 1),
 					     PLAN_MAX_SIZE + 1.0);
 	if (width)
@@ -228,7 +230,7 @@ static int read_filter(const struct scene_node *sensor, struct scene_settings *o
 	return 0;
 }
 
-/* The innermost one has it, as in Mitsuba, whose `direct` shows light that is scattered once. */
+/* Reads the depths. As in Mitsuba, the innermost integrator determines them; `direct` shows light scattered once. */
 static int read_depth(const struct scene *s, struct scene_settings *out, struct error *e)
 {
 	uint32_t count;
@@ -254,7 +256,7 @@ static int read_depth(const struct scene *s, struct scene_settings *out, struct 
 	return 0;
 }
 
-/* The film is as wide as to_world makes the line from -1 to 1. */
+/* Reads the size of an orthographic film: it is as wide as the line from -1 to 1 is after to_world. */
 static int read_scale(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
 {
 	mat4 m = node_transform(sensor, "to_world");
@@ -313,7 +315,7 @@ bool scene_settings_upright(mat4 m, mat4 *out)
 	return true;
 }
 
-/* Where the camera is when the shutter opens. */
+/* Determines where the camera is when the shutter opens. */
 static int read_place(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
 {
 	const struct animation *a = node_animation(sensor);
@@ -386,7 +388,7 @@ static int read_camera(const struct scene_node *sensor, struct scene_settings *o
 
 #define STAND_IN_FOV 45.0
 
-/* What a scene without a sensor is seen by, but for its place. */
+/* The sensor of a scene that has none; scene_settings_place() gives its position. */
 static const struct property stand_in_properties[] = {{"fov", 0, {.type = VALUE_FLOAT, .as.number = STAND_IN_FOV}}};
 static const struct scene_node stand_in = {.cls = PLUGIN_SENSOR,
 					   .type = "perspective",

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Each form of a spectrum has a function that fills a table of wavelengths and values, or a constant; check_table
- * checks all tables for order, range and finite values.
+ * Reads spectra. Each form of a spectrum has a function that makes a constant or a table of wavelengths and values of
+ * it; check_table checks each table for order and range.
  *
- * Failures: lists of different lengths, wavelengths that do not increase, files other than lines of two numbers,
- * negative temperatures.
+ * Failures: lists of different lengths, wavelengths that do not increase, files that do not consist of lines of two
+ * numbers, temperatures out of range.
  */
 #include "worker/render/scene/spectral.h"
 
@@ -14,12 +14,12 @@
 
 #include <string.h>
 
-#define TEMPERATURE_MAX 1e6 /* kelvin; below 100 there is practically no visible light */
+#define TEMPERATURE_MAX 1e6 /* in kelvin; below TEMPERATURE_MIN there is practically no visible light */
 #define TEMPERATURE_MIN 100
 #define VALUE_LARGEST 1e30
 
-/* Luminance of the CIE's D65 table over that of a constant 1: divided by it, this spectrum has the same white as rgb
- * 1. */
+/* Returns the luminance of the CIE's D65 table relative to that of a constant 1. Divided by it, the table gives the
+ * white of rgb 1. */
 static double d65_normalization(void)
 {
 	double sum = 0, y = 0;
@@ -42,7 +42,7 @@ static int constant(const struct xml_element *el, double x, struct arena *arena,
 	return 0;
 }
 
-/* A table with room for n points; NULL, with the error set: out of memory. */
+/* Makes a table with room for n points. Returns false, with the error set, if out of memory. */
 static bool table(const struct xml_element *el, uint32_t n, struct arena *arena, struct value *out, double **nm,
 		  double **value, struct error *e)
 {
@@ -71,7 +71,8 @@ static int check_table(const struct xml_element *el, const struct value *v, stru
 	return 0;
 }
 
-/* "400:0.1, 500:0.2", or lines "400 0.1" of a file: the number of points, 0 if it is neither. */
+/* Reads "400:0.1, 500:0.2", or lines "400 0.1" of a file. Returns the number of points, or 0 if the text is
+ * malformed. */
 static uint32_t scan_pairs(const char *p, const char *end, char between, double *nm, double *value)
 {
 	uint32_t n = 0;
@@ -147,12 +148,13 @@ static int read_value(const struct xml_element *el, const char *text, const stru
 	if (number_parse(text, x)) {
 		if (!el->snake)
 			return constant(el, x[0], arena, out, e);
-		/* In 0.6 it is rgb, so that light is white; in 3.x it is the same at each wavelength. */
+		/* In 0.6 a single number is rgb, so that as a light it is white; in 3.x it is constant over all
+		 * wavelengths. */
 		*out = (struct value){.type = VALUE_FLOAT};
 		out->as.number = x[0];
 		return 0;
 	}
-	/* 0.6 built with three lanes accepts r, g, b here; with more it accepts as many numbers. */
+	/* 0.6 built with three spectral samples accepts r, g, b here; built with more, it accepts that many numbers. */
 	if (el->snake && number_list(text, x, 3) == 3) {
 		*out = (struct value){.type = VALUE_RGB};
 		memcpy(out->as.rgb, x, sizeof x);
@@ -213,7 +215,7 @@ int spectral_read_blackbody(const struct xml_element *el, struct arena *arena, s
 	return r ? r : blackbody(el, kelvin, factor, arena, out, e);
 }
 
-/* The contents of a <spectrum type="...">: the value of <float name="NAME" .../> or of any other element; NULL:
+/* Returns the value of the parameter `name` inside a <spectrum type="...">, whatever its element; NULL if there is
  * none. */
 static const char *inner_value(const struct xml_element *el, const char *name)
 {
@@ -237,7 +239,7 @@ static int inner_number(const struct xml_element *el, const char *name, const ch
 	return text ? number_of(el, name, text, 0, x, e) : 0;
 }
 
-/* The numbers of `name`, at least 2: their count, or negative with the error set. */
+/* Reads the numbers of `name`, at least 2. Returns their count, or a negative errno with the error set. */
 static int inner_list(const struct xml_element *el, const char *name, struct arena *arena, double **out,
 		      struct error *e)
 {
@@ -290,7 +292,7 @@ static int read_irregular(const struct xml_element *el, struct arena *arena, str
 			   : xml_error(el, e, EINVAL, "%d wavelengths, but %d values", n, values);
 }
 
-/* What the colour of <rgb name="NAME" value="..."/> is; one number stands for three. */
+/* Reads the colour of <rgb name="NAME" value="..."/>; a single number stands for all three. */
 static int inner_colour(const struct xml_element *el, const char *name, double scale, struct value *out,
 			struct error *e)
 {
@@ -305,7 +307,7 @@ static int inner_colour(const struct xml_element *el, const char *name, double s
 	return 0;
 }
 
-/* D65, or with a colour the same as <rgb> of light. */
+/* Reads D65; with a colour, it means the same as an <rgb> of a light. */
 static int read_d65(const struct xml_element *el, struct arena *arena, struct value *out, struct error *e)
 {
 	double scale, *nm, *value;
@@ -344,7 +346,7 @@ static int read_srgb(const struct xml_element *el, struct arena *arena, struct v
 	return inner_colour(el, "color", 1, out, e);
 }
 
-/* One number, the same at each wavelength, or three. */
+/* Reads one number, constant over all wavelengths, or three, which are a colour. */
 static int read_rawconstant(const struct xml_element *el, struct arena *arena, struct value *out, struct error *e)
 {
 	double x[3];
@@ -354,7 +356,7 @@ static int read_rawconstant(const struct xml_element *el, struct arena *arena, s
 }
 
 static const struct {
-	const char *type, *names; /* elements that may be inside */
+	const char *type, *names; /* names of the parameters that it may contain */
 	int (*read)(const struct xml_element *el, struct arena *arena, struct value *out, struct error *e);
 } types[] = {
 	{"uniform", "value|wavelength_min|wavelength_max|lambda_min|lambda_max", read_uniform},

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Goes through the shapes of a tree. Under a boundary that reflects, scenes of 0.6 give the diffuse part of the BSDF no
- * reflectance, since the dipole has that part: without either, the shape would be black. The coefficients are turned
- * into the reflectance of a flat medium that is lit evenly, and that into the reflectance of the BSDF's base.
+ * Goes through the shapes of a tree. In scenes of 0.6 the diffuse part of a plastic above a dipole has no reflectance,
+ * because the dipole replaces it: if only the dipole were left out, the shape would be black. Therefore the dipole's
+ * coefficients are converted to the reflectance of a flat, evenly lit medium, and this to the reflectance of the BSDF's
+ * base.
  *
- * What is not understood (coefficients that vary, other BSDFs, other models) is left for the maker to leave out.
+ * Combinations that are not understood (varying coefficients, other BSDFs, other models) are left to the maker, which
+ * leaves out the <subsurface>.
  */
 #include "worker/render/scene/subsurface.h"
 
@@ -18,10 +20,11 @@
 #include <stdio.h>
 #include <string.h>
 
-#define BK7_ETA 1.5046 /* over 1.000277 of air; names of materials count as this */
+#define BK7_ETA 1.5046 /* over AIR_ETA; a material's name counts as this */
 #define AIR_ETA 1.000277
 
-/* The diffuse Fresnel reflectance on the inside, by the polynomial of the same section; eta > 1. */
+/* Returns the diffuse Fresnel reflectance on the inside, by the polynomial of the section cited in the header; eta >
+ * 1. */
 static double inside_reflectance(double eta)
 {
 	return -1.440 / (eta * eta) + 0.710 / eta + 0.668 + 0.0636 * eta;
@@ -41,7 +44,7 @@ double subsurface_base(double reflectance, double eta)
 
 struct medium {
 	double sigma_s[3], sigma_a[3], sigma_t[3], albedo[3], g[3], inside, outside;
-	unsigned given; /* bits: which of the first four */
+	unsigned given; /* bit k: the k-th of sigma_s, sigma_a, sigma_t, albedo is given */
 };
 
 static bool read_color(struct maker *m, const struct xml_element *el, double out[3])
@@ -69,7 +72,7 @@ static bool read_measured(const char *name, struct medium *out)
 	return known;
 }
 
-/* One parameter; false: it cannot be understood. */
+/* Reads one parameter. Returns false if it is not understood. */
 static bool read_parameter(struct maker *m, const struct xml_element *el, struct medium *out)
 {
 	const char *written = xml_attribute(el, "name"), *value = xml_attribute(el, "value");
@@ -93,10 +96,10 @@ static bool read_parameter(struct maker *m, const struct xml_element *el, struct
 		out->inside = number;
 	if (strcmp(name, "ext_ior") == 0 && number_parse(value, &number))
 		out->outside = number;
-	return true; /* the scale and the number of samples have no effect on this */
+	return true; /* scale and number of samples do not matter here */
 }
 
-/* The colour of the base, as text. */
+/* Writes the colour of the base as text. Returns false if the dipole is not understood. */
 static bool base_of(struct maker *m, const struct xml_element *dipole, char *text, size_t size)
 {
 	struct medium md = {.inside = BK7_ETA, .outside = AIR_ETA};
@@ -128,7 +131,7 @@ static bool is_plastic(const struct xml_element *el)
 	       (strcmp(type, "plastic") == 0 || strcmp(type, "roughplastic") == 0);
 }
 
-/* The BSDF of a shape: `el`, or what it refers to. */
+/* Returns the plastic that `el` is or refers to, or NULL. */
 static const struct xml_element *plastic_of(struct maker *m, const struct xml_element *el)
 {
 	const char *id = strcmp(el->name, "ref") == 0 ? xml_attribute(el, "id") : NULL;
@@ -136,7 +139,7 @@ static const struct xml_element *plastic_of(struct maker *m, const struct xml_el
 	return target && is_plastic(target) ? target : NULL;
 }
 
-/* Turns el into a copy of the BSDF with that base: others may refer to it as it is. */
+/* Turns el into a copy of the plastic with that base; other shapes may refer to the original. */
 static int put_base(struct maker *m, struct xml_element *el, const struct xml_element *plastic, const char *base)
 {
 	const struct xml_element old = *plastic;

@@ -18,7 +18,7 @@ void texture_names_settle(const struct plugin_decl *decls, struct xml_element *r
 		texture_names_settle(decls, c);
 }
 
-/* The attributes of the spectrum under the name, if any, by which it is referred to. */
+/* Turns a <ref> into a copy of the spectrum, under the name, if any, that the <ref> has. */
 static int become_spectrum(struct xml_element *ref, const struct xml_element *spectrum, struct arena *arena,
 			   struct error *e)
 {
@@ -40,7 +40,7 @@ static int become_spectrum(struct xml_element *ref, const struct xml_element *sp
 	return 0;
 }
 
-/* Bytes that are read again for each <ref>. */
+/* Returns the number of bytes that are read again for each <ref>. */
 static uint64_t bytes_of(const struct xml_element *spectrum)
 {
 	uint64_t n = 0;
@@ -52,7 +52,7 @@ static uint64_t bytes_of(const struct xml_element *spectrum)
 
 static int follow(struct xml_element *el, struct id_table *ids, struct arena *arena, uint64_t *bytes, struct error *e)
 {
-	if (strcmp(el->name, "spectrum") == 0) /* which holds values alone; one that holds a <ref> is refused later */
+	if (strcmp(el->name, "spectrum") == 0) /* contains values only; one with a <ref> is refused later */
 		return 0;
 	const char *id = strcmp(el->name, "ref") == 0 && !el->ignored ? xml_attribute(el, "id") : NULL;
 	const struct xml_element *target = id ? id_table_look(ids, id) : NULL;
@@ -75,7 +75,7 @@ int texture_names_follow(struct xml_element *root, struct id_table *ids, struct 
 	return follow(root, ids, arena, &bytes, e);
 }
 
-/* ---- pictures that bump and normal maps name themselves ---- */
+/* ---- pictures that bump and normal maps name themselves */
 
 static bool is_relief(const struct xml_element *el)
 {
@@ -89,13 +89,13 @@ static bool is_filename(const struct xml_element *el)
 	return name && strcmp(name, "filename") == 0;
 }
 
-/* Normals and heights are numbers, not colours: raw. */
+/* Turns the file name into a raw texture: normals and heights are numbers, not colours. */
 static int become_texture(struct xml_element *el, struct arena *arena, struct error *e)
 {
 	const char *file = xml_attribute(el, "value");
 	struct xml_attribute *type = arena_alloc(arena, 1, sizeof *type);
 	if (!file)
-		return 0; /* refused by whoever reads it */
+		return 0; /* refused by its reader */
 	if (!type)
 		return xml_error(el, e, ENOMEM, "out of memory");
 	*type = (struct xml_attribute){"type", "bitmap"};

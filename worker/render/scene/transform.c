@@ -3,11 +3,11 @@
  * Reads <transform> and vectors given as attributes.
  *
  * Happy path: transform_read goes through the elements in order, finds each in the table `steps`, and multiplies its
- * matrix from the left, so that it applies to the result of those before.
+ * matrix from the left, so that it applies to the result of the previous ones.
  *
- * Failures are errors with file and line: an unknown element (with the nearest name), a missing or malformed
+ * Failures are errors with file and line: an unknown element (with the most similar name), a missing or malformed
  * attribute, a matrix that is not affine, a lookat without a direction, a number outside PARAM_LENGTH_MAX. The first
- * ends the reading; transform_report then lists those of all elements.
+ * failure ends the reading; transform_report then reports those of all elements.
  */
 #include "worker/render/scene/transform.h"
 
@@ -17,10 +17,10 @@
 
 #include <string.h>
 
-/* Inverses of float, as scripts write them, have such errors in their last row. */
+/* Allowed error of the last row: matrices inverted in float by scripts have such errors there. */
 #define AFFINE_SLACK 1e-6
 
-/* Range of any number in a transform: what squares of areas can represent. */
+/* Refuses numbers whose size would keep squares of areas from being represented. */
 static int check_number(const struct xml_element *el, const char *attribute, double x, struct error *e)
 {
 	if (fabs(x) <= PARAM_LENGTH_MAX)
@@ -62,7 +62,7 @@ int transform_read_vec3(const struct xml_element *el, double missing, bool one_f
 		return xml_error(el, e, EINVAL, "needs either x, y, z or value");
 	if (text) {
 		int n = number_list(text, v, 3);
-		bool one = one_for_all || !el->snake; /* of 3.x: for places and directions, too */
+		bool one = one_for_all || !el->snake; /* in 3.x also for positions and directions */
 		if (n == 1 && one)
 			v[1] = v[2] = v[0];
 		else if (n != 3)
@@ -108,7 +108,7 @@ static int read_rotate(const struct xml_element *el, mat4 *m, struct error *e)
 	if (r)
 		return r;
 	double length = vec3_length(axis);
-	if (degrees == 0) { /* about any axis, or none */
+	if (degrees == 0) { /* whatever the axis, even none */
 		*m = mat4_identity();
 		return 0;
 	}
@@ -127,7 +127,8 @@ static bool is_in_range(const mat4 *m)
 	return true;
 }
 
-/* Without `up`, each Mitsuba uses the first axis that its own function makes perpendicular to the view. */
+/* Returns the default for `up`: in each version of Mitsuba, the first axis that its own function makes perpendicular
+ * to the view. */
 static vec3 any_up(const struct xml_element *el, vec3 view)
 {
 	if (!el->snake)
@@ -236,7 +237,7 @@ int transform_read(const struct xml_element *el, mat4 *out, struct error *e)
 	return 0;
 }
 
-/* The problems of the steps, except for the one that is known. */
+/* Reports the problems of all steps, except for the known one. */
 static int report_steps(const struct xml_element *el, const struct error *known, struct report *report, struct error *e)
 {
 	int r = 0;

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A table has each element's name, its attributes and its reader. Other attributes are refused with the nearest name,
- * so a typing error never silently becomes a default. So are values that do not parse; each error has file and line.
+ * A table has each element's name, its attributes and its reader. An attribute that is not in it is refused with the
+ * most similar name, so a misspelling never silently becomes a default; so is a value that does not parse. Each error
+ * has file and line.
  */
 #include "worker/render/scene/value.h"
 
@@ -27,7 +28,7 @@ static int read_bool(const struct xml_element *el, struct value *out, struct err
 	int r = need_value(el, &text, e);
 	if (r)
 		return r;
-	out->as.boolean = strcasecmp(text, "true") == 0; /* Python's exporters write True */
+	out->as.boolean = strcasecmp(text, "true") == 0; /* Python writes True */
 	if (!out->as.boolean && strcasecmp(text, "false") != 0) {
 		struct spelling s = {.wanted = text};
 		char hint[32];
@@ -78,7 +79,7 @@ static int read_rgb(const struct xml_element *el, struct value *out, struct erro
 		return r;
 	double *rgb = out->as.rgb;
 	bool srgb = strcmp(el->name, "srgb") == 0;
-	/* 0.6 reads #rrggbb in <rgb>, too, as linear; 3.x does not accept it. */
+	/* 0.6 reads #rrggbb also in <rgb>, as linear; 3.x does not. */
 	if (!(text[0] == '#' && (srgb || el->snake) && parse_hex(text, rgb))) {
 		int n = number_list(text, rgb, 3);
 		if (n == 1)
@@ -94,8 +95,8 @@ static int read_rgb(const struct xml_element *el, struct value *out, struct erro
 	return 0;
 }
 
-/* In Mitsuba 0.6 a value may say whether it is a light's colour or a surface's; a contradiction to its place is
- * refused. */
+/* In Mitsuba 0.6 a value may state whether it is a light's colour or a surface's; a statement that contradicts its
+ * place is refused. */
 static int check_intent(const struct xml_element *el, struct error *e)
 {
 	const char *intent = xml_attribute(el, "intent");
