@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The container (GLB header and chunks, or plain JSON), and the scene's nodes: each mesh of a node becomes shapes under
- * the product of the matrices above it, each light an emitter, each camera a sensor. JSON is parsed by jansson; the
- * starts of entries are searched for separately, so that messages have line numbers.
+ * Reads the container (GLB header and chunks, or plain JSON) and the scene's nodes: each mesh of a node becomes shapes
+ * under the product of the matrices above it, each light an emitter, each camera a sensor. jansson parses the JSON; the
+ * lines on which entries begin are searched for separately, for messages.
  *
- * What glTF cannot express keeps its default: the film's size follows the first camera's aspect, a file without cameras
- * gets one that sees everything, one without lights a constant environment, both with a note.
+ * Settings that glTF cannot express keep their defaults. The film's aspect ratio is the first camera's; a file without
+ * cameras gets one that sees everything, and one without lights a constant environment, both with a note.
  *
  * Failures: a container that contradicts itself, invalid JSON, another version. Indices of missing entries, nodes that
- * are their own ancestors, unknown required extensions are listed, and what depends on them is left out. What is known
- * but not supported becomes a property that no table of parameters has: there it is refused, or left out.
+ * are their own ancestors and unknown required extensions are listed, and what depends on them is left out. A feature
+ * that is known but not supported becomes a property that no table of parameters has: it is refused there, or left out.
  */
 #include "worker/render/gltf/gltf.h"
 
@@ -40,7 +40,8 @@ bool gltf_is(const char *name)
 
 /* ---- lines */
 
-/* The array with that name, and room for the lines of its entries; GLTF_ARRAYS: none. */
+/* Returns the array with that name and makes room for the lines of its entries; GLTF_ARRAYS if there is no such
+ * array. */
 static enum gltf_array lines_of(struct gltf *g, const char *key, size_t n)
 {
 	for (int i = 0; i < GLTF_ARRAYS; i++) {
@@ -56,8 +57,8 @@ static enum gltf_array lines_of(struct gltf *g, const char *key, size_t n)
 	return GLTF_ARRAYS;
 }
 
-/* Finds where the entries of the top-level arrays begin, in JSON that is known to be well formed and to have no
- * duplicate keys. */
+/* Finds the lines on which the entries of the top-level arrays begin, in JSON that is known to be well formed and to
+ * have no duplicate keys. */
 static void find_lines(struct gltf *g, const char *text, size_t size)
 {
 	int depth = 0, line = 1;
@@ -84,7 +85,7 @@ static void find_lines(struct gltf *g, const char *text, size_t size)
 
 /* ---- the container */
 
-/* The JSON and the binary chunk of a .glb; a .gltf is all JSON. */
+/* Finds the JSON and the binary chunk of a .glb; a .gltf is JSON as a whole. */
 static int find_json(struct gltf *g, const char **text, size_t *size)
 {
 	const unsigned char *p = g->bytes;
@@ -107,7 +108,7 @@ static int find_json(struct gltf *g, const char **text, size_t *size)
 		if (i == 0 && type == GLB_JSON) {
 			*text = (const char *)p + at;
 			*size = length;
-			while (*size && !(*text)[*size - 1]) /* some fill it up with zeros instead of blanks */
+			while (*size && !(*text)[*size - 1]) /* some writers pad with zeros instead of blanks */
 				--*size;
 		} else if (i == 1 && type == GLB_BINARY) {
 			g->binary_first = at;
@@ -118,7 +119,7 @@ static int find_json(struct gltf *g, const char **text, size_t *size)
 	return *size ? 0 : gltf_fail(g, NULL, EINVAL, "a GLB file begins with JSON");
 }
 
-/* A note with the extensions that the file uses and the reader does not know: their effect is missing. */
+/* Notes the extensions that the file uses and the reader does not know: their effect is missing. */
 static void note_unknown(struct gltf *g)
 {
 	const json_t *used = json_object_get(g->root, "extensionsUsed");
@@ -134,8 +135,8 @@ static void note_unknown(struct gltf *g)
 		gltf_note(g, text);
 }
 
-/* The exporter's `generator` ends in its version. Since 3.4 lamps are in lumens unless the user wants otherwise; since
- * 4.0 Blender's diffuse surfaces are the format's. */
+/* Determines the exporter from `generator`, which ends in its version. Since 3.4, Blender's exporter writes lamps in
+ * lumens by default; since 4.0, Blender's diffuse surfaces are those of the format. */
 static void note_writer(struct gltf *g, const char *generator)
 {
 	static const char blender[] = "Khronos glTF Blender I/O v";
@@ -149,7 +150,8 @@ static void note_writer(struct gltf *g, const char *generator)
 		g->lamp_scale = 1.0 / 683;
 }
 
-/* All of them, so that one run says what to export otherwise. */
+/* Refuses all required extensions that are not supported in one error, so that one run shows everything that has to
+ * be exported differently. */
 static void check_required(struct gltf *g)
 {
 	const json_t *required = json_object_get(g->root, "extensionsRequired");
@@ -172,7 +174,7 @@ static void check_required(struct gltf *g)
 static void check_file(struct gltf *g)
 {
 	const json_t *asset = gltf_object(g, NULL, g->root, "asset");
-	const json_t *number = asset ? json_object_get(asset, "version") : NULL; /* as files of 1.0 may have it */
+	const json_t *number = asset ? json_object_get(asset, "version") : NULL; /* as in files of 1.0 */
 	if (json_is_number(number) && json_number_value(number) < 2) {
 		gltf_fail(g, NULL, EINVAL, "glTF of version %.3g; 2.0 is supported", json_number_value(number));
 		return;
@@ -192,7 +194,7 @@ static void check_file(struct gltf *g)
 
 struct walk {
 	struct gltf *g;
-	bool *above; /* by node: it is an ancestor of the current one */
+	bool *above; /* for each node: it is an ancestor of the current one */
 	size_t nodes, visited;
 };
 
@@ -201,8 +203,8 @@ static bool is_hidden(struct gltf *g, const struct gltf_at *node)
 	return json_is_false(json_object_get(gltf_extension(g, node, node->json, "KHR_node_visibility"), "visible"));
 }
 
-/* Whether a scale of 0 in two or three directions leaves a line or a point of its mesh: animations hide things so. Not
- * of a skinned mesh, which is where its joints are. */
+/* Returns whether a scale of 0 in two or three directions reduces the node's mesh to a line or a point, which is how
+ * animations hide objects. A skinned mesh is placed by its joints and therefore not affected. */
 static bool is_scaled_away(const struct gltf_at *node, const mat4 *to_world)
 {
 	int flat = 0;
@@ -211,7 +213,7 @@ static bool is_scaled_away(const struct gltf_at *node, const mat4 *to_world)
 	return flat > 1 && !json_object_get(node->json, "skin");
 }
 
-/* hidden: it and all below, except for cameras. */
+/* Adds the camera, mesh and light of a node. hidden: only the camera. */
 static void visit_lists(struct gltf *g, const struct gltf_at *node, const mat4 *to_world, bool hidden)
 {
 	struct gltf_at what;
@@ -264,7 +266,7 @@ static void visit(struct walk *w, uint64_t index, const mat4 *above, int depth, 
 	w->above[index] = false;
 }
 
-/* A file without scenes is a library of meshes, which most viewers show with all of its nodes. */
+/* Visits the root nodes of a file without scenes, which is a library of meshes: most viewers show all of it. */
 static void visit_all(struct gltf *g, struct walk *w, const mat4 *world)
 {
 	gltf_note(g, "it has no scenes: all of its nodes are shown");
@@ -304,7 +306,8 @@ static void read_scene(struct gltf *g)
 	}
 }
 
-/* An upper bound of the number of values: each begins with, or comes after, one of these. */
+/* Returns whether the number of values is within its limit, by an upper bound: each value begins with, or comes
+ * after, one of the counted characters. */
 static bool is_moderate(const char *text, size_t size)
 {
 	size_t values = 0;
@@ -328,7 +331,7 @@ static int read_json(struct gltf *g)
 	int rc = find_json(g, &text, &size);
 	if (rc)
 		return rc;
-	static const char bom[] = "\xef\xbb\xbf"; /* forbidden, and ignored by most readers */
+	static const char bom[] = "\xef\xbb\xbf"; /* forbidden by the standard, but ignored by most readers */
 	if (size >= sizeof bom - 1 && memcmp(text, bom, sizeof bom - 1) == 0) {
 		text += sizeof bom - 1;
 		size -= sizeof bom - 1;
@@ -356,7 +359,8 @@ static void *allocate(struct gltf *g, enum gltf_array array, size_t size)
 	return arena_alloc(g->arena, json_array_size(json_object_get(g->root, gltf_array_name(array))) + 1, size);
 }
 
-/* Nodes that are not in the scene count, too: what follows is right without them, and sooner without asking. */
+/* Counts the nodes that use each mesh, which decides between copies and instances. Nodes outside the scene count,
+ * too: that saves a search and affects only the speed. */
 static void count_uses(struct gltf *g)
 {
 	const json_t *nodes = json_object_get(g->root, "nodes");

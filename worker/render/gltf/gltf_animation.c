@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Exporters write figures in the position in which their skin was bound, with arms stretched out, and their poses as
- * animations. So the scene is shown as the first animation begins: the first value of each channel (glTF 2.0, section
- * 3.11; of cubic splines the one between its tangents) takes the place of the node's own translation, rotation, scale
+ * animations. Therefore the scene is shown as the first animation begins: the first value of each channel (glTF 2.0,
+ * section 3.11; for cubic splines, the one between its tangents) replaces the node's own translation, rotation, scale
  * or weights. Only these values are read, however long the animation is.
  *
- * Failures: samplers, nodes or accessors that are not there, fewer values than a node needs. Channels for something
- * else than these four, and values in sparse accessors, are left out with a note.
+ * Failures: missing samplers, nodes or accessors, and fewer values than a node needs. Channels for other properties
+ * than these four, and values in sparse accessors, are left out with a note.
  */
 #include "worker/render/gltf/gltf_animation.h"
 
@@ -15,15 +15,16 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { VALUES_MAX = 1 << 22 }; /* of all channels */
+enum { VALUES_MAX = 1 << 22 }; /* for all channels together */
 
 struct animation {
 	struct gltf *g;
 	const json_t *samplers;
-	uint64_t values; /* so far */
+	uint64_t values; /* number of values read so far */
 };
 
-/* What a channel changes: `count` numbers of a node, behind `skip` others, in `vectors` vectors of an accessor. */
+/* What a channel changes: `count` numbers of a node. They follow `skip` others in the first `vectors` vectors of the
+ * accessor. */
 struct channel {
 	struct gltf_at node, output;
 	const char *path;
@@ -31,7 +32,7 @@ struct channel {
 	unsigned components;
 };
 
-/* The number of morph targets of a node's mesh. */
+/* Returns the number of morph targets of a node's mesh. */
 static uint64_t targets_of(struct gltf *g, const struct gltf_at *node)
 {
 	struct gltf_at mesh;
@@ -40,7 +41,7 @@ static uint64_t targets_of(struct gltf *g, const struct gltf_at *node)
 	return json_array_size(json_object_get(json_array_get(json_object_get(mesh.json, "primitives"), 0), "targets"));
 }
 
-/* false: it is left out, or wrong. */
+/* Returns false if the channel is left out, or after a failure. */
 static bool read_channel(struct animation *a, const json_t *json, struct channel *c)
 {
 	struct gltf *g = a->g;
@@ -71,7 +72,7 @@ static bool read_channel(struct animation *a, const json_t *json, struct channel
 	return c->count > 0 && !g->failed;
 }
 
-/* The accessor shortened to what is needed. NULL after a failure. */
+/* Reads the values, from a copy of the accessor that is shortened to the vectors needed. NULL after a failure. */
 static json_t *first_values(struct gltf *g, const struct channel *c)
 {
 	struct gltf_vectors v;

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Animations. Private to gltf*.c. */
+/* Animations of a glTF file. Private to gltf*.c. */
 #ifndef WORKER_RENDER_GLTF_GLTF_ANIMATION_H
 #define WORKER_RENDER_GLTF_GLTF_ANIMATION_H
 
 #include "worker/render/gltf/gltf_tree.h"
 
-/* Puts nodes where the first animation begins, with a note. Nothing happens if there is none. */
+/* Moves nodes to where they are when the first animation begins, with a note. Does nothing if there is no animation. */
 void gltf_animation_begin(struct gltf *g);
 
 #endif

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Finds the bytes of buffers: files beside the scene, the binary chunk of a .glb, or base64 in the JSON, whose place in
- * the file is searched for so that shapes and images can be read from there. Failures: other URI schemes, views that
- * exceed their buffer.
+ * Finds the bytes of buffers: in files beside the scene, in the binary chunk of a .glb, or as base64 in the JSON, whose
+ * position in the file is searched for so that shapes and images can read it from there. Failures: other URI schemes,
+ * views that exceed their buffer.
  */
 #include "worker/render/gltf/gltf_buffer.h"
 #include "worker/render/asset/asset_name.h"
@@ -15,8 +15,8 @@ static int digit(char c)
 	return c >= '0' && c <= '9' ? c - '0' : (c | 32) >= 'a' && (c | 32) <= 'f' ? (c | 32) - 'a' + 10 : -1;
 }
 
-/* The canonical name of a file in a URI: %20 is a blank. Exporters on Windows write folders with '\\', which no URI
- * has. */
+/* Returns the canonical name of the file in a URI, where %20 is a blank. Exporters on Windows write folders with
+ * '\\', which cannot occur in a valid URI. */
 static const char *file_name(struct gltf *g, const struct gltf_at *at, const char *uri)
 {
 	size_t n = strlen(uri), k = 0;

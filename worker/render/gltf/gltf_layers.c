@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The extensions of materials as properties of `principled`. Transmission refracts, as in importers of modelling tools:
- * thin walls are not distinguished from solids. The clear coat is the parameter `coat`, since the original model's ends
- * at a quarter of the format's. Anisotropic roughness is exact as long as the two roughnesses differ by less than a
- * factor of ten.
+ * The extensions of materials as properties of `principled`. Transmission refracts, as modelling tools import it: thin
+ * walls are not distinguished from solids. The clear coat becomes the parameter `coat`, since the original model's
+ * `clearcoat` reaches only a quarter of the format's. Anisotropic roughness is exact as long as the two roughnesses
+ * differ by less than a factor of ten.
  *
- * Details that `principled` does not have are left out with a note: normals of a coat, what a sheen or a reflection
- * varies by. So are extensions that are not known, as the format wants it of those that a file does not require. So is
- * the dispersion of anything but clear glass; where the file requires it, it becomes a property that the table does not
- * know: refused with its name, or left out with --lenient.
+ * Details that `principled` does not have are left out with a note: normals of a coat, textures of a sheen or of the
+ * specular strength. Unknown extensions are also left out, as the format demands unless the file requires them.
+ * Dispersion of anything but clear glass is left out as well; if the file requires it, it becomes a property that the
+ * table does not have: refused with its name, or left out with --lenient.
  */
 #include "worker/render/gltf/gltf_layers.h"
 #include "worker/render/gltf/gltf_texture.h"
@@ -16,7 +16,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Members that are left out. what: of which layer, and why that matters little. */
+/* Notes that members are left out, if there are any. note: which layer they belong to, and why that matters little. */
 static void note_members(struct gltf *g, const json_t *extension, const char *const *members, const char *note)
 {
 	for (; *members; members++)
@@ -26,7 +26,7 @@ static void note_members(struct gltf *g, const json_t *extension, const char *co
 		}
 }
 
-/* Only this many entries are checked for each material; one after those may be reported twice. */
+/* Only this many entries are checked for each material; an extension listed later may be reported twice. */
 enum { LISTED_MOST = 64 };
 
 static bool is_listed(const struct gltf *g, const char *list, const char *extension)
@@ -40,9 +40,9 @@ static bool is_listed(const struct gltf *g, const char *list, const char *extens
 	return false;
 }
 
-/* The reflectance at normal incidence in the format is min(r^2 c, 1) f for an index of reflectance r^2, a colour c and
- * a factor f. Here the largest component of c decides the index, and the rest is `specular_color`. Where light enters,
- * the index is left alone. */
+/* Sets the index of refraction. In the format the reflectance at normal incidence is min(r^2 c, 1) f, where r^2 is
+ * that of the index, c a colour and f a factor. Here the largest component of c, with f, is included in the index, and
+ * c relative to it becomes `specular_color`. For materials that transmit light the index stays as it is. */
 static void put_index(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
 {
 	const json_t *ior = gltf_extension(g, at, at->json, "KHR_materials_ior"),
@@ -64,7 +64,7 @@ static void put_index(struct gltf *g, struct xml_element *el, const struct gltf_
 		factor = most = 1;
 		coloured = false;
 	}
-	/* An index of 0 means total reflection in the format. */
+	/* In the format an index of 0 means total reflection. */
 	double root = eta > 0 ? fabs((eta - 1) / (eta + 1)) : 1,
 	       scaled = fmin(root * sqrt(most), 1) * sqrt(fmin(fmax(factor, 0), 1));
 	gltf_put_number(g, el, at, "eta", fmin((1 + scaled) / fmax(1 - scaled, 0.1), 10));
@@ -89,7 +89,7 @@ static void put_coat(struct gltf *g, struct xml_element *el, const struct gltf_a
 		     "clear coats use the normals of the surface: their own normal maps are left out");
 }
 
-/* The format's sheen is of cloth (Estevez and Kulla 2017), Burley's of its edges. */
+/* The format's sheen is that of cloth (Estevez and Kulla 2017); Burley's is a brightening at grazing angles. */
 static void put_sheen(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
 {
 	const json_t *sheen = gltf_extension(g, at, at->json, "KHR_materials_sheen");
@@ -106,8 +106,9 @@ static void put_sheen(struct gltf *g, struct xml_element *el, const struct gltf_
 	gltf_put_number(g, el, at, "sheen_tint", fmin(1 - least / most, 1));
 }
 
-/* The format widens the roughness along the tangent to a_t = a + (1 - a) s^2, and leaves a across; `principled` divides
- * and multiplies a by sqrt(1 - 0.9 x). With r for their ratio: x = (1 - 1 / r) / 0.9, and a becomes sqrt(a_t a). */
+/* The format widens the roughness along the tangent to a_t = a + (1 - a) s^2, and keeps a across it; `principled`
+ * divides and multiplies a by sqrt(1 - 0.9 x). With their ratio r = a_t / a: x = (1 - 1 / r) / 0.9, and a becomes
+ * sqrt(a_t a). */
 static void put_anisotropy(struct gltf *g, struct xml_element *el, const struct gltf_at *at, double *roughness,
 			   bool textured)
 {
@@ -125,8 +126,8 @@ static void put_anisotropy(struct gltf *g, struct xml_element *el, const struct 
 	*roughness = sqrt(sqrt(wide * a));
 }
 
-/* Such surfaces show their colour whatever the light, which no material does. A file that requires it does not want
- * them lit. */
+/* Unlit surfaces show their colour whatever the light, which no BSDF can do. They are lit with a note, and refused
+ * if the file requires the extension. */
 static void put_unlit(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
 {
 	const char *name = "KHR_materials_unlit";
@@ -145,7 +146,7 @@ static void note_iridescence(struct gltf *g, const struct gltf_at *at)
 		gltf_note(g, "the colours of thin films (KHR_materials_iridescence) are left out");
 }
 
-/* Dispersion of materials other than clear glass is left out: `principled` has one index of refraction. */
+/* Leaves out the dispersion of materials other than clear glass: `principled` has a single index of refraction. */
 static void put_dispersion(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
 {
 	if (is_listed(g, "extensionsRequired", "KHR_materials_dispersion"))

@@ -5,11 +5,11 @@
 
 #include "worker/render/gltf/gltf_tree.h"
 
-/* All of a material, as properties of a `principled`, and its roughness, times the green of the texture (NULL: none),
- * which one of them changes. */
+/* Adds all extensions of a material, as properties of a `principled`, and its roughness, which one of them changes.
+ * The roughness is multiplied by the green channel of the texture (NULL: none). */
 void gltf_put_layers(struct gltf *g, struct xml_element *el, const struct gltf_at *material, double roughness,
 		     const json_t *texture);
-/* A note of each unknown extension that the file does not list: gltf.c tells of those that it does. */
+/* Notes each unknown extension that the file does not list in extensionsUsed; those listed are noted by gltf.c. */
 void gltf_note_foreign(struct gltf *g, const struct gltf_at *material);
 
 #endif

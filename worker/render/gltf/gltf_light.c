@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Cameras, and lights of KHR_lights_punctual. Both look along -z with y up; sensors and spots of this scene language
+ * Cameras, and lights of KHR_lights_punctual. Both look along -z with y up; the sensors and spots of the scene language
  * look along z, with x to the left. Candela and lux are used as radiant intensity and irradiance, and emission, which
- * the format has in nits, as radiance. Blender's exporter writes emission as it is but multiplies the watts of lamps by
- * 683 lumens, so lamps of its files are divided by that: otherwise they would be 683 times too bright in comparison
- * with emission. What the file lacks is supplied with a note: a camera that sees the whole scene, an environment of
- * radiance 1.
+ * the format has in nits, as radiance. Blender's exporter writes emission unchanged but multiplies the watts of lamps
+ * by 683 lumens per watt. In its files lamps are divided by that number: otherwise they would be 683 times too bright
+ * compared with emission. Missing objects are supplied with a note: a camera that sees the whole scene, an environment
+ * of radiance 1.
  */
 #include "worker/render/gltf/gltf_light.h"
 
@@ -14,7 +14,7 @@
 enum { FILM_WIDTH = 768 };
 static const double degrees = 180 / M_PI;
 
-/* Turned to look along z, without the lengths of its axes where these have no meaning. */
+/* Returns the transform turned to look along z, with axes of unit length: a camera or light has no size. */
 static mat4 looking(const mat4 *to_world)
 {
 	mat4 m = *to_world;
@@ -112,7 +112,7 @@ void gltf_default_camera(struct gltf *g)
 		return;
 	}
 	if (!vec3_is_finite(middle) || !(radius > 0))
-		return; /* the accessors do not say how large it is: the scene has no sensor (scene_settings_place) */
+		return; /* The accessors do not tell its size: scene_settings_place() places a sensor. */
 	vec3 from = vec3_normalize((vec3){0.5, 0.4, 1});
 	mat4 look = mat4_look_at(vec3_madd(middle, radius / sin(fov / 2), from), middle, (vec3){0, 1, 0});
 	mat4 back = mat4_scale((vec3){-1, 1, -1}), m = mat4_mul(look, back);

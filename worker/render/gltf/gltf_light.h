@@ -7,7 +7,7 @@
 
 void gltf_light(struct gltf *g, const struct gltf_at *light, const mat4 *to_world);
 void gltf_camera(struct gltf *g, const struct gltf_at *camera, const mat4 *to_world);
-/* Supplies what the file lacks: a camera that sees everything, an environment. */
+/* Supply what the file lacks: a camera that sees everything, an environment. */
 void gltf_default_camera(struct gltf *g);
 void gltf_default_light(struct gltf *g);
 

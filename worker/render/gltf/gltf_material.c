@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A metallic-roughness material as a `principled` BSDF, inside a `normalmap` and a `mask` if it has these, and an area
- * emitter if it emits. Clear dispersive glass is a dielectric. Extensions are in gltf_layers.c.
+ * Makes a metallic-roughness material into a `principled` BSDF, inside a `normalmap` and a `mask` if it has these, and
+ * an area emitter if it emits. Clear dispersive glass becomes a dielectric. Extensions are in gltf_layers.c.
  *
- * A wrong value sets g->failed, with its place, and nothing is added after it. What the plug-ins cannot do is left out
- * with a note.
+ * A wrong value sets g->failed, with its place, and nothing is added after it. Features that the plug-ins lack are left
+ * out with a note.
  */
 #include "worker/render/gltf/gltf_material.h"
 #include "worker/render/gltf/gltf_layers.h"
@@ -12,20 +12,20 @@
 
 #include <string.h>
 
-#define DARKEST 1e-6 /* no light at all would be an infinite coefficient */
+#define DARKEST 1e-6 /* black would have an infinite coefficient */
 
 /* ---- the surface below the layers */
 
 struct gltf_surface {
-	double base[4]; /* colour and alpha */
+	double base[4]; /* base colour and alpha */
 	double metallic, roughness;
-	const json_t *colour; /* textures that multiply the base; NULL: none */
-	const json_t *both;   /* ... and roughness and metallic, as green and blue */
+	const json_t *colour; /* texture that multiplies the base; NULL: none */
+	const json_t *both;   /* texture that multiplies roughness (green) and metallic (blue); NULL: none */
 };
 
 static const double dielectric = 0.04;
 
-/* As the eye weighs them, with a square root as a rough gamma. */
+/* Returns a perceived brightness: weighted as by the eye, with squares and a root as a rough gamma. */
 static double brightness(const double c[3])
 {
 	return sqrt(0.299 * c[0] * c[0] + 0.587 * c[1] * c[1] + 0.114 * c[2] * c[2]);
@@ -60,20 +60,20 @@ static void from_glossiness(struct gltf *g, const struct gltf_at *at, const json
 	for (int i = 0; i < 3; i++) {
 		double of_diffuse = s->base[i] * rest / (1 - dielectric) / fmax(1 - m, 1e-6),
 		       of_specular = (specular[i] - dielectric * (1 - m)) / fmax(m, 1e-6);
-		double b = of_diffuse + m * m * (of_specular - of_diffuse); /* the better known of the two */
+		double b = of_diffuse + m * m * (of_specular - of_diffuse); /* m weights the better determined value */
 		s->base[i] = fmin(fmax(b, 0), 1);
 	}
 }
 
 /*
- * Metallic-roughness, or, of a material without it, KHR_materials_pbrSpecularGlossiness: a diffuse colour d, and a
- * reflectance s at normal incidence, for which a base b and a share m of metal are found. A dielectric reflects r =
- * 0.04 of each colour, so that
+ * Returns the surface of a metallic-roughness material or, if it has none, of KHR_materials_pbrSpecularGlossiness. The
+ * latter has a diffuse colour d and a reflectance s at normal incidence, for which a base colour b and a metallic
+ * fraction m are found. A dielectric reflects r = 0.04 of each colour, so that
  *
  *   s = r (1 - m) + b m,   d = b (1 - m) (1 - r) / (1 - max s)
  *
  * for the brightness of both; eliminating b leaves r m^2 + p m + r - s = 0 with p = d (1 - max s) / (1 - r) + s - 2 r.
- * Where s has a texture it is taken for a dielectric's, with a note.
+ * If s has a texture, the material is taken for a dielectric, with a note.
  */
 static struct gltf_surface surface_of(struct gltf *g, const struct gltf_at *at)
 {
@@ -100,7 +100,8 @@ static void put_attribute(struct gltf *g, struct xml_element *el, const struct g
 	gltf_put_text(g, gltf_plugin(g, el, at, "texture", "mesh_attribute", name), at, "name", attribute);
 }
 
-/* An element whose unnamed child will be, as `name` of el, multiplied by an attribute of the mesh. */
+/* Adds a texture as `name` of el and returns it: its unnamed child, still to be added, will be multiplied by an
+ * attribute of the mesh. */
 static struct xml_element *put_product(struct gltf *g, struct xml_element *el, const struct gltf_at *at,
 				       const char *name, const char *attribute)
 {
@@ -126,7 +127,7 @@ static void put_base_colour(struct gltf *g, struct xml_element *el, const struct
 
 /* ---- the material */
 
-/* Wraps the BSDF in what transmits a part of the light. */
+/* Wraps the BSDF in a mask, which lets a part of the light through unchanged, if the material has one. */
 static struct xml_element *put_mask(struct gltf *g, struct xml_element *parent, const struct gltf_at *at,
 				    const json_t *texture, double alpha, bool vertex_alpha)
 {
@@ -138,9 +139,9 @@ static struct xml_element *put_mask(struct gltf *g, struct xml_element *parent, 
 	if (!texture && cut && alpha >= cutoff && !vertex_alpha)
 		return parent;
 	struct xml_element *mask = gltf_plugin(g, parent, at, "bsdf", "mask", NULL);
-	if (cut && vertex_alpha) /* no threshold of a product: not supported */
+	if (cut && vertex_alpha) /* the threshold would apply to a product: not supported */
 		gltf_put_text(g, mask, at, "alpha_of_COLOR_0_with_MASK", ELEMENT_UNSUPPORTED);
-	/* alpha times the texture's is cut off at `cutoff` */
+	/* The product of alpha and the texture's is cut off at `cutoff`. */
 	const struct gltf_channel c = {.name = "a",
 				       .factor = {cut ? 1 : alpha},
 				       .cutoff = !cut	     ? -1
@@ -167,7 +168,7 @@ static struct xml_element *put_normal_map(struct gltf *g, struct xml_element *pa
 		return parent;
 	struct xml_element *map = gltf_plugin(g, parent, at, "bsdf", "normalmap", NULL);
 	const struct gltf_channel c = {.factor = {1}, .cutoff = -1};
-	/* What Mitsuba's maps do besides, and the format does not. */
+	/* Features of Mitsuba's normal maps that the format does not have. */
 	gltf_put_bool(g, map, at, "flip_invalid_normals", false);
 	gltf_put_bool(g, map, at, "use_shadowing_function", false);
 	gltf_put_bool(g, map, at, "handedness", true);
@@ -178,7 +179,7 @@ static struct xml_element *put_normal_map(struct gltf *g, struct xml_element *pa
 	return map;
 }
 
-/* <bsdf id="..."> and <emitter id="..."> at the top level, for shapes to refer to. */
+/* Gives an id to the <bsdf>, <emitter> or <medium> at the top level, by which shapes refer to it. */
 static void put_id(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *what,
 		   enum gltf_colours colours)
 {
@@ -205,8 +206,9 @@ bool gltf_material_shines(struct gltf *g, const struct gltf_at *at, double rgb[3
 	return rgb[0] > 0 || rgb[1] > 0 || rgb[2] > 0;
 }
 
-/* Clear glass with a varying index: a dielectric, with Cauchy's law for the Abbe number 20 / dispersion, which is
- * coloured as `principled` is, by the root of the base colour at each boundary. false: another material. */
+/* Makes clear glass with a varying index: a dielectric with Cauchy's law for the Abbe number 20 / dispersion. As in
+ * `principled`, each boundary colours light by the square root of the base colour. Returns false if it is another
+ * material. */
 static bool put_dispersive(struct gltf *g, const struct gltf_at *at, const struct gltf_surface *s)
 {
 	static const double f_line = 0.48613, c_line = 0.65627; /* micrometres */
@@ -217,7 +219,7 @@ static bool put_dispersive(struct gltf *g, const struct gltf_at *at, const struc
 	bool clear = s->metallic == 0 && !s->colour && !s->both, white = true;
 	double root[3];
 	for (int k = 0; k < 3; k++) {
-		root[k] = s->base[k] > 0 ? sqrt(s->base[k]) : s->base[k]; /* negative ones are refused */
+		root[k] = s->base[k] > 0 ? sqrt(s->base[k]) : s->base[k]; /* negative values are refused later */
 		white &= s->base[k] == 1;
 	}
 	if (!(strength > 0) || !clear || !t || gltf_number(g, at, t, "transmissionFactor", 0) != 1 ||
@@ -244,8 +246,9 @@ static bool put_dispersive(struct gltf *g, const struct gltf_at *at, const struc
 	return true;
 }
 
-/* Diffuse transmission gets a share of the light that is not reflected by metal. It is a second BSDF, blended with the
- * material's by put_through, so the boundary reflects less than in the format, by that share. */
+/* Adds a blend for diffuse transmission, which takes a fraction of the light that metal does not reflect.
+ * put_through adds it as a second BSDF beside the material's own, so the boundary reflects less than in the format, by
+ * that fraction. */
 static struct xml_element *put_sheet(struct gltf *g, struct xml_element *parent, const struct gltf_at *at,
 				     const json_t *through, double metallic)
 {
@@ -305,12 +308,13 @@ static void put_emitter(struct gltf *g, const struct gltf_at *at)
 	if (json_is_true(json_object_get(at->json, "doubleSided")))
 		gltf_put_bool(g, emitter, at, "two_sided", true);
 	put_id(g, emitter, at, "emitter", GLTF_NO_COLOURS);
-	/* Emission of at most 1 is like a screen's and does not light a room: viewers add an environment. */
+	/* Emission of at most 1 is like a screen's and does not light a room: then an environment is added, as by
+	 * viewers. */
 	g->has_light |= rgb[0] > 1 || rgb[1] > 1 || rgb[2] > 1;
 }
 
-/* The coefficient of Beer's law by which white light has this colour after `distance`. Without thickness a volume is a
- * thin sheet, which absorbs nothing. */
+/* Computes the coefficients of Beer's law with which white light has the given colour after `distance`. Returns
+ * whether any is above 0. Without thickness a volume is a thin sheet, which absorbs nothing. */
 static bool absorbs(struct gltf *g, const struct gltf_at *at, double sigma_a[3])
 {
 	const json_t *volume = gltf_extension(g, at, at->json, "KHR_materials_volume"),
@@ -353,7 +357,8 @@ void gltf_material(struct gltf *g, struct xml_element *shape, const struct gltf_
 		gltf_attribute(g, put_ref(g, shape, at, "medium", GLTF_NO_COLOURS), "name", "interior");
 }
 
-/* The format's is rough white metal; what has no material in Blender is grey there. */
+/* For shapes without a material: the format's default is a rough white metal, but Blender shows such objects in
+ * grey, so they are grey in its files. */
 void gltf_default_material(struct gltf *g, struct xml_element *shape, enum gltf_colours colours)
 {
 	static const char grey[] =

@@ -1,4 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/* Each primitive of triangles becomes a shape of type "gltf" that names its buffer and the position of its numbers
+ * there, or that contains its vertices if they have to be computed (gltf_pose.h). Points and lines have no area and are
+ * left out, with a note. A large mesh of several nodes becomes a shapegroup, and each of its nodes an instance.
+ * Failures: accessors of a type that the attribute cannot have, accessors that exceed their views. */
 /*
  * Each primitive of triangles becomes a shape of type "gltf" that names its buffer and the position of its numbers
  * there, or has its vertices itself where they have to be computed (gltf_pose.h). Points and lines have no area and are
@@ -28,24 +32,24 @@ static const char *type_name(uint64_t component, uint64_t *size)
 						  : NULL;
 }
 
-/* Numbers in a buffer. */
+/* An array of numbers in a buffer. */
 struct numbers {
 	const char *name, *component;
 	uint64_t first, stride, count, end;
 };
 
-/* The shape of a primitive while it is made. */
+/* The shape of a primitive, while it is made. */
 struct primitive {
 	struct gltf *g;
 	const struct gltf_at *mesh;
 	struct xml_element *shape;
-	struct gltf_range buffer; /* of all its attributes */
+	struct gltf_range buffer; /* holds all its attributes */
 	struct numbers numbers[GLTF_SOURCES + 1];
 	unsigned count;
 	enum gltf_colours colours;
 };
 
-/* The attribute `name` of the shape, from that accessor. */
+/* Adds the attribute `name` of the shape, read from that accessor. */
 static void put_accessor(struct primitive *p, const struct gltf_at *a, const char *name, const char *type,
 			 uint64_t components)
 {
@@ -75,7 +79,7 @@ static enum gltf_colours colours_of(struct gltf *g, const struct gltf_at *a)
 	return strcmp(gltf_text(g, a, a->json, "type", ""), "VEC4") == 0 ? GLTF_COLOURS_AND_ALPHA : GLTF_COLOURS;
 }
 
-/* Colours have three or four components; the fourth becomes another accessor of the shape. */
+/* Adds colours, which have three or four components; the fourth becomes a separate attribute of the shape. */
 static void put_colours(struct primitive *p, const struct gltf_at *a)
 {
 	struct gltf *g = p->g;
@@ -90,7 +94,8 @@ static void put_colours(struct primitive *p, const struct gltf_at *a)
 	p->numbers[p->count++] = fourth;
 }
 
-/* The shape reads the part of the buffer that it needs; for base64 that starts at a group of three bytes. */
+/* Adds the part of the buffer that the shape reads, and where its arrays are in that part. The part begins at a
+ * multiple of three bytes, a group of base64. */
 static void put_numbers(struct primitive *p)
 {
 	uint64_t begin = UINT64_MAX, end = 0;
@@ -111,7 +116,8 @@ static void put_numbers(struct primitive *p)
 	}
 }
 
-/* The accessor's bounds, which positions must have, for a camera that sees everything. */
+/* Extends the scene's bounding box by the bounds that an accessor of positions must state, for a camera that sees
+ * everything. */
 static void grow_box(struct gltf *g, const struct gltf_at *a, const mat4 *to_world)
 {
 	double bound[2][3] = {{0, 0, 0}, {0, 0, 0}};
@@ -126,7 +132,7 @@ static void grow_box(struct gltf *g, const struct gltf_at *a, const mat4 *to_wor
 	}
 }
 
-/* As they stand in a buffer. */
+/* Uses the attributes as they are stored in a buffer. */
 static void put_in_place(struct primitive *p, const struct gltf_primitive *from, const mat4 *to_world)
 {
 	static const struct {
@@ -172,7 +178,8 @@ static void find_sources(struct gltf *g, struct gltf_primitive *p, const json_t 
 		gltf_fail(g, p->mesh, EINVAL, "a primitive has no POSITION");
 }
 
-/* A primitive compressed by Draco may also have its numbers in accessors, for readers that cannot decompress it. */
+/* Refuses a primitive compressed with Draco, unless its numbers are also in accessors, for readers that cannot
+ * decompress it. */
 static void check_draco(struct gltf *g, const struct gltf_primitive *p)
 {
 	if (!gltf_extension(g, p->mesh, p->json, "KHR_draco_mesh_compression"))
@@ -202,7 +209,7 @@ static void put_primitive(struct gltf *g, struct xml_element *parent, const stru
 	}
 	struct gltf_primitive from = {.mesh = mesh, .node = node, .json = primitive};
 	struct primitive p = {.g = g, .mesh = mesh, .shape = gltf_plugin(g, parent, mesh, "shape", "gltf", NULL)};
-	/* All of a .glb stands in one line: messages name shapes by this. */
+	/* All of a .glb may be on one line, so messages name shapes by this id. */
 	gltf_attribute(g, p.shape, "id", "shape %u, of meshes[%zu]", g->primitives, mesh->index);
 	find_sources(g, &from, attributes);
 	check_draco(g, &from);
@@ -217,7 +224,7 @@ static void put_primitive(struct gltf *g, struct xml_element *parent, const stru
 	if (from.sources[GLTF_COLOR].json)
 		p.colours = colours_of(g, &from.sources[GLTF_COLOR]);
 	if (!from.sources[GLTF_NORMAL].json)
-		gltf_put_bool(g, p.shape, mesh, "face_normals", true); /* as the format says */
+		gltf_put_bool(g, p.shape, mesh, "face_normals", true); /* as the format demands */
 	if (mode != MODE_TRIANGLES)
 		gltf_put_text(g, p.shape, mesh, "mode", mode == MODE_STRIP ? "strip" : "fan");
 	gltf_put_matrix(g, p.shape, mesh, "to_world", &to_world);
@@ -246,7 +253,7 @@ static void put_primitives(struct gltf *g, struct xml_element *parent, const str
 
 /* ---- meshes of several nodes */
 
-/* Triangles that copies would have beyond the first; below that copies are faster than instances. */
+/* Limit on the triangles that copies would add to the first; up to it, copies are faster than instances. */
 static const double copied_most = 200000;
 
 static bool shines(struct gltf *g, const struct gltf_at *mesh, const json_t *primitive)
@@ -257,7 +264,8 @@ static bool shines(struct gltf *g, const struct gltf_at *mesh, const json_t *pri
 	       gltf_material_shines(g, &material, rgb);
 }
 
-/* A group, which may hold no lamps, and no mesh that each node moves in its own way. */
+/* Returns whether the mesh becomes a shapegroup, which may hold neither emitters nor a mesh that each node deforms
+ * differently. */
 static bool is_shared(struct gltf *g, const struct gltf_at *mesh, const struct gltf_at *node)
 {
 	const json_t *primitives = json_object_get(mesh->json, "primitives");
@@ -311,7 +319,7 @@ void gltf_mesh(struct gltf *g, const struct gltf_at *mesh, const struct gltf_at 
 
 /* ---- EXT_mesh_gpu_instancing */
 
-/* false: there is no such attribute, or it cannot be read. */
+/* Returns false if the attribute is missing or cannot be read. */
 static bool read_instances(struct gltf *g, const struct gltf_at *node, const json_t *attributes, const char *name,
 			   unsigned components, struct gltf_vectors *out)
 {

@@ -5,9 +5,9 @@
 
 #include "worker/render/gltf/gltf_tree.h"
 
-/* The shapes of that mesh of a node, under that matrix. */
+/* Adds the shapes of a node's mesh, under that matrix. */
 void gltf_mesh(struct gltf *g, const struct gltf_at *mesh, const struct gltf_at *node, const mat4 *to_world);
-/* As often as the extension EXT_mesh_gpu_instancing says. */
+/* Like gltf_mesh(), once for each instance in the extension EXT_mesh_gpu_instancing. */
 void gltf_mesh_instances(struct gltf *g, const struct gltf_at *mesh, const struct gltf_at *node,
 			 const json_t *extension, const mat4 *to_world);
 

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Decompression by libmeshoptimizer, except for what Debian's does not know. What the extension forbids is refused
- * first, because the library asserts it, and no memory is taken for more than the compressed bytes can stand for.
- * Failures: modes and filters that are unknown, bytes that are no such stream or one of a later version, more than
- * UNPACKED_MAX in one file.
+ * Decompresses buffer views with libmeshoptimizer, except for what Debian's version lacks. Streams that the extension
+ * forbids are refused first, because the library would assert, and no more memory is allocated than the compressed
+ * bytes can stand for. Failures: unknown modes and filters, bytes that are not such a stream or are of a later version,
+ * more than UNPACKED_MAX bytes in one file.
  */
 #include "worker/render/gltf/gltf_meshopt.h"
 
@@ -24,8 +24,8 @@ enum { STRIDE_MAX = 256 };
 static const char *const mode_names[MODES] = {"ATTRIBUTES", "TRIANGLES", "INDICES"};
 static const char *const filter_names[FILTERS] = {"NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR"};
 
-/* Bytes that one compressed byte stands for at most: a quarter of a byte says that a byte of each of 256 elements is as
- * before; a triangle, or an index, takes at least one. */
+/* The largest number of bytes that one compressed byte can stand for. Two bits suffice to say that one byte of each
+ * of 256 elements is unchanged; a triangle takes at least one byte, and so does an index. */
 static const unsigned expands[MODES] = {1024, 12, 4};
 
 struct packed {
@@ -39,7 +39,7 @@ const json_t *gltf_meshopt(struct gltf *g, const struct gltf_at *view)
 	return o ? o : gltf_extension(g, view, view->json, "KHR_meshopt_compression");
 }
 
-/* The index of the member's text in a list. */
+/* Returns the index of the member's text in a list. */
 static int choice(struct gltf *g, const struct gltf_at *view, const json_t *o, const char *key, const char *fallback,
 		  const char *const *names, int count)
 {
@@ -78,8 +78,9 @@ static int decode(const struct packed *p, const unsigned char *bytes, uint64_t s
 	}
 }
 
-/* Luma, two chrominances with a sign, and alpha, in as many bits as alpha has with a bit of 1 above; they become shares
- * of all the bits of a component. Appendix B of KHR_meshopt_compression; Debian's library does not have it. */
+/* Decodes luma, two signed chrominances and alpha. The highest bit of alpha is a marker: it gives the number of bits
+ * of all four, which are rescaled to the full range of a component. Appendix B of KHR_meshopt_compression; Debian's
+ * library does not have it. */
 static void undo_color(const struct packed *p, unsigned char *out)
 {
 	int width = (int)p->stride / 4, sign = 1 << (8 * width - 1), most = 2 * sign - 1;
@@ -99,7 +100,7 @@ static void undo_color(const struct packed *p, unsigned char *out)
 	}
 }
 
-/* Vectors of nothing become NaN within the library. */
+/* Applies a filter. In the library a zero vector becomes NaN, so floating-point traps are off meanwhile. */
 static void undo_filter(const struct packed *p, unsigned char *out)
 {
 	unsigned trap = fptrap_leave();
@@ -114,7 +115,7 @@ static void undo_filter(const struct packed *p, unsigned char *out)
 		undo_color(p, out);
 }
 
-/* The first byte has the coding in its upper half, and the coding's version in the other. */
+/* Reports undecodable bytes. The upper half of the first byte identifies the coding, the lower half its version. */
 static void refuse(struct gltf *g, const struct gltf_at *view, const struct packed *p, const unsigned char *bytes,
 		   uint64_t size)
 {
@@ -139,7 +140,7 @@ unsigned char *gltf_meshopt_decode(struct gltf *g, const struct gltf_at *view, c
 			  mode_names[p.mode]);
 	if (g->failed)
 		return NULL;
-	*count = p.count * p.stride; /* at most 2^53 times STRIDE_MAX */
+	*count = p.count * p.stride; /* at most 2^53 times STRIDE_MAX: no overflow */
 	if (*count != gltf_whole(g, view, view->json, "byteLength", 0))
 		gltf_fail(g, view, EINVAL, "its byteLength is not count times byteStride of what is compressed");
 	else if (*count / expands[p.mode] > size)

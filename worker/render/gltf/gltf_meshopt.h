@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Compressed buffer views: EXT_meshopt_compression, and KHR_meshopt_compression, which adds codings to it. Private to
+ * Compressed buffer views: EXT_meshopt_compression, and KHR_meshopt_compression, which adds further codings. Private to
  * gltf*.c.
  */
 #ifndef WORKER_RENDER_GLTF_GLTF_MESHOPT_H
@@ -8,9 +8,11 @@
 
 #include "worker/render/gltf/gltf_tree.h"
 
-/* The extension's object, which names the compressed bytes as a view does; NULL: the view is as it stands. */
+/* Returns the extension's object, which locates the compressed bytes as a view does; NULL if the view is not
+ * compressed. */
 const json_t *gltf_meshopt(struct gltf *g, const struct gltf_at *view);
-/* What the `size` bytes stand for; mem_alloc'd. NULL after a failure. */
+/* Returns the decompressed bytes, allocated with mem_alloc(), and stores their number in *count. NULL after a
+ * failure. */
 unsigned char *gltf_meshopt_decode(struct gltf *g, const struct gltf_at *view, const json_t *packed,
 				   const unsigned char *bytes, uint64_t size, uint64_t *count);
 

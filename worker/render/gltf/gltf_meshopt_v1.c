@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * As appendix A of KHR_meshopt_compression has it. Elements are in blocks. Of each block the first bytes of all
- * elements come first, then the second ones, and so on; four of these planes are a channel. A plane has deltas to the
- * element before, in groups of 16 that are packed with as few bits as they need. The first element's are to the one at
- * the end of the stream, behind which each channel says what its deltas are. Failures: streams that end too early or
- * too late, unknown kinds of deltas.
+ * Decodes the format of appendix A of KHR_meshopt_compression. Elements are stored in blocks. A block stores the first
+ * bytes of all its elements, then the second bytes, and so on; four of these planes form a channel. A plane consists of
+ * deltas to the previous element, in groups of 16 that are packed with as few bits as they need. The deltas of the very
+ * first element refer to a base element at the end of the stream; after it, one byte for each channel states the kind
+ * of its deltas. Failures: streams that end too early or too late, unknown kinds of deltas.
  */
 #include "worker/render/gltf/gltf_meshopt_v1.h"
 
@@ -27,7 +27,7 @@ static const unsigned char *take_bytes(struct stream *s, size_t count)
 	return from;
 }
 
-/* 16 numbers of `bits`; those whose bits are all ones stand behind, as bytes. */
+/* Reads 16 numbers of `bits` each. A number whose bits are all ones is stored as a whole byte after the group. */
 static bool read_group(struct stream *s, unsigned bits, unsigned char out[GROUP])
 {
 	const unsigned char *from = take_bytes(s, 2 * bits), *whole;
@@ -47,7 +47,7 @@ static bool read_group(struct stream *s, unsigned bits, unsigned char out[GROUP]
 	return true;
 }
 
-/* One byte of each of `count` elements; there is room for whole groups. */
+/* Reads one byte of each of `count` elements; `out` has room for whole groups. */
 static bool read_plane(struct stream *s, unsigned control, size_t count, unsigned char *out)
 {
 	enum { ZEROS = 2, AS_THEY_ARE = 3 };
@@ -70,7 +70,7 @@ static bool read_plane(struct stream *s, unsigned control, size_t count, unsigne
 	return header != NULL;
 }
 
-/* Zigzag decoding: the integer at this place of 0, -1, 1, -2, 2, ... */
+/* Zigzag decoding: returns the integer at this place in the sequence 0, -1, 1, -2, 2, ... */
 static uint32_t unfold(uint32_t place)
 {
 	return place & 1 ? ~(place >> 1) : place >> 1;
@@ -78,7 +78,7 @@ static uint32_t unfold(uint32_t place)
 
 enum { BYTES, PAIRS, ROTATED, KINDS };
 
-/* From the four bytes of an element's channel to those of the next. */
+/* Returns the four bytes of a channel in the next element, from those in the last one. */
 static uint32_t next(uint32_t last, unsigned channel, uint32_t delta)
 {
 	unsigned width = channel == BYTES ? 8 : 16, turn = channel >> 4;
@@ -90,7 +90,7 @@ static uint32_t next(uint32_t last, unsigned channel, uint32_t delta)
 	return out;
 }
 
-/* One channel of a block; `to` is that of its first element, `last` that of the element before. */
+/* Reads one channel of a block. to: where it is in the first element; last: its value in the element before. */
 static bool read_channel(struct stream *s, unsigned controls, unsigned channel, size_t count, size_t stride,
 			 unsigned char *to, uint32_t *last)
 {

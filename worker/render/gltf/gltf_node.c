@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A node's matrix is given, or the product of its translation, rotation and scale. Nodes name their children only, so
- * that the way up is found once for all of them. Failures: rotations that are no quaternions, nodes of two parents or
- * below themselves.
+ * A node's matrix is given, or is the product of its translation, rotation and scale. Nodes name only their children,
+ * so the parents of all nodes are found at once, when first needed. Failures: rotations that are not quaternions, nodes
+ * with two parents, nodes that are their own ancestors.
  */
 #include "worker/render/gltf/gltf_node.h"
 
@@ -67,7 +67,7 @@ static bool find_parents(struct gltf *g)
 		for (size_t k = 0; k < json_array_size(children); k++) {
 			json_int_t child = json_integer_value(json_array_get(children, k));
 			if (child < 0 || (size_t)child >= count)
-				continue; /* said where the node is visited */
+				continue; /* reported where the node is visited */
 			if (g->parents[child] != SIZE_MAX && g->parents[child] != i) {
 				gltf_fail(g, &(struct gltf_at){GLTF_NODES, (size_t)child, NULL}, EINVAL,
 					  "it has two parents, and is a joint of a skin or above one");

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The buffer of the last accessor stays open, because neighbours share it, and so does every buffer in base64, because
- * decoding one for each of many accessors could take hours. So does what was compressed. Its file joins those that the
- * scene consists of (the tree's includes), as no shape names it. Failures: as the accessor says it, views that are too
- * short, more numbers than a mesh may have.
+ * Buffers stay open: the last one that is a file, because neighbouring accessors share it, and all that are in base64,
+ * because decoding one again for each of many accessors could take hours. Decompressed views are kept as well. The file
+ * of such a buffer is added to the list of the scene's files (the tree's includes), because no shape names it.
+ *
+ * Failures: accessors that contradict themselves, views that are too short, more numbers than a mesh may have.
  */
 #include "worker/render/gltf/gltf_numbers.h"
 
@@ -22,7 +23,7 @@ enum { COMPONENTS_MAX = 16 };
 
 struct gltf_open {
 	struct asset_range part;
-	const char *file; /* NULL: it is closed */
+	const char *file; /* NULL: not open */
 	uint64_t first, count;
 	struct gltf_open *next;
 };
@@ -69,7 +70,7 @@ static bool is_open(const struct gltf_open *o, const struct gltf_range *r)
 	return o->file && o->first == r->first && o->count == r->count && strcmp(o->file, r->file) == 0;
 }
 
-/* Room for a buffer, which may be open already; file NULL: it is not. */
+/* Returns the entry of a buffer: that of the open buffer, or one with file NULL. NULL if out of memory. */
 static struct gltf_open *find_open(struct gltf *g, const struct gltf_range *r)
 {
 	struct gltf_open *o = r->base64 ? g->decoded : g->plain;
@@ -93,7 +94,7 @@ static struct gltf_open *find_open(struct gltf *g, const struct gltf_range *r)
 	return o;
 }
 
-/* NULL after a failure. */
+/* Returns NULL after a failure. */
 static const struct gltf_open *open_buffer(struct gltf *g, const struct gltf_range *r)
 {
 	struct error inner;
@@ -115,7 +116,7 @@ static const struct gltf_open *open_buffer(struct gltf *g, const struct gltf_ran
 	return !g->failed && list_file(g, r->file) ? o : NULL;
 }
 
-/* The bytes of a view as it stands, valid until those of another buffer are wanted. NULL after a failure. */
+/* Returns the stored bytes of a view, valid until another buffer is read. NULL after a failure. */
 static const unsigned char *stored_bytes(struct gltf *g, const struct gltf_at *view, uint64_t *count)
 {
 	struct gltf_range buffer;
@@ -129,7 +130,8 @@ static const unsigned char *stored_bytes(struct gltf *g, const struct gltf_at *v
 	return NULL;
 }
 
-/* Each is decompressed once: files may have one view for the numbers of all meshes. */
+/* Returns the bytes of a view, decompressed if necessary: only once, since a file may have the numbers of all meshes
+ * in one view. NULL after a failure. */
 static const unsigned char *view_bytes(struct gltf *g, const struct gltf_at *view, uint64_t *count)
 {
 	const json_t *packed = gltf_meshopt(g, view);
@@ -206,13 +208,13 @@ static unsigned components_of(const char *type)
 	return 0;
 }
 
-/* An array of vectors in a view. */
+/* How an array of vectors is stored in a view. */
 struct packed {
 	uint64_t component, stride, offset;
 	bool normalized;
 };
 
-/* Vector k goes to `to[k]`, or to vector k. */
+/* Stores the k-th vector of the view as vector to[k], or as vector k if `to` is NULL. */
 static void unpack(struct gltf *g, const struct gltf_at *a, const struct gltf_at *view, const struct packed *p,
 		   uint64_t count, const double *to, struct gltf_vectors *out)
 {

@@ -1,6 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Reads all attributes as numbers, adds the morph targets by their weights (glTF 2.0, section 3.7.2.2), moves the
+ * vertices by the skin's joints (3.7.3), and puts floats and indices into the shape as base64 (asset/asset_range.h).
+ *
+ * Failures: attributes of different lengths, joints that do not exist, more than EMBEDDED_MAX bytes in one file.
+ */
+/*
+ * Reads all attributes as numbers, adds the morph targets by their weights (glTF 2.0, section 3.7.2.2), moves the
  * vertices by the skin's joints (3.7.3), and puts floats and indices into the shape as
  * base64 (asset/asset_range.h). Failures: attributes of different lengths, joints that are none, more bytes than
  * EMBEDDED_MAX in one file.
@@ -21,7 +27,7 @@
 enum { SETS_MAX = 8 };
 #define EMBEDDED_MAX (UINT64_C(512) << 20)
 
-/* ---- which */
+/* ---- which primitives */
 
 static bool is_in_place(struct gltf *g, const struct gltf_at *a, enum gltf_source which, struct gltf_range *buffer)
 {
@@ -37,7 +43,7 @@ static bool is_in_place(struct gltf *g, const struct gltf_at *a, enum gltf_sourc
 	if (json_object_get(a->json, "sparse") || !json_object_get(a->json, "bufferView"))
 		return false;
 	if (gltf_follow(g, a, a->json, "bufferView", GLTF_BUFFER_VIEWS, &view) <= 0)
-		return true; /* an error, which is said already */
+		return true; /* an error, which has been reported */
 	if (gltf_meshopt(g, &view))
 		return false;
 	if (gltf_buffer_view(g, &view, &own, &first, &count))
@@ -47,7 +53,7 @@ static bool is_in_place(struct gltf *g, const struct gltf_at *a, enum gltf_sourc
 	return strcmp(own.file, buffer->file) == 0 && own.first == buffer->first;
 }
 
-/* The weights of the morph targets: the node's, or the mesh's. NULL: none is moved. */
+/* Returns the weights of the morph targets, of the node or else of the mesh; NULL if no target has an effect. */
 static const json_t *weights_of(const struct gltf_primitive *p)
 {
 	const json_t *weights = json_object_get(p->node->json, "weights");
@@ -107,7 +113,7 @@ static void morph(struct gltf *g, const struct gltf_primitive *p, struct gltf_ve
 
 /* ---- skins */
 
-/* From the space of the mesh to the world, for each joint; mem_alloc'd. */
+/* Returns for each joint the matrix from the mesh's space to the world; allocated with mem_alloc(). */
 static mat4 *joint_matrices(struct gltf *g, const struct gltf_at *skin, size_t *count)
 {
 	const json_t *joints = json_object_get(skin->json, "joints");
@@ -133,7 +139,8 @@ static mat4 *joint_matrices(struct gltf *g, const struct gltf_at *skin, size_t *
 	return out;
 }
 
-/* Adds weight * matrix of the joints of one set (JOINTS_n, WEIGHTS_n) to each vertex's matrix. false: there is none. */
+/* Adds weight * matrix of the joints of one set (JOINTS_n, WEIGHTS_n) to each vertex's matrix. Returns false if
+ * there is no such set, or after a failure. */
 static bool add_joints(struct gltf *g, const struct gltf_primitive *p, unsigned set, const mat4 *matrices, size_t count,
 		       mat4 *sums, double *weights, uint64_t vertices)
 {
@@ -200,7 +207,7 @@ static void move(struct gltf_vectors *v, mat4 *sums, const double *weights)
 	}
 }
 
-/* The joints place the vertices; the node's own transform is ignored. */
+/* Moves the vertices by the skin. Its joints place them in the world; the node's own transform is ignored. */
 static void apply_skin(struct gltf *g, const struct gltf_primitive *p, struct gltf_vectors *v)
 {
 	struct gltf_at skin;
@@ -231,7 +238,7 @@ static size_t bytes_of(const struct gltf_vectors *v)
 	return (size_t)v->count * v->components * 4;
 }
 
-/* Floats, and indices as whole numbers. */
+/* Stores floats, or indices as 32-bit integers. */
 static void pack(const struct gltf_vectors *v, bool whole, unsigned char *out)
 {
 	for (uint64_t i = 0; i < v->count * v->components; i++) {

@@ -1,6 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A texture becomes a `bitmap` with the sampler's wrap modes and the transform of KHR_texture_transform, inside a
+ * `scale` if it has a factor. One of the material's sets of texture coordinates becomes the shape's own, whose tangents
+ * normal maps use, and a second one its attribute vertex_texcoord.
+ *
+ * Failures: indices without an entry, textures without an index. A third set becomes a property that no table has, and
+ * an image in an unsupported format a texture of such a type: both are refused with that name, or left out with
+ * --lenient.
+ */
+/*
+ * A texture becomes a `bitmap` with the sampler's wrap modes and the transform of KHR_texture_transform, inside a
  * `scale` if it has a factor. Of a material's sets of texture coordinates one is the shape's, by which normal maps
  * bend, and another its attribute vertex_texcoord. Failures: indices of nothing, textures without a source. A third set
  * becomes a property that no table knows, and an image of a format that is not read a texture of such a type: refused
@@ -30,7 +39,7 @@ static void put_sampler(struct gltf *g, struct xml_element *el, const struct glt
 		gltf_put_text(g, el, &s, "filter_type", "nearest");
 }
 
-/* KHR_texture_transform: uv' = T R S uv, the rotation by -r as v points down. */
+/* KHR_texture_transform: uv' = T R S uv. The rotation is by -r, because v points down. */
 static void put_transform(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const json_t *info)
 {
 	const json_t *t = gltf_extension(g, at, info, "KHR_texture_transform");
@@ -84,7 +93,8 @@ struct gltf_sets gltf_texture_sets(struct gltf *g, const struct gltf_at *at)
 	return sets;
 }
 
-/* Images that are not read, of textures without another: refused by this name, or left out. NULL: none is known. */
+/* Returns the extension that names the image of a texture without another image, in a format that is not supported:
+ * it is refused by this name, or left out. NULL if none is known. */
 static const char *foreign_format(const struct gltf_at *texture)
 {
 	static const char *const formats[] = {"KHR_texture_basisu", "EXT_texture_avif", "MSFT_texture_dds"};
@@ -103,14 +113,14 @@ void gltf_put_texture(struct gltf *g, struct xml_element *el, const struct gltf_
 		gltf_fail(g, at, EINVAL, "a texture without an index");
 		return;
 	}
-	/* Where there are two, the other is for those who cannot read WebP. */
+	/* If the texture has two images, the other one is for readers without WebP. */
 	const json_t *webp = gltf_extension(g, &texture, texture.json, "EXT_texture_webp");
 	int found = gltf_follow(g, &texture, webp ? webp : texture.json, "source", GLTF_IMAGES, &image);
 	if (found == 0 && foreign_format(&texture)) {
 		gltf_plugin(g, el, &texture, "texture", foreign_format(&texture), name);
 		return;
 	}
-	/* The exporter lost the image, or it is of an unknown extension: refused, or left out with `lenient`. */
+	/* The exporter lost the image, or it belongs to an unknown extension: refused, or left out with `lenient`. */
 	if (found <= 0) {
 		gltf_plugin(g, el, &texture, "texture", "unknown_format", name);
 		return;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Members of JSON objects, and elements made from them, for the reader of glTF. After a failure nothing is added to the
- * tree until gltf_go_on has noted it. Failures: members of another type or out of range, and out of memory; each names
- * its place in the file.
+ * Reads members of JSON objects, and makes elements from them, for the reader of glTF. After a failure nothing is added
+ * to the tree until gltf_go_on has recorded it. Failures: members of another type or out of range, and out of memory;
+ * each names its place in the file.
  */
 #include "worker/render/gltf/gltf_tree.h"
 
@@ -52,7 +52,7 @@ void gltf_go_on(struct gltf *g)
 {
 	struct xml_tree *t = g->tree;
 	bool limit = g->failed == -ENOMEM || g->failed == -E2BIG || g->failed == -EFBIG;
-	/* A mesh of several nodes says the same of each. */
+	/* A mesh of several nodes gives the same error for each of them. */
 	bool noted = g->failed && text_is_among(g->error->text, t->missing, t->missing_count);
 	if (g->failed && !limit && (noted || t->missing_count < XML_MISSING_MAX)) {
 		const char *text = noted ? NULL : arena_strdup(g->arena, g->error->text);
@@ -281,7 +281,7 @@ bool gltf_knows(const char *extension)
 		"KHR_materials_transmission", "KHR_materials_unlit", "KHR_materials_volume", "KHR_mesh_quantization",
 		"KHR_meshopt_compression", "KHR_node_visibility", "KHR_texture_basisu", "KHR_texture_transform",
 		"MSFT_texture_dds",
-		/* They change no light: order of triangles, other looks, who made it. */
+		/* These do not change light: polygons of triangles, alternative looks, metadata. */
 		"FB_ngon_encoding", "KHR_materials_variants", "KHR_xmp", "KHR_xmp_json_ld"};
 	return text_is_among(extension, known, sizeof known / sizeof *known);
 }

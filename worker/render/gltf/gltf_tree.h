@@ -10,9 +10,9 @@
 
 enum {
 	GLTF_JSON_MAX = 128 << 20,     /* bytes of the JSON, including embedded data */
-	GLTF_VALUES_MAX = 1 << 22,     /* values in it, at most 250 bytes of memory each */
+	GLTF_VALUES_MAX = 1 << 22,     /* values in the JSON, each of at most 250 bytes of memory */
 	GLTF_EMBEDDED_MAX = 4096,      /* buffers and images embedded in the JSON */
-	GLTF_PRIMITIVES_MAX = 1 << 18, /* of all meshes, counted once per node that has them */
+	GLTF_PRIMITIVES_MAX = 1 << 18, /* for all meshes, counted once per node that has them */
 };
 
 #define GLTF_WHOLE_MAX 9007199254740992.0 /* a double represents all integers up to here */
@@ -45,16 +45,16 @@ enum gltf_component {
 	GLTF_FLOAT
 };
 
-/* An entry of one of them. */
+/* An entry of a top-level array. */
 struct gltf_at {
 	enum gltf_array array;
 	size_t index;
 	const json_t *json; /* an object */
 };
 
-/* A compressed view's numbers. */
+/* The bytes of a compressed view. */
 struct gltf_unpacked {
-	unsigned char *bytes; /* mem_alloc'd; NULL: not wanted so far */
+	unsigned char *bytes; /* allocated with mem_alloc(); NULL: not needed so far */
 	uint64_t count;
 };
 
@@ -62,9 +62,9 @@ struct gltf_unpacked {
 struct gltf_range {
 	const char *file;
 	uint64_t first, count;
-	bool base64;   /* first and count refer to the text; a view's offset to the decoded bytes */
-	uint64_t size; /* decoded */
-	unsigned skip; /* of the decoded bytes, at the beginning */
+	bool base64;   /* first and count are of the text, offsets of views of the decoded bytes */
+	uint64_t size; /* number of decoded bytes */
+	unsigned skip; /* number of decoded bytes to skip at the beginning */
 };
 
 struct gltf {
@@ -72,63 +72,64 @@ struct gltf {
 	const struct asset_source *assets;
 	struct arena *arena;
 	struct error *error;
-	int failed; /* an error's negative errno: nothing more is added to the tree (gltf_go_on) */
+	int failed; /* negative errno of an error: nothing more is added to the tree until gltf_go_on() */
 	const char *file;
-	const unsigned char *bytes; /* of the file */
+	const unsigned char *bytes; /* contents of the file */
 	size_t size;
 	uint64_t binary_first, binary_count; /* the binary chunk of a .glb */
 	json_t *root;
 	const json_t *lights;	 /* NULL: none */
-	int *lines[GLTF_ARRAYS]; /* of each entry */
+	int *lines[GLTF_ARRAYS]; /* line on which each entry begins */
 	size_t line_count[GLTF_ARRAYS], line_room[GLTF_ARRAYS];
-	struct gltf_range *buffers, *images; /* embedded data that has been located, by entry */
+	struct gltf_range *buffers, *images; /* embedded data located so far, by entry */
 	unsigned embedded, primitives;
-	unsigned char *material_made;	   /* bits 1 << enum gltf_colours */
-	struct gltf_open *plain, *decoded; /* open buffers: the last that is a file; a list of those in base64 */
-	struct gltf_unpacked *unpacked;	   /* of each view; NULL: no compressed one was wanted so far */
-	uint64_t unpacked_bytes;	   /* of them all */
-	size_t *parents;		   /* of each node (gltf_node.h); NULL: not needed so far */
-	uint64_t embedded_bytes;	   /* of vertices that are computed */
-	uint64_t read;			   /* bytes of files with buffers, so far */
-	double *mesh_uses;		   /* number of nodes that have each mesh */
-	bool *mesh_made;		   /* it is a shapegroup already */
+	unsigned char *material_made;	   /* by material: made for these bits 1 << enum gltf_colours */
+	struct gltf_open *plain, *decoded; /* open buffers: the last one in a file; a list of those in base64 */
+	struct gltf_unpacked *unpacked;	   /* by view; NULL: no compressed view was needed so far */
+	uint64_t unpacked_bytes;	   /* total size of these */
+	size_t *parents;		   /* by node (gltf_node.h); NULL: not needed so far */
+	uint64_t embedded_bytes;	   /* total size of computed vertices */
+	uint64_t read;			   /* bytes read so far from files with buffers */
+	double *mesh_uses;		   /* by mesh: number of nodes that use it */
+	bool *mesh_made;		   /* by mesh: a shapegroup was made of it */
 	struct xml_element *scene;
 	bool has_camera, has_light;
-	bool is_blenders;  /* its exporter wrote the file */
-	bool is_burleys;   /* its writer's diffuse surfaces are not Lambert's, as the format's are, but Burley's */
-	double lamp_scale; /* of the intensities of KHR_lights_punctual */
-	vec3 low, high;	   /* over all vertices */
+	bool is_blenders;  /* Blender's exporter wrote the file */
+	bool is_burleys;   /* the writer's diffuse surfaces follow Burley, not Lambert, as the format's do */
+	double lamp_scale; /* factor for the intensities of KHR_lights_punctual */
+	vec3 low, high;	   /* bounding box of all vertices */
 };
 
 const char *gltf_array_name(enum gltf_array array);
-/* The entry with that index; false: missing, which is an error. */
+/* Finds the entry with that index. Returns false, after a failure, if there is none. */
 bool gltf_entry(struct gltf *g, enum gltf_array array, uint64_t index, struct gltf_at *out);
-/* The entry whose index is the value of `key`. 1: found, 0: no such key, negative: an error. */
+/* Finds the entry whose index is the value of `key`. Returns 1 if found, 0 if there is no such key, negative after a
+ * failure. */
 int gltf_follow(struct gltf *g, const struct gltf_at *from, const json_t *object, const char *key,
 		enum gltf_array array, struct gltf_at *out);
-/* Sets g->failed, with "file:line: array[index]: ". */
+/* Sets g->failed, and the error with "file:line: array[index]: " before the text. Returns g->failed. */
 __attribute__((format(printf, 4, 5))) int gltf_fail(struct gltf *g, const struct gltf_at *at, int errno_value,
 						    const char *format, ...);
 
-/* After something that is complete by itself, a node or a primitive: a failure is put into the list of what is missing,
- * and reading goes on. Exceeded limits still end it. */
+/* Called after a node or a primitive, which is complete by itself: moves a failure to the list of what is missing,
+ * so that reading goes on. A limit that was exceeded still ends the reading. */
 void gltf_go_on(struct gltf *g);
 
-/* Members of an object, with defaults for missing ones; another type is an error. */
+/* Each returns a member of an object, or a default if it is missing; a member of another type is an error. */
 double gltf_number(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key, double fallback);
 uint64_t gltf_whole(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key, uint64_t fallback);
 const char *gltf_text(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key, const char *fallback);
-/* `count` numbers into x, which keeps its values if there are none. */
+/* Stores `count` numbers in x, which keeps its values if the member is missing. */
 void gltf_numbers(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key, double *x, size_t count);
 const json_t *gltf_object(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key); /* or NULL */
 const json_t *gltf_extension(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *name);
 
-/* Elements, with the line of an entry. With NULL as parent nothing is made, and NULL is returned. */
+/* Make elements, with the line of an entry. With NULL as parent nothing is made, and NULL is returned. */
 struct xml_element *gltf_element(struct gltf *g, struct xml_element *parent, const struct gltf_at *at,
 				 const char *name);
 __attribute__((format(printf, 4, 5))) void gltf_attribute(struct gltf *g, struct xml_element *el, const char *name,
 							  const char *format, ...);
-/* <cls type="..." name="..."> (name NULL: without) */
+/* <cls type="..." name="...">; without a name if that is NULL */
 struct xml_element *gltf_plugin(struct gltf *g, struct xml_element *parent, const struct gltf_at *at, const char *cls,
 				const char *type, const char *name);
 void gltf_put_number(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, double x);
@@ -139,10 +140,10 @@ void gltf_put_text(struct gltf *g, struct xml_element *el, const struct gltf_at 
 void gltf_put_rgb(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name,
 		  const double rgb[3]);
 void gltf_put_matrix(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, const mat4 *m);
-void gltf_grow_box(struct gltf *g, vec3 p); /* of all vertices, for a camera that sees everything */
-/* A note that the file gets once. */
+void gltf_grow_box(struct gltf *g, vec3 p); /* extends the box by a vertex */
+/* Adds a note, only once per file. */
 void gltf_note(struct gltf *g, const char *text);
-/* Whether the reader knows the extension, supported or not. */
+/* Returns whether the reader knows the extension, supported or not. */
 bool gltf_knows(const char *extension);
 
 #endif
