@@ -20,17 +20,16 @@ struct scene {
 	struct arena arena;
 	const char *file;   /* as it was opened */
 	bool dialect_3;	    /* version >= 2: Mitsuba 3 rules */
-	bool black_backs;   /* backs of opaque one-sided materials are black, unless the setting `backs` differs */
-	bool without_media; /* Mitsuba's image has no media, unless the setting `media` says otherwise */
+	bool black_backs;   /* backs of opaque one-sided materials are black; the setting `backs` overrides it */
+	bool without_media; /* Mitsuba's image has no media; the setting `media` overrides it */
 	uint32_t object_count;
 	const struct scene_node *const *objects; /* top-level objects, in file order */
 	uint32_t asset_count;
 	const char *const *assets; /* names of all files that the description refers to, each once, without the scene
 				      file itself */
-	const char *const
-		*asset_places;	     /* "scene.xml:12: <shape type=\"obj\">", the first place that names it; or "" */
-	uint32_t problem_count;	     /* 0 except after scene_read_all */
-	const char *const *problems; /* "scene.xml:12: <bsdf>: ...", in file order */
+	const char *const *asset_places; /* "scene.xml:12: <shape type=\"obj\">", the first place naming it; or "" */
+	uint32_t problem_count;		 /* 0 except after scene_read_all */
+	const char *const *problems;	 /* "scene.xml:12: <bsdf>: ...", in file order */
 	uint32_t flawed_count;
 	const struct scene_node *const *flawed; /* the nodes with scene_node.flawed, at any depth */
 	uint32_t note_count;
