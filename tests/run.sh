@@ -2,23 +2,23 @@
 # SPDX-License-Identifier: Apache-2.0
 # Runs all tests of a build folder and sums them up: tests/run.sh BUILD [PATTERN]
 #
-# Test programs are BUILD/tests/**/test_* (cmocka: each of their tests is counted); scripts are tests/lint/*.sh and
-# tests/e2e/*.sh (one test each; exit 77: skipped; a line `skipped in part: WHY`: one skipped beside the one that passed). The output
-# of what fails is shown; that of what passes, its figures, is left in BUILD/tests/said (and shown with HSLT_TEST_VERBOSE=1). The last
-# lines name what failed, as `failed: NAME: WHY`, what was skipped, as `skipped: NAME: WHY`, and sum up: `N passed, N failed, N skipped`;
-# the exit code is 0 when something ran and nothing failed. PATTERN: only names that hold it.
+# Test programs are BUILD/tests/**/test_* (cmocka: each of their tests is counted); scripts are tests/lint/*.sh and tests/e2e/*.sh. A
+# script counts as one test; exit code 77 means skipped, and a line `skipped in part: WHY` counts as one skipped test besides the one that
+# passed. The output of failed tests is shown. That of passed tests, such as figures, is kept in BUILD/tests/said (and shown with
+# HSLT_TEST_VERBOSE=1). The last lines name the failed tests, as `failed: NAME: WHY`, and the skipped ones, as `skipped: NAME: WHY`, and
+# sum up: `N passed, N failed, N skipped`. The exit code is 0 if something passed and nothing failed. PATTERN: run only tests whose path
+# contains it.
 #
 # As many programs run at a time as there are processors (HSLT_TEST_JOBS), the longest of the last run first. Scripts and the programs
-# that test connections wait for most of their time: three and two of them run beside the others, which leave them the processor when
-# they want it (nice).
-# HSLT_TEST_KINDS: "unit script" (default both). HSLT_TEST_WITHOUT: an extended regular expression for those that are left out. No test
-# has a limit of wall clock, which a busy machine would reach: it is ended when its processes have used HSLT_TEST_CPU seconds of processor
-# time (default 1800; with FULL=1 28800), or have been idle without output for HSLT_TEST_IDLE seconds (900; 3600), see
-# tests/limit/limit.c. SIGINT, SIGTERM and SIGHUP end the tests that run, and the run.
+# that test connections spend most of their time waiting: three scripts and two such programs run beside the others, which are niced.
+# HSLT_TEST_KINDS: "unit", "script" or both (default). HSLT_TEST_WITHOUT: an extended regular expression; matching tests are left out.
+# No test has a wall-clock limit, which it could exceed on a busy machine. Instead it is ended when its processes have used HSLT_TEST_CPU
+# seconds of CPU time (default 1800; 28800 with FULL=1), or have been idle without output for HSLT_TEST_IDLE seconds (900; 3600), see
+# tests/limit/limit.c. SIGINT, SIGTERM and SIGHUP end the running tests and the run.
 set -u
-if [ "${1:-}" = --one ]; then # one test of the run in folder $2: its list, its file
+if [ "${1:-}" = --one ]; then # runs one test of the run in folder $2: its kind $3, its file $4
 	run=$2 kind=$3 file=$4
-	[ ! -e "$run/ended" ] || exit 0 # by a signal
+	[ ! -e "$run/ended" ] || exit 0 # the run was ended by a signal
 	. "$run/settings"
 	log=$(mktemp -p "$run")
 	begin=$(date +%s)
@@ -36,12 +36,12 @@ if [ "${1:-}" = --one ]; then # one test of the run in folder $2: its list, its 
 	times >"$log.times"
 	used=$(awk 'NR == 2 { gsub("s", ""); split($1, u, "m"); split($2, s, "m"); print int(60 * (u[1] + s[1]) + u[2] + s[2] + 0.5) }' "$log.times")
 
-	count() { # of cmocka's closing lines: "[  PASSED  ] 3 test(s).", of later versions "[  SKIPPED ] tests: 1 test(s), listed below:"
+	count() { # the number in a closing line of cmocka: "[  PASSED  ] 3 test(s)." or, in later versions, "[  SKIPPED ] tests: 1 test(s), listed below:"
 		sed -n "s/^\[ *$1 *\] \([^ ]*: \)*\([0-9][0-9]*\) test(s).*/\2/p" "$log" | tail -n 1
 	}
 	if [ "$kind" != script ]; then
 		ok=$(count PASSED) bad=$(count FAILED) out=$(count SKIPPED)
-		# By name, with what the test said before.
+		# The names of skipped tests, each with the last line that the test printed.
 		awk -v of="$name" '/^\[ *RUN/ { why = "" }
 			/^[^[]/ { why = $0; sub(/^skipped: /, "", why) }
 			/^\[ *SKIPPED *\] [^ ]*$/ && !seen[$NF]++ { print "skipped: " of ": " $NF (why ? ": " why : "") }' "$log" >"$log.skips"
@@ -57,7 +57,7 @@ if [ "${1:-}" = --one ]; then # one test of the run in folder $2: its list, its 
 	fi
 	{
 		if [ $code -ne 0 ] && [ $code -ne 77 ]; then
-			# A crash, a limit or a leak report after the closing lines: one failure more than cmocka counted.
+			# A crash, a limit or a leak report after the closing lines is a failure that cmocka has not counted.
 			[ "${bad:-0}" != 0 ] || bad=1
 			echo "FAILED $name (exit $code)"
 			cat "$log"
@@ -65,13 +65,13 @@ if [ "${1:-}" = --one ]; then # one test of the run in folder $2: its list, its 
 			echo "ok $name: ${ok:-0} passed, $took s, $used s of CPU time"
 		fi
 	} >"$log.shown"
-	# What a test says of itself (figures, reasons for skipping) is kept, and shown when asked for.
+	# The output of a test (figures, reasons for skipping) is kept, and shown on request.
 	if [ -s "$log" ]; then
 		mkdir -p "$said/$(dirname "$name")"
 		grep -v '^\[\|^$' "$log" >"$said/$name.txt"
 		[ "${HSLT_TEST_VERBOSE:-0}" = 0 ] || [ $code -ne 0 ] || sed 's/^/   /' "$said/$name.txt" >>"$log.shown"
 	fi
-	# Why: what a script's `fail` says, or the tests of a program that failed; else the last line.
+	# The reason is the message of a script's `fail`, or the names of a program's failed tests; otherwise the last line of output.
 	if [ "${bad:-0}" != 0 ]; then
 		why=$(if [ "$kind" != script ]; then
 			sed -n 's/^\[ *FAILED *\] \([^ ]*\)$/\1/p' "$log" | sort -u | paste -sd ' ' -
@@ -82,7 +82,7 @@ if [ "${1:-}" = --one ]; then # one test of the run in folder $2: its list, its 
 		echo "$name${why:+: $(echo "$why" | cut -c1-300)}" >"$log.bad"
 	fi
 	echo "${ok:-0} ${bad:-0} ${out:-0}" >"$log.counts"
-	# In one piece, however many end at the same time.
+	# The lock keeps the output of tests that end at the same time apart.
 	flock "$run/settings" cat "$log.shown"
 	exit 0
 fi
@@ -96,7 +96,7 @@ for number in HSLT_TEST_JOBS HSLT_TEST_CPU HSLT_TEST_IDLE; do
 done
 pattern=${2:-}
 kinds=${HSLT_TEST_KINDS:-unit script}
-# The long forms take hours.
+# The long forms of tests (FULL=1) take hours.
 if [ "${FULL:-0}" = 0 ]; then
 	cpu=1800 idle=900
 else
@@ -112,13 +112,13 @@ trap 'rm -rf "$run"' EXIT
 cat >"$run/settings" <<END
 cpu=${HSLT_TEST_CPU:-$cpu} idle=${HSLT_TEST_IDLE:-$idle} limit='$limit' said='$build/tests/said'
 END
-took=$build/tests/took # seconds and file of the last run
+took=$build/tests/took # seconds and file of each test in the last run
 touch "$took"
-# Of a first run: what takes minutes begins first.
+# The order of a first run: tests that take minutes begin first.
 longest="worker/render/path/test_integrators worker/render/mutation/test_balance worker/render/mutation/test_forced image/test_calibration worker/render/path/test_motion image/test_reference worker/render/path/test_volume_emission numerics/test_random worker/render/mutation/test_tolerance image/test_effects numerics/test_agree coordinator/status/test_status coordinator/peers/test_orders"
 longest="$longest e2e/faults.sh e2e/slurm.sh e2e/tls.sh e2e/orders.sh e2e/accuracy.sh e2e/disagree.sh e2e/estimate.sh e2e/restart.sh e2e/runner.sh e2e/small_disk.sh e2e/full_later.sh e2e/full.sh"
 
-# The tests of a list, one per line; programs that took long the last time first, new ones before them.
+# Prints the tests of a list, one per line: new ones first, then those that took longest the last time.
 list() {
 	waits='/tests/(common/net|coordinator/(jobs|peers|server|status)|worker/daemon)/'
 	case $1 in
@@ -137,7 +137,7 @@ list() {
 			}
 			{ name = $0; sub(/.*\/tests\/|^tests\//, "", name); print ($0 in s ? s[$0] : 1000000 + first[name]), NR, $0 }' | sort -k1,1nr -k2,2n | cut -d' ' -f3
 }
-one() { # one LIST TESTS_AT_A_TIME NICENESS
+one() { # one LIST TESTS_AT_A_TIME NICENESS: runs the tests of a list
 	nice -n "$3" xargs -r <"$run/$1.list" -n 1 -P "$2" --process-slot-var=HSLT_TEST_SLOT sh tests/run.sh --one "$run" "$1"
 }
 
@@ -153,7 +153,7 @@ jobs=${HSLT_TEST_JOBS:-$(nproc 2>/dev/null || echo 2)}
 	wait
 } &
 lists=$!
-# Ends the tests that run, again and again for those that were just beginning; the others are not begun.
+# Ends the running tests, repeatedly, to catch those that were just beginning; no further tests begin.
 end() {
 	trap '' INT TERM HUP
 	: >"$run/ended"
@@ -168,7 +168,7 @@ wait $lists
 cat "$run"/*.took "$took" 2>/dev/null | awk '!seen[$2]++' >"$took.new" && mv "$took.new" "$took"
 cat "$run"/*.bad 2>/dev/null | sort | sed 's/^/failed: /'
 cat "$run"/*.skips 2>/dev/null | sort
-# One that left no counts was ended from outside: a failure.
+# A test without counts was ended from outside, which is a failure.
 lost=$(($(cat "$run"/*.list | wc -l) - $(ls "$run" | grep -c '\.counts$')))
 [ "$lost" = 0 ] || echo "FAILED: $lost tests did not end as they should"
 { echo "0 $lost 0" && cat "$run"/*.counts 2>/dev/null; } | awk '{ p += $1; f += $2; s += $3 }

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# Files are touched through common/base/disk.h alone by whatever keeps what must survive, so that tests can simulate a loss of power
-# there. Not of it: sockets (status/) and the programs of clients (coordinator/ctl).
+# Code that keeps durable data may access files only through common/base/disk.h, where tests simulate a loss of power. Sockets (status/)
+# and the clients' programs (coordinator/ctl) are exempt.
 cd "$(dirname "$0")/../.." || exit 1
 calls='open|openat|creat|opendir|fdopendir|mkdir|mkdirat|rmdir|unlink|unlinkat|remove|rename|renameat|link|symlink|fsync|fdatasync|sync'
 calls="$calls|syncfs|read|pread|readv|preadv|write|pwrite|writev|pwritev|fallocate|posix_fallocate|ftruncate|truncate|stat|fstat|lstat"

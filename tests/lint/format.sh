@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# Each source is laid out as .clang-format says (`make format` does it), no line of it is too long to be read, and it names its
-# licence. Other versions of clang-format lay out otherwise, so only one counts. clang-format never breaks a string, and moves what
-# follows a macro among strings to the right: such scenes are files (tests/scenes), or laid out by hand.
+# Each source is formatted by .clang-format (`make format`), has no overlong lines, names its licence and, if it is long, begins with a
+# comment. Only clang-format 14 counts, because versions format differently. clang-format never breaks a string, and moves what follows a
+# macro among strings to the right: such scenes are files (tests/scenes), or formatted by hand.
 cd "$(dirname "$0")/../.." || exit 1
 sources=$(git ls-files '*.[ch]' '*.inc' 2> /dev/null || find common coordinator worker tests -name '*.[ch]' -o -name '*.inc')
 sources=$(echo "$sources" | grep -v /data/)
@@ -22,7 +22,7 @@ if [ -n "$silent" ]; then
 	exit 1
 fi
 echo "ok: each source above 200 lines opens with a comment"
-# 120 columns, as .clang-format says. It never breaks a string, so lines with one, and macros of strings, may have 140.
+# 120 columns, as in .clang-format. It never breaks a string, so lines with a string, and macros of strings, may have 140.
 wide=$(echo "$sources" | LC_ALL=C xargs awk -v most=120 -v most_with_text=140 '
 	{
 		line = $0

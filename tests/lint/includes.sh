@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# Who includes whom, against includes.txt; no unfinished marks; no overlong files. A line for each check, then what is wrong.
+# Checks which folders include which others, against includes.txt, and for unfinished marks and overlong files. Prints a line for each
+# check, followed by the violations.
 cd "$(dirname "$0")/../.." || exit 1
 LIST=tests/lint/includes.txt
 MOST_LINES=620
@@ -8,7 +9,7 @@ FOLDERS="common coordinator worker"
 SOURCES=$(find $FOLDERS -name '*.[ch]' | sort)
 failed=0
 
-# check NAME COMMAND...: the command prints what is wrong
+# check NAME COMMAND...: the command prints the violations
 check() {
 	name=$1
 	shift
@@ -22,12 +23,12 @@ check() {
 	fi
 }
 
-# A rule a line: the folder or library, then what is allowed, each between spaces.
+# Prints one rule per line: the folder or library, then what it may include or where it may be included, separated by spaces.
 rules() {
 	sed 's/#.*//' $LIST | awk -F: 'NF > 1 { gsub(/[ \t]+/, " ", $2); print $1 " :" $2 " " }'
 }
 
-# FILE:LINE FOLDER HEADER, the header with the " or < before it
+# Prints each include as FILE:LINE FOLDER HEADER, with the " or < in front of the header.
 includes() {
 	grep -Hn '^[[:space:]]*#[[:space:]]*include' $SOURCES |
 		sed 's/^\([^:]*\)\/\([^/:]*:[0-9]*\):[^"<]*\(["<][^">]*\).*/\1\/\2 \1 \3/'
@@ -53,7 +54,7 @@ edges() {
 	}' "${TMPDIR:-/tmp}/includes.$$"
 }
 
-# What must not be allowed by the list either.
+# Checks the list itself: prints rules that it must not contain.
 borders() {
 	rules | awk '
 	substr($1, 1, 1) == "<" { next }
@@ -67,7 +68,7 @@ borders() {
 	}'
 }
 
-# Takes away folders that include nothing but what is gone; what stays goes round in circles.
+# Repeatedly removes folders that include only removed ones; those that remain are in circles or depend on one.
 circles() {
 	rules | awk '
 	substr($1, 1, 1) == "<" { next }
@@ -92,8 +93,8 @@ circles() {
 	}'
 }
 
-# Includes whose header, by way of other files, comes back to the file that has the include; a source and its header are one file here.
-# The list cannot say this of files of one folder, nor of the single headers that it allows.
+# Prints includes that lead, by way of other files, back to the file that has the include; a source and its header count as one file.
+# The list of folders cannot detect this within a folder, nor for the single headers that it allows.
 returns() {
 	awk '
 	function file(name) { sub(/\.[ch](:.*)?$/, "", name); return name }
@@ -143,15 +144,16 @@ doors() {
 	}' "${TMPDIR:-/tmp}/includes.$$"
 }
 
-# Functions and variables alike. Declarations and definitions begin in the first column, and a body with a brace of its own there; names
-# in capitals are those of lists (header_list.h) and of the compiler.
+# Prints functions and variables that are not defined in the source of the header that declares them. Assumes that declarations and
+# definitions begin in the first column, and so do the braces of bodies; names in capitals are macros of lists (header_list.h) or of the
+# compiler.
 declared() {
 	awk '
 	function name_of(text) {
 		gsub(/__attribute__\(\([^)]*\([^)]*\)\)\)/, "", text)
 		return match(text, /[A-Za-z_0-9]+\(/) ? substr(text, RSTART, RLENGTH - 1) : ""
 	}
-	# The names of variables: what is before [, =, a comma or the end.
+	# Stores the names of the declared variables: the words before [, =, a comma or the end.
 	function variables(text, names,   part, k, count, n) {
 		sub(/ = .*/, "", text); gsub(/\[[^]]*\]/, "", text); sub(/;.*/, "", text)
 		count = split(text, part, ","); n = 0
@@ -207,7 +209,7 @@ marks() {
 	grep -nIE "$words" $(git ls-files 2>/dev/null || find $FOLDERS tests deploy proto -type f)
 }
 
-# Comments that send the reader to a header which has been renamed.
+# Prints headers that comments mention and that do not exist, because they were renamed, for example.
 named() {
 	known=$({ find $FOLDERS tests proto -name '*.h'; sed -n 's/^# *include <\(.*\)>.*/\1/p' $SOURCES $(find tests -name '*.[ch]'); } | sort -u)
 	grep -hvE '^[[:space:]]*# *include' $SOURCES $(find tests -name '*.[ch]') | grep -oE '[A-Za-z0-9_/-]{3,}\.h\b' | sort -u |
@@ -216,7 +218,7 @@ named() {
 		done
 }
 
-# overlong MOST FILE...
+# overlong MOST FILE...: prints the files of more than MOST lines.
 overlong() {
 	most=$1
 	shift

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Each link of a Markdown page leads to a file that is there, and to a heading of it. What sources cite of docs/ is there as well.
+# Each link of a Markdown page leads to an existing file and heading. Pages of docs/ that sources cite exist as well.
 cd "$(dirname "$0")/../.." || exit 1
 pages=$(git ls-files '*.md' 2> /dev/null || find . -name '*.md')
 if ! broken=$(echo "$pages" | xargs python3 tests/lint/links.py); then

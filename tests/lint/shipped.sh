@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# The programs that are installed cannot be asked for faults: no name of one is in them, and no function of the worker with faults
-# (tests/e2e/faulty_worker.c), in which both are found.
+# Installed programs cannot inject faults: they contain neither names of faults nor functions of the faulty worker
+# (tests/e2e/faulty_worker.c), in which this check must find both.
 cd "$(dirname "$0")/../.." || exit 1
 build=${1:-build}
 faulty=$build/tests/e2e/faulty_worker
@@ -10,7 +10,7 @@ if [ ! -x "$faulty" ]; then
 fi
 failed=0
 
-# holds PROGRAM: what of a fault is in it
+# holds PROGRAM: prints the names of faults that it contains
 holds() {
 	{ strings "$1" && nm "$1"; } | grep -oE 'HSLT_(TEST|FAULT)[A-Z_]*|--test-[a-z-]*|^test-[a-z-]+$|__wrap_[a-z_]+|faulty_worker|mem_fail_after' | sort -u | tr '\n' ' '
 }

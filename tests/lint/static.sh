@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# Static analysis of the product's code by cppcheck: errors, warnings and what is not portable. What it says wrongly is listed in
-# static.txt, with reasons; static.cfg tells it macros of libraries. First it has to find a fault that is planted for it.
+# Static analysis of the product's code by cppcheck: errors, warnings and portability. Its false positives are listed in static.txt, with
+# reasons; static.cfg declares macros of libraries. First cppcheck has to find a planted fault.
 cd "$(dirname "$0")/../.." || exit 1
 if ! command -v cppcheck > /dev/null; then
 	echo "cppcheck is not installed"

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# Nothing gets into the repository by accident: the files at the top are those named here, and packages, objects, archives and dumps
-# stand nowhere. Without git (an unpacked archive) there is nothing to look at.
+# Nothing gets into the repository by accident: the top folder contains only the files named here, and no folder contains packages,
+# objects, archives or dumps. Without git (an unpacked archive) there is nothing to check.
 cd "$(dirname "$0")/../.." || exit 1
 if ! files=$(git ls-files 2>/dev/null) || [ -z "$files" ]; then
 	echo "ok: not a git checkout, tracked files are not looked at"

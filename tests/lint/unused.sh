@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# Each function that a source offers to others is called by another source, of the product or the tests. One that is not is static, or
-# dead.
+# Each function with external linkage is used by another source, of the product or the tests. Otherwise it should be static, or it is
+# dead code.
 cd "$(dirname "$0")/../.." || exit 1
 build=${1:-build}
 objects=$(git ls-files 'common/*.c' 'coordinator/*.c' 'worker/*.c' 'tests/*.c' 2> /dev/null | sed "s|^|$build/obj/|; s|c\$|o|")
