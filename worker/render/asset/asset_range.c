@@ -77,7 +77,7 @@ int asset_range_open(struct asset_range *p, const struct asset_source *assets, c
 	p->bytes = p->file.bytes + first;
 	p->size = (size_t)count;
 	if (first > size || count > size - first)
-		rc = error_set(e, EINVAL, "%s has %llu bytes, and not %llu from byte %llu on", name,
+		rc = error_set(e, EINVAL, "%s has %llu bytes, too few for %llu bytes from byte %llu on", name,
 			       (unsigned long long)size, (unsigned long long)count, (unsigned long long)first);
 	else if (base64)
 		rc = asset_range_decode(p, name, e);

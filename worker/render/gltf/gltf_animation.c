@@ -68,7 +68,7 @@ static bool read_channel(struct animation *a, const json_t *json, struct channel
 	c->skip = cubic ? c->count : 0;
 	a->values += c->skip + c->count;
 	if (a->values > VALUES_MAX)
-		gltf_fail(g, NULL, E2BIG, "more than %d values in an animation's beginning", VALUES_MAX);
+		gltf_fail(g, NULL, E2BIG, "more than %d values at the beginning of the animation", VALUES_MAX);
 	return c->count > 0 && !g->failed;
 }
 
@@ -111,7 +111,7 @@ void gltf_animation_begin(struct gltf *g)
 			gltf_fail(g, &c.node, ENOMEM, "out of memory");
 	}
 	const char *name = json_string_value(json_object_get(first, "name"));
-	snprintf(text, sizeof text, "nothing moves: everything is placed as the first animation%s%.64s%s begins",
+	snprintf(text, sizeof text, "nothing moves: everything is where it is when the first animation%s%.64s%s begins",
 		 name ? ", `" : "", name ? name : "", name ? "`," : "");
 	if (json_array_size(channels))
 		gltf_note(g, text);

@@ -31,7 +31,7 @@ static const char *file_name(struct gltf *g, const struct gltf_at *at, const cha
 		char c = low >= 0 ? (char)(16 * high + low) : uri[i] == '\\' ? '/' : uri[i];
 		i += low >= 0 ? 2 : 0;
 		if (c == 0) {
-			gltf_fail(g, at, EINVAL, "its uri names no file");
+			gltf_fail(g, at, EINVAL, "its uri is not the name of a file");
 			return NULL;
 		}
 		name[k++] = c;
@@ -89,7 +89,7 @@ static int buffer_range(struct gltf *g, const struct gltf_at *buffer, struct glt
 	else if (range_of_uri(g, buffer, uri, out))
 		return g->failed;
 	if (length > out->size)
-		return gltf_fail(g, buffer, EINVAL, "it states %llu bytes and has %llu", (unsigned long long)length,
+		return gltf_fail(g, buffer, EINVAL, "it states %llu bytes but has %llu", (unsigned long long)length,
 				 (unsigned long long)out->size);
 	out->size = length;
 	if (!out->base64)
@@ -102,7 +102,7 @@ int gltf_buffer_view(struct gltf *g, const struct gltf_at *view, struct gltf_ran
 {
 	struct gltf_at at;
 	if (gltf_meshopt(g, view))
-		return gltf_fail(g, view, EINVAL, "it is compressed, as only numbers may be");
+		return gltf_fail(g, view, EINVAL, "it is compressed, which only views of accessors may be");
 	int rc = gltf_follow(g, view, view->json, "buffer", GLTF_BUFFERS, &at);
 	if (rc <= 0)
 		return rc ? rc : gltf_fail(g, view, EINVAL, "it has no buffer");

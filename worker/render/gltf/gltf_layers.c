@@ -119,7 +119,7 @@ static void put_anisotropy(struct gltf *g, struct xml_element *el, const struct 
 		return;
 	double wide = a + (1 - a) * s * s, ratio = a > 0 ? wide / a : INFINITY;
 	if (textured || turn != 0 || json_object_get(o, "anisotropyTexture") || !(ratio < 10)) {
-		gltf_note(g, "anisotropy with a texture, a rotation, or of a smooth surface is left out");
+		gltf_note(g, "anisotropy is left out if it has a texture or a rotation, or if the surface is smooth");
 		return;
 	}
 	gltf_put_number(g, el, at, "anisotropic", (1 - 1 / ratio) / 0.9);

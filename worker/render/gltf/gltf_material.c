@@ -51,8 +51,8 @@ static void from_glossiness(struct gltf *g, const struct gltf_at *at, const json
 	if (gltf_object(g, at, o, "specularGlossinessTexture")) {
 		gltf_note(
 			g,
-			"textures of KHR_materials_pbrSpecularGlossiness are left out except for the diffuse colour's; "
-			"such materials are no metals");
+			"textures of KHR_materials_pbrSpecularGlossiness are left out, except that of the diffuse colour; "
+			"such materials are not metallic");
 		return;
 	}
 	double rest = 1 - fmin(fmax(specular[0], fmax(specular[1], specular[2])), 1);
@@ -257,7 +257,9 @@ static struct xml_element *put_sheet(struct gltf *g, struct xml_element *parent,
 	if (!(factor > 0))
 		return parent;
 	if (t && gltf_number(g, at, t, "transmissionFactor", 0) > 0) {
-		gltf_note(g, "KHR_materials_diffuse_transmission of what transmits light otherwise is left out");
+		gltf_note(
+			g,
+			"KHR_materials_diffuse_transmission is left out if the material also transmits light otherwise");
 		return parent;
 	}
 	struct xml_element *blend = gltf_plugin(g, parent, at, "bsdf", "blendbsdf", NULL);

@@ -147,7 +147,8 @@ unsigned char *gltf_meshopt_decode(struct gltf *g, const struct gltf_at *view, c
 		gltf_fail(g, view, EINVAL, "%llu compressed bytes cannot stand for %llu", (unsigned long long)size,
 			  (unsigned long long)*count);
 	else if (*count > UNPACKED_MAX - g->unpacked_bytes)
-		gltf_fail(g, view, E2BIG, "more than %llu MB are compressed", (unsigned long long)UNPACKED_MAX >> 20);
+		gltf_fail(g, view, E2BIG, "the compressed views have more than %llu MB when decompressed",
+			  (unsigned long long)UNPACKED_MAX >> 20);
 	unsigned char *out = g->failed ? NULL : mem_alloc(*count + 1, 1);
 	if (!out) {
 		gltf_fail(g, view, ENOMEM, "out of memory");

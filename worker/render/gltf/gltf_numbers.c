@@ -264,7 +264,7 @@ static void read_sparse(struct gltf *g, const struct gltf_at *a, const struct pa
 		gltf_fail(g, a, ENOMEM, "out of memory");
 	else if (p.component != GLTF_UNSIGNED_BYTE && p.component != GLTF_UNSIGNED_SHORT &&
 		 p.component != GLTF_UNSIGNED_INT)
-		gltf_fail(g, a, EINVAL, "its sparse indices are no whole numbers");
+		gltf_fail(g, a, EINVAL, "its sparse indices are not whole numbers");
 	else
 		unpack(g, a, &view[0], &p, count, NULL, &at);
 	p = *whole;

@@ -65,7 +65,7 @@ static int read_header(struct bmp *b)
 		used = get32(p + 46);
 	}
 	if (compression != PLAIN && !(compression == MASKED && masks_are_usual(b)))
-		return error_set(b->in->error, ENOTSUP, "BMP: compressed, or with unusual masks");
+		return error_set(b->in->error, ENOTSUP, "BMP: compressed images and unusual masks are not supported");
 	if (b->bits != 1 && b->bits != 4 && b->bits != 8 && b->bits != 24 && b->bits != 32)
 		return error_set(b->in->error, ENOTSUP, "BMP: %u bits per pixel", b->bits);
 	return read_palette(b, header, used);

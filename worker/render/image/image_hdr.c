@@ -98,7 +98,7 @@ static int read_flat(struct cursor *c, float *out, size_t width)
 	for (size_t x = 0; x < width; x++, c->p += 4) {
 		if (c->p[0] == 1 && c->p[1] == 1 && c->p[2] == 1)
 			return error_set(c->in->error, EBADMSG,
-					 "Radiance HDR: the old kind of run lengths is not supported");
+					 "Radiance HDR: the old run-length encoding is not supported");
 		put_pixel(out + 3 * x, c->p[0], c->p[1], c->p[2], c->p[3]);
 	}
 	return 0;
@@ -111,7 +111,7 @@ static int read_row(struct cursor *c, unsigned char *planes, float *out, size_t 
 	if (!runs)
 		return read_flat(c, out, width);
 	if (((size_t)c->p[2] << 8 | c->p[3]) != width)
-		return error_set(c->in->error, EBADMSG, "Radiance HDR: a scan line of another width");
+		return error_set(c->in->error, EBADMSG, "Radiance HDR: a scan line whose width is not the image's");
 	c->p += 4;
 	for (size_t k = 0; k < 4; k++)
 		if (!read_runs(c, planes + k * width, width))

@@ -81,7 +81,7 @@ static int read_pixels(struct state *s)
 	size_t n = (size_t)j->output_width * (size_t)j->output_components;
 	if (j->output_width != s->out->width || j->output_height != s->out->height ||
 	    (uint32_t)j->output_components != s->out->channels)
-		return error_set(s->in->error, EBADMSG, "JPEG of two sizes");
+		return error_set(s->in->error, EBADMSG, "JPEG: its header and its image differ in size");
 	s->row = mem_alloc(n, 1);
 	if (!s->row)
 		return error_set(s->in->error, ENOMEM, "out of memory");

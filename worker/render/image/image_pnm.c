@@ -114,7 +114,7 @@ static int read_integers(struct pnm *m, struct image *out)
 	for (size_t i = 0; i < (size_t)out->width * out->height * out->channels && !r; i++) {
 		uint32_t x = next_sample(m);
 		if (x > max)
-			r = error_set(m->in->error, EBADMSG, "portable map: a sample above the largest");
+			r = error_set(m->in->error, EBADMSG, "portable map: a sample above the stated maximum");
 		else
 			out->pixels[i] = value[x];
 	}

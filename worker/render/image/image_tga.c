@@ -46,7 +46,7 @@ static int read_map(struct tga *t, const unsigned char *header)
 	uint32_t bits = header[7];
 	uint64_t size = (uint64_t)get16(header + 5) * ((bits + 7) / 8);
 	if (header[1] > 1 || (t->kind == KIND_MAPPED && header[1] == 0))
-		return error_set(t->in->error, EBADMSG, "TGA: a palette that is not there");
+		return error_set(t->in->error, EBADMSG, "TGA: the palette is missing or of an unknown kind");
 	if (header[1] == 0)
 		return 0;
 	if (size > bytes_left(t))

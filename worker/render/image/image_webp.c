@@ -19,7 +19,7 @@ static int decode(const struct image_input *in, struct image *out)
 {
 	WebPBitstreamFeatures about;
 	if (in->size < 12 || memcmp(in->bytes + 8, "WEBP", 4) != 0)
-		return error_set(in->error, EINVAL, "a RIFF file that is no WebP image");
+		return error_set(in->error, EINVAL, "a RIFF file that is not a WebP image");
 	if (WebPGetFeatures(in->bytes, in->size, &about) != VP8_STATUS_OK)
 		return error_set(in->error, EBADMSG, "WebP: damaged, or cut off in its header");
 	if (about.has_animation)
@@ -35,7 +35,7 @@ static int decode(const struct image_input *in, struct image *out)
 	if ((uint32_t)width == out->width && (uint32_t)height == out->height)
 		store(in, rgba, out);
 	else
-		r = error_set(in->error, EBADMSG, "WebP of two sizes");
+		r = error_set(in->error, EBADMSG, "WebP: its header and its image differ in size");
 	WebPFree(rgba);
 	return r;
 }

@@ -43,10 +43,12 @@ static int check_even(const struct xml_element *el, const struct keyframe *key, 
 	mat4 inverse;
 	double size = largest_element(&key->place);
 	if (!mat4_invert(key->place, &inverse))
-		return xml_error(el, e, EINVAL, "flattens what moves (it has no inverse)");
+		return xml_error(el, e, EINVAL, "flattens the object (it has no inverse)");
 	if (!(size >= LEAST_SIZE) || !(size * largest_element(&inverse) <= UNEVEN))
-		return xml_error(el, e, ERANGE, "makes what moves too small, or longer one way than another by %g",
-				 UNEVEN);
+		return xml_error(
+			el, e, ERANGE,
+			"makes the object too small, or stretches it more than %g times as far in one direction as in another",
+			UNEVEN);
 	return 0;
 }
 
@@ -58,7 +60,8 @@ static int check_step(const struct xml_element *el, const struct keyframe *from,
 		return xml_error(el, e, EINVAL, "time=%g is not after the time of the transform before, %g", to->time,
 				 from->time);
 	if ((mat4_det3(from->place) < 0) != (mat4_det3(to->place) < 0))
-		return xml_error(el, e, EINVAL, "of it and the transform before, one mirrors what moves");
+		return xml_error(el, e, EINVAL,
+				 "either this transform or the one before mirrors the object, but not both");
 	return 0;
 }
 

@@ -159,7 +159,7 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 		return note_parameter(&m->notes, owner, el, written, "is not known and is ignored");
 	if (found && d->stands_in && lenient_says_again(d->decl->type, found->name, owner))
 		return note_parameter(&m->notes, owner, el, written,
-				      "goes, because the index of refraction says the same (lenient)");
+				      "is left out, because the index of refraction says the same (lenient)");
 	if ((!found || found->status == PARAM_REFUSED) && m->lenient)
 		return leave_out(&m->notes, el, xml_attribute(owner, "type"), written, "the parameter");
 	if (!found || found->status == PARAM_REFUSED)

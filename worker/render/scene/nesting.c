@@ -29,7 +29,7 @@ int nesting_count(uint64_t *objects, struct xml_element *el, struct error *e)
 	el->counted = true;
 	if (el->nesting.objects > NESTING_OBJECTS_MAX - *objects)
 		return xml_error(el, e, E2BIG,
-				 "the scene has more than %d objects with it when all references are followed",
+				 "the scene has more than %d objects with this one, when all references are followed",
 				 NESTING_OBJECTS_MAX);
 	*objects += el->nesting.objects;
 	return 0;

@@ -106,7 +106,7 @@ int note_foreign(const struct notes *t, const struct xml_element *el)
 	if (depth)
 		return note(
 			t, el, "", "",
-			"%s:%d: <%.64s> is ignored with its contents, also with `%.64s`: --max-depth %.16s limits paths",
+			"%s:%d: <%.64s> is ignored with its contents, including `%.64s`: --max-depth %.16s limits paths",
 			el->file, el->line, el->name, xml_attribute(depth, "name"), xml_attribute(depth, "value"));
 	const char *name = el->first ? NULL : xml_attribute(el, "name");
 	if (name)

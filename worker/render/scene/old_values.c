@@ -89,7 +89,7 @@ static int replace_distribution(const struct notes *t, const struct xml_element 
 	v->as.string = "beckmann";
 	return note(
 		t, owner, xml_attribute(owner, "type"), given,
-		"%s:%d: <%.64s type=\"%.64s\">: the distribution `%s` becomes `beckmann`, which ends sooner: the image "
+		"%s:%d: <%.64s type=\"%.64s\">: the distribution `%s` becomes `beckmann`, which falls off faster: the image "
 		"differs a little from Mitsuba's",
 		el->file, el->line, owner->name, xml_attribute(owner, "type"), given);
 }

@@ -81,7 +81,7 @@ static bool is_pattern(const char *type)
 /* Refuses a colour of a texture, but only once, however many materials use the texture. */
 static int refuse_colour(const struct notes *t, const struct scene_node *texture, const struct property *p, double most)
 {
-	error_set(t->error, ERANGE, "%s:%d: <texture type=\"%.64s\">: %s=%g is above 1, which no reflectance is%s",
+	error_set(t->error, ERANGE, "%s:%d: <texture type=\"%.64s\">: %s=%g is above 1, which no reflectance can be%s",
 		  texture->file, p->line, texture->type, p->name, most, OVER_ONE_HINT);
 	for (uint32_t i = 0; i < t->report->problem_count; i++)
 		if (strcmp(t->report->problems[i], t->error->text) == 0)

@@ -139,8 +139,9 @@ static int on_emitter(struct report *r, const struct scene_node *n, bool dialect
 	bool sun = strcmp(n->type, "sun") == 0;
 	if (!dialect_3 && (sun || strcmp(n->type, "sky") == 0) &&
 	    (node_find(n, "sun_scale") || node_find(n, "sky_scale")))
-		return remark(r, n, e,
-			      "only `scale` counts here, as in Mitsuba 0.6: `sunScale` and `skyScale` are of `sunsky`");
+		return remark(
+			r, n, e,
+			"only `scale` counts here, as in Mitsuba 0.6: `sunScale` and `skyScale` belong to `sunsky`");
 	bool both = strcmp(n->type, "sunsky") == 0 || strcmp(n->type, "timed_sunsky") == 0;
 	if (!dialect_3 || (!sun && !both))
 		return 0;
@@ -159,7 +160,7 @@ static int on_metal(struct report *r, const struct scene_node *n, struct error *
 	const char *name = node_string(n, "material", ""), *end = strstr(name, "_palik");
 	for (size_t i = 0; i < sizeof doubled / sizeof *doubled && end; i++)
 		if (strlen(doubled[i]) == (size_t)(end - name) && strncmp(doubled[i], name, (size_t)(end - name)) == 0)
-			return remark(r, n, e, "the indices of %s are used for %.32s", doubled[i], name);
+			return remark(r, n, e, "the refractive indices of %s are used for %.32s", doubled[i], name);
 	return 0;
 }
 

@@ -58,7 +58,7 @@ int report_text(struct report *r, const char *file, const char *key, const char 
 	snprintf(text, sizeof text, "%s", said);
 	text_clean(text);
 	if (r->note_count == REPORT_NOTES_MAX - 1)
-		snprintf(text, sizeof text, "%s: more is ignored than listed here", file);
+		snprintf(text, sizeof text, "%s: more things are ignored than are listed here", file);
 	const char *note = arena_strdup(r->arena, text), *copy = arena_strdup(r->arena, key);
 	if (!note || !copy)
 		return error_set(e, ENOMEM, "out of memory");

@@ -74,8 +74,9 @@ int substitute_medium(const struct notes *t, const struct xml_element *el, bool 
 {
 	if (node->cls != PLUGIN_MEDIUM || !lacks)
 		return 0;
-	int r = note(t, el, node->type, "", "%s:%d: <medium type=\"%.64s\"> is left out with what it lacks (lenient)",
-		     el->file, el->line, node->type);
+	int r = note(t, el, node->type, "",
+		     "%s:%d: <medium type=\"%.64s\"> is left out, because a part of it is missing (lenient)", el->file,
+		     el->line, node->type);
 	return r ? r : REPORT_TOLD;
 }
 

@@ -190,7 +190,7 @@ static void drop_attributes(struct xml_element *scene)
 
 static int needs_version(const struct reader *r, const struct xml_element *el)
 {
-	return xml_error(el, r->error, EINVAL, "needs version=\"0.6.0\" or version=\"3.0.0\" and the like");
+	return xml_error(el, r->error, EINVAL, "needs a version, such as version=\"0.6.0\" or version=\"3.0.0\"");
 }
 
 /* Files from before 0.3 state no version. A main file without one is first read as such a file, and checked at its
@@ -268,7 +268,7 @@ static int read_path(struct reader *r, const struct xml_element *el)
 {
 	const char *value = xml_attribute(el, "value");
 	if (!value)
-		return xml_error(el, r->error, EINVAL, "needs a value, a folder");
+		return xml_error(el, r->error, EINVAL, "needs a value: the name of a folder");
 	r->tree->blind |= el->unset;
 	if (el->unset)
 		return 0;
@@ -392,7 +392,7 @@ static int become_included(struct xml_element *el, struct error *e)
 {
 	const struct xml_element include = *el;
 	if (strcmp(el->first->name, "scene") == 0)
-		return xml_error(el, e, EINVAL, "a file that holds a <scene> may be included directly in <scene> only");
+		return xml_error(el, e, EINVAL, "a file with a <scene> can only be included directly in <scene>");
 	*el = *el->first;
 	el->parent = include.parent;
 	el->next = include.next;
@@ -413,7 +413,8 @@ static int read_include(struct reader *r, struct xml_element *el)
 	if (!name)
 		return xml_error(el, r->error, EINVAL, "needs filename");
 	if (!at_top && r->minor >= 0)
-		return xml_error(el, r->error, EINVAL, "in files before 0.5 it may stand directly in <scene> only");
+		return xml_error(el, r->error, EINVAL,
+				 "in files of versions before 0.5 it must be directly in <scene>");
 	int c = at_top ? 0 : element_check(el, "filename", false, r->error);
 	if (c)
 		return c;

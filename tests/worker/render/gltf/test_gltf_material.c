@@ -129,7 +129,7 @@ static void test_diffuse_transmission(void **state)
 	scene_fini(&s);
 	s = gltf_files_scene(IOR, THROUGH("") ", " IOR, false); /* which transmits */
 	assert_string_equal(scene_named(&s, "bsdf of materials[2]")->type, "principled");
-	assert_true(scene_has_note(&s, "of what transmits light otherwise is left out"));
+	assert_true(scene_has_note(&s, "is left out if the material also transmits light otherwise"));
 	scene_fini(&s);
 #undef FIRST
 #undef THROUGH
@@ -154,7 +154,7 @@ static void test_anisotropy(void **state)
 	for (int i = 0; i < 2; i++) {
 		s = gltf_files_scene(IOR, left_out[i], false);
 		assert_null(node_find(scene_named(&s, third), "anisotropic"));
-		assert_true(scene_has_note(&s, "anisotropy with a texture, a rotation"));
+		assert_true(scene_has_note(&s, "anisotropy is left out if it has a texture or a rotation"));
 		scene_fini(&s);
 	}
 }

@@ -360,7 +360,7 @@ static const struct {
 	{{"\"byteOffset\": 601, "}, {"\"byteOffset\": 5000, "}, "it exceeds buffers[0]"},
 	{{"{\"uri\": \"rgb.hdr\"}"},
 	 {"{\"bufferView\": 0}"},
-	 "bufferViews[0]: it is compressed, as only numbers may be"},
+	 "bufferViews[0]: it is compressed, which only views of accessors may be"},
 	{{"\"count\": 6, \"type\": \"VEC2\""}, {"\"count\": 9, \"type\": \"VEC2\""}, "it exceeds bufferViews[1]"},
 };
 
@@ -412,7 +412,7 @@ static void test_too_much(void **state)
 		12 * COUNT, SIZE, COUNT, SIZE);
 	assert_true(n > 0 && (size_t)n < sizeof own.json);
 	const struct memory_file files[] = {{"s.gltf", own.json, (size_t)n}, {"b", bytes, SIZE}, {0}};
-	refuses(files, "bufferViews[0]: more than 512 MB are compressed");
+	refuses(files, "bufferViews[0]: the compressed views have more than 512 MB");
 	mem_free(bytes);
 }
 

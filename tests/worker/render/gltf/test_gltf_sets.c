@@ -223,7 +223,7 @@ static void test_specular_glossiness(void **state)
 			assert_true(fabs(base->value.as.rgb[c] - cases[i].base[c]) < 1e-6);
 		assert_true(fabs(node_float(bsdf, "metallic", -1) - cases[i].metallic) < 1e-6);
 		assert_true(fabs(node_float(bsdf, "roughness", -1) - cases[i].roughness) < 1e-6);
-		assert_true(scene_has_note(&s, "such materials are no metals") == (i == 3));
+		assert_true(scene_has_note(&s, "such materials are not metallic") == (i == 3));
 		scene_fini(&s);
 	}
 }

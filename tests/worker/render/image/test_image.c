@@ -292,9 +292,9 @@ static void test_bad_hdr(void **state)
 	refuses(file, make_hdr(file, "-Y 8193 +X 16384", pixels, 12), "pixels; at most 134217728");
 	refuses(file, make_hdr(file, "-Y 9223372036854775000 +X 9223372036854775000", pixels, 12), "pixels; at most");
 	refuses(file, make_hdr(file, "-Y 1 +X 8", pixels, 64), "run lengths that do not fill");
-	refuses(file, make_hdr(file, "-Y 1 +X 9", pixels, 64), "another width");
+	refuses(file, make_hdr(file, "-Y 1 +X 9", pixels, 64), "a scan line whose width is not");
 	static const unsigned char old[] = {9, 9, 9, 9, 1, 1, 1, 3};
-	refuses(file, make_hdr(file, "-Y 1 +X 2", old, 8), "old kind of run lengths");
+	refuses(file, make_hdr(file, "-Y 1 +X 2", old, 8), "old run-length encoding");
 	static const char xyze[] = "#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\n....";
 	refuses(xyze, sizeof xyze - 1, "only FORMAT=32-bit_rle_rgbe");
 }

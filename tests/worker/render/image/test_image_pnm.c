@@ -153,7 +153,7 @@ static void test_lies(void **state)
 	refuses_text("P6 300 300 255\n", "too short for");
 	struct file f = integers("P5 3 2 200\n", 1, 200);
 	f.bytes[f.size - 1] = 201;
-	refuses(&f, f.size, "a sample above the largest");
+	refuses(&f, f.size, "a sample above the stated maximum");
 	f = reals("Pf\n3 2\n-1\n", 1, false);
 	memcpy(f.bytes + f.size - 4, "\0\0\xc0\x7f", 4);
 	refuses(&f, f.size, "a pixel that is not finite");

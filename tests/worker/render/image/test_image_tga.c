@@ -206,8 +206,8 @@ static void test_lies(void **state)
 	refuses_changed(COLOUR, 24, 12, 0, "pixels; at most");
 	refuses_changed(COLOUR, 24, 13, 100, "too short for");
 	refuses_changed(COLOUR, 24, 0, 255, "the header ends too early");
-	refuses_changed(COLOUR, 24, 1, 2, "a palette that is not there");
-	refuses_changed(MAPPED, 24, 1, 0, "a palette that is not there");
+	refuses_changed(COLOUR, 24, 1, 2, "the palette is missing or of an unknown kind");
+	refuses_changed(MAPPED, 24, 1, 0, "the palette is missing or of an unknown kind");
 	refuses_changed(MAPPED, 24, 6, 255, "the palette ends too early");
 	refuses_changed(MAPPED, 24, 7, 16, "a palette of 16 bits");
 	refuses_changed(MAPPED, 24, 3, FIRST + 1, "beyond the palette");

@@ -107,8 +107,8 @@ static void test_damaged(void **state)
 	draw(rgba);
 	size_t size = WebPEncodeRGBA(rgba, WIDTH, HEIGHT, 4 * WIDTH, 50, &file);
 	uint8_t *copy = mem_alloc(size, 1);
-	refuses("RIFF\4\0\0\0WAVE", 12, "a RIFF file that is no WebP image");
-	refuses("RIFF", 4, "a RIFF file that is no WebP image");
+	refuses("RIFF\4\0\0\0WAVE", 12, "a RIFF file that is not a WebP image");
+	refuses("RIFF", 4, "a RIFF file that is not a WebP image");
 	for (size_t n = 12; n < size; n += 1 + n / 9)
 		refuses(file, n, "WebP: damaged");
 	for (int i = 0; i < 400; i++) {

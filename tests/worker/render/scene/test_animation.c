@@ -106,13 +106,14 @@ static void test_refused(void **state)
 	refuses(S MOVING("cube", LATER("0", "2"), "") END, "time=0 is not after the time of the transform before, 0");
 	refuses(S MOVING("cube", LATER("2", "2") LATER("1", "3"), "") END,
 		"time=1 is not after the time of the transform before, 2");
-	refuses(S MOVING("cube", LATER("1", "0"), "") END, "flattens what moves (it has no inverse)");
-	refuses(S MOVING("cube", LATER("1", "1e-61"), "") END, "makes what moves too small");
+	refuses(S MOVING("cube", LATER("1", "0"), "") END, "flattens the object (it has no inverse)");
+	refuses(S MOVING("cube", LATER("1", "1e-61"), "") END, "makes the object too small");
 	refuses(S MOVING("cube", "<transform time='1'><scale x='1e-300' y='1e-300'/></transform>", "") END,
-		"longer one way than another by 1e+12");
+		"more than 1e+12 times as far in one direction");
 	refuses(S MOVING("cube", "<transform time='1'><scale x='1e13'/></transform>", "") END,
-		"longer one way than another by 1e+12");
-	refuses(S MOVING("cube", LATER("1", "-1"), "") END, "of it and the transform before, one mirrors what moves");
+		"more than 1e+12 times as far in one direction");
+	refuses(S MOVING("cube", LATER("1", "-1"), "") END,
+		"either this transform or the one before mirrors the object, but not both");
 	refuses(S MOVING("cube", LATER("1", "2") "<scale value='2'/>", "") END, "has no place in <animation>");
 	refuses(S MOVING("cube", "<transform time='1' tiem='2'/>", "") END, "has no attribute `tiem`");
 	refuses(S "<shape type='sphere'><animation name='toWorld' tiem='1'><transform/></animation></shape>" END,

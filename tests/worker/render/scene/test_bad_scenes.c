@@ -65,8 +65,8 @@ static void test_broken_xml(void **state)
 	refuses(S "<shape type='sphere'><float name='radius'>2</float></shape>" END, "values are given by attributes");
 	refuses(S "words" END, "text is not allowed here");
 	refuses("<scenes version='3.0.0'/>", "a scene file must begin with <scene");
-	refuses("<scene/>", "needs version=");
-	refuses("<scene version='three'/>", "needs version=");
+	refuses("<scene/>", "needs a version, such as version=");
+	refuses("<scene version='three'/>", "needs a version, such as version=");
 	refuses("<scene version='3.0.0' verzion='1'/>", "has no attribute `verzion`; did you mean `version`?");
 }
 
@@ -264,7 +264,7 @@ static void test_bad_values(void **state)
 	refuses(BSDF("<blackbody name='eta' temperature='hot'/>"), "temperature=\"hot\" is not a number");
 	refuses(BSDF("<blackbody name='eta' temperature='1'/>"), "a temperature of 1 K is outside [100, 1e+06]");
 	refuses(BSDF("<color name='eta'/>"), "is not supported; supported: boolean");
-	refuses("<scene version='0.6.0'><path/></scene>", "s.xml:1: <path>: needs a value, a folder");
+	refuses("<scene version='0.6.0'><path/></scene>", "s.xml:1: <path>: needs a value: the name of a folder");
 	refuses(S "<shape type='sphere'><boolean name='flip_normals' value='yes'/></shape>" END,
 		"neither true nor false");
 	refuses(S "<shape type='sphere'><float name='radius' value='0'/></shape>" END, "must be positive");
@@ -455,7 +455,7 @@ static void test_bad_includes(void **state)
 	refuses(S "<bsdf type='diffuse'><include filename='s.xml'/></bsdf>" END, "more than 15 deep");
 	refuses(S "<bsdf type='mask'><include filename='s.xml' nme='x'/></bsdf>" END, "has no attribute `nme`");
 	refuses("<scene version='0.4.0'><bsdf type='mask'>\n<include filename='i.xml'/></bsdf>" END,
-		"s.xml:2: <include>: in files before 0.5 it may stand directly in <scene> only");
+		"s.xml:2: <include>: in files of versions before 0.5 it must be directly in <scene>");
 	refuses(S "<include filename='s.xml'/>" END, "files include each other more than 15 deep");
 	static const char main_file[] = S "<include filename='i.xml'/>" END,
 			  broken[] = S "\n\n<bsdf type='difuse'/>" END,
@@ -467,10 +467,10 @@ static void test_bad_includes(void **state)
 		const char *bytes, *text;
 	} cases[] = {{broken, "i.xml:3: <bsdf type=\"difuse\">"},
 		     {doctype, "i.xml:1: <!DOCTYPE>"},
-		     {no_version, "i.xml:1: <shape type=\"sphere\">: needs version="},
+		     {no_version, "i.xml:1: <shape type=\"sphere\">: needs a version, such as version="},
 		     {no_object, "i.xml:1: <spere>: there is no element of this name"},
 		     {inside, "files include each other more than 15 deep"},
-		     {in_object, "i.xml:2: <include>: a file that holds a <scene> may be included"}};
+		     {in_object, "i.xml:2: <include>: a file with a <scene> can only be included"}};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		const struct memory_file files[] = {{"s.xml", main_file, sizeof main_file - 1},
 						    {"i.xml", cases[i].bytes, strlen(cases[i].bytes)},

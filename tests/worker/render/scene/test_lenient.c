@@ -387,7 +387,8 @@ static void test_volumes_without_a_value(void **state)
 	assert_int_equal(s.object_count, 2); /* and the sky */
 	assert_null(node_ref(s.objects[0], "interior"));
 	assert_true(scene_has_note(&s, "s.xml:4: <volume type=\"constvolume\"> has no `value`: left out (lenient)"));
-	assert_true(scene_has_note(&s, "s.xml:2: <medium type=\"heterogeneous\"> is left out with what it lacks"));
+	assert_true(scene_has_note(
+		&s, "s.xml:2: <medium type=\"heterogeneous\"> is left out, because a part of it is missing"));
 	scene_fini(&s);
 	static const char new[] = "<scene version='3.0.0'><volume type='constvolume'/></scene>";
 	const struct memory_file new_files[] = {{"s.xml", new, sizeof new - 1}, {0}};
@@ -458,7 +459,8 @@ static void test_more_than_the_stand_in_has(void **state)
 	assert_string_equal(scene_named(&s, "metal")->type, "roughconductor");
 	assert_string_equal(scene_named(&s, "glass")->type, "dielectric");
 	assert_true(scene_has_note(&s, "s.xml:3: <rfilter>: a second object, `tfilter` is not supported and left out"));
-	assert_true(scene_has_note(&s, "s.xml:4: <bsdf type=\"disneybsdf\">: `specular` goes, because the index of"));
+	assert_true(scene_has_note(
+		&s, "s.xml:4: <bsdf type=\"disneybsdf\">: `specular` is left out, because the index of"));
 	scene_fini(&s);
 	static const char twice[] = "<scene version='3.0.0'><sensor type='perspective'><film type='hdrfilm'>"
 				    "<rfilter type='box'/><rfilter type='tent'/></film></sensor></scene>";

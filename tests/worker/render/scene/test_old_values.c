@@ -191,7 +191,7 @@ static void test_distributions(void **state)
 	static const char *const old[] = {"phong", "as"};
 	for (size_t i = 0; i < sizeof old / sizeof *old; i++) {
 		char note[128];
-		snprintf(note, sizeof note, "the distribution `%s` becomes `beckmann`, which ends sooner", old[i]);
+		snprintf(note, sizeof note, "the distribution `%s` becomes `beckmann`, which falls off faster", old[i]);
 		struct scene s = read_old(i ? ROUGH("as") : ROUGH("phong"), note);
 		assert_string_equal(node_string(s.objects[0], "distribution", ""), "beckmann");
 		scene_fini(&s);

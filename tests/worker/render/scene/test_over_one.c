@@ -105,7 +105,8 @@ static void test_textures(void **state)
 		"<bsdf type='phong' id='p'><ref name='exponent' id='t'/></bsdf>";
 	for (int version = 0; version < 2; version++) {
 		refuses(version ? "3.0.0" : "0.6.0", body, false,
-			"s.xml:2: <texture type=\"checkerboard\">: color0=2 is above 1, which no reflectance is; --lenient counts it as 1");
+			"s.xml:2: <texture type=\"checkerboard\">: color0=2 is above 1, which no reflectance can be; "
+			"--lenient counts it as 1");
 		struct scene s = read_leniently(version ? "3.0.0" : "0.6.0", body);
 		assert_true(scene_has_note(
 			&s, "s.xml:2: <texture type=\"checkerboard\">: color0=2 is above 1 and counts as 1 (lenient)"));

@@ -102,8 +102,8 @@ static void test_depths(void **state)
 {
 	(void)state;
 	check("<dpt><string name='a' value='b'/><integer name='maxdepth' value='8'/></dpt>",
-	      "s.xml:1: <dpt> is ignored with its contents, also with `maxdepth`: --max-depth 8 limits paths");
-	check("<mode><integer name='max_Depth' value='12'/></mode>", "also with `max_Depth`: --max-depth 12 limits");
+	      "s.xml:1: <dpt> is ignored with its contents, including `maxdepth`: --max-depth 8 limits paths");
+	check("<mode><integer name='max_Depth' value='12'/></mode>", "including `max_Depth`: --max-depth 12 limits");
 	static const char *const others[] = {"<integer name='maxdepth' value='-1'/>",
 					     "<integer name='maxdepth' value='8x'/>",
 					     "<integer name='maxdepths' value='8'/>",

@@ -454,7 +454,8 @@ static void test_lenient(void **state)
 		memory_assets(scene_of("3.0.0", "heterogeneous", "<volume type='hgridvolume' name='sigma_t'/>" EVEN));
 	assert_int_equal(scene_read_lenient(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e), 0);
 	assert_true(is_noted(&s, "the plug-in `hgridvolume` is not supported and left out (lenient)"));
-	assert_true(is_noted(&s, "<medium type=\"heterogeneous\"> is left out with what it lacks (lenient)"));
+	assert_true(
+		is_noted(&s, "<medium type=\"heterogeneous\"> is left out, because a part of it is missing (lenient)"));
 	assert_null(node_ref(s.objects[s.object_count - 1], "interior"));
 	scene_fini(&s);
 }

@@ -123,7 +123,7 @@ static void test_second_tables(void **state)
 	assert_int_equal(c.found.problem_count, 0);
 	assert_int_equal(c.scene.note_count, 1);
 	assert_string_equal(c.scene.notes[0],
-			    "s.xml:2: <bsdf type=\"conductor\">: the indices of Cu are used for Cu_palik");
+			    "s.xml:2: <bsdf type=\"conductor\">: the refractive indices of Cu are used for Cu_palik");
 	free_checked(&c);
 }
 

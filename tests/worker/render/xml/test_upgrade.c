@@ -358,7 +358,7 @@ static void test_no_version(void **state)
 		struct asset_source assets = memory_assets(files);
 		struct error e;
 		if (!scene_read(&s[0], &assets, "s.xml", render_plugins(), NULL, 0, &e) ||
-		    !strstr(e.text, "needs version="))
+		    !strstr(e.text, "needs a version, such as version="))
 			fail_msg("%s: \"%s\"", refused[i], e.text);
 	}
 }
