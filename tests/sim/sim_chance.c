@@ -37,7 +37,7 @@ __attribute__((format(printf, 2, 3))) void sim_wrong(struct world *w, const char
 	va_end(ap);
 }
 
-/* ---- what happens when */
+/* ---- messages in the order of their times */
 
 static bool is_earlier(const struct message *a, const struct message *b)
 {
@@ -81,7 +81,7 @@ bool sim_is_calm(const struct world *w)
 	return w->now >= w->calm;
 }
 
-/* Over the network: late, twice or never while there is trouble. */
+/* Posts a message over the network. Before the world is calm it may be late, delivered twice or lost. */
 void sim_post(struct world *w, struct message m)
 {
 	bool calm = sim_is_calm(w);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The coordinator dies and comes back; jobs are held, released, given another priority, and extended while they run or
- * are done. */
+/* Restarts of the coordinator and orders for jobs: they are held, released, given another priority, and extended
+ * while they run or after they have ended. */
 #include "tests/sim/sim_private.h"
 
 #include <math.h>
@@ -11,7 +11,7 @@ static void hold_job(struct world *w, struct sim_job *j, enum job_hold which, bo
 	struct event ev = {.kind = EVENT_HOLD, .job = j->id, .hold = which, .text = on ? "held" : ""};
 	if (j->over)
 		return;
-	j->held[which] = on; /* first: leases may go out at once */
+	j->held[which] = on; /* set before the step, which may hand out leases at once */
 	sim_step(w, &ev, 0);
 }
 
@@ -24,7 +24,7 @@ void sim_restore(struct world *w, struct sim_job *j, double elapsed)
 	for (uint32_t i = 0; i < slots; i++)
 		next[i] = render ? j->next[i] : j->boot >> i & 1;
 	j->prepared = render;
-	j->progress = 0; /* looks at the error are not remembered here */
+	j->progress = 0; /* the new coordinator does not remember earlier evaluations of the error */
 	struct event ev = {.kind = EVENT_RESTORE,
 			   .restore = {.job = j->id,
 				       .submit = {.plan = &j->plan,
@@ -39,15 +39,15 @@ void sim_restore(struct world *w, struct sim_job *j, double elapsed)
 				       .opened = elapsed,
 				       .completed = j->completed,
 				       .looks = &no_looks}};
-	bool held = j->held[HOLD_ORDERED]; /* the other is not remembered: there may be room by now */
+	bool held = j->held[HOLD_ORDERED]; /* a hold for want of storage is not remembered: there may be room by now */
 	memset(j->held, 0, sizeof j->held);
 	sim_step(w, &ev, 0);
 	if (held)
 		hold_job(w, j, HOLD_ORDERED, true);
 }
 
-/* Only what is merged is remembered. What was under way to the old one comes to the new one, from peers that it does
- * not know. */
+/* Replaces the coordinator by one that remembers only merged results. Messages still under way to the old one reach
+ * the new one, from peers that it does not know. */
 void sim_restart(struct world *w)
 {
 	double elapsed[JOBS];
@@ -96,7 +96,7 @@ static void set_priority(struct world *w, struct sim_job *j)
 	sim_step(w, &ev, 0);
 }
 
-/* Later bounds: each that the job has, so that none of them is met. */
+/* Moves each bound that the job has further away, so that none of them is met. */
 static void extend_bounds(struct world *w, struct sim_job *j)
 {
 	struct plan *p = &j->plan;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The simulated farm's insides, for sim_*.c: what there is, what happens when, who does what. One thread. */
+/* The internals of the simulated farm, for sim_*.c: its state, its messages and its actors. One thread. */
 #ifndef TESTS_SIM_SIM_PRIVATE_H
 #define TESTS_SIM_SIM_PRIVATE_H
 
@@ -16,7 +16,7 @@ enum {
 	QUEUE = 64,
 	MESSAGES = 1 << 14,
 	STEPS_MOST = 400000,
-	HOARD = 4096 /* threads that one claims to have */
+	HOARD = 4096 /* number of threads that a hoarding worker claims to have */
 };
 
 enum message_kind { TO_CORE, TICK, SUBMIT, LEASE, REVOKE, FINISH, BEAT, CRASH, START, CALM, RESTART, ORDER };
@@ -27,9 +27,9 @@ struct message {
 	enum message_kind kind;
 	uint32_t worker;
 	uint64_t peer;
-	struct event ev; /* TO_CORE */
+	struct event ev; /* for TO_CORE */
 	struct lease_key key;
-	uint64_t value; /* chain state: in for LEASE, out for a batch */
+	uint64_t value; /* chain state: the input of a LEASE, the output of a batch */
 };
 
 struct work {
@@ -42,7 +42,7 @@ struct worker {
 	uint32_t threads, busy, queued, want;
 	double speed, frozen_until;
 	double fault_rate, failure_rate, lie_rate;
-	bool hoards; /* until it is calm */
+	bool hoards; /* takes leases and never answers them, until the world is calm */
 	const char *fingerprint;
 	struct work queue[QUEUE];
 };
@@ -53,15 +53,15 @@ struct sim_job {
 	int priority;
 	bool mixed, submitted, over, prepared;
 	double verify;
-	uint32_t answered[SLOTS];   /* whose answers are noted, by worker */
-	bool held[JOB_HOLDS], done; /* done: it has ended, and may go on */
-	double elapsed;		    /* then */
+	uint32_t answered[SLOTS];   /* by slot: bits of the workers whose answers the core has noted */
+	bool held[JOB_HOLDS], done; /* done: it has ended successfully, and may be extended */
+	double elapsed;		    /* seconds at its end */
 	double cancel_at, lease_time, error_scale;
 	uint64_t next[SLOTS], state[SLOTS], boot;
 	uint64_t round_sum[ROUNDS];
-	uint64_t rounds;     /* complete, counted here */
-	double completed;    /* s after its first lease: the last complete round */
-	char fingerprint[2]; /* of those whose work is merged */
+	uint64_t rounds;     /* number of complete rounds, counted here */
+	double completed;    /* seconds from its first lease to its last complete round */
+	char fingerprint[2]; /* of the workers whose results are merged */
 	double progress;
 };
 
@@ -70,8 +70,8 @@ struct world {
 	int trace;
 	double now, calm, tick_at;
 	double drop, repeat, delay, failure;
-	double verify; /* of every job */
-	bool liars;    /* then every result is verified, and all are of one fingerprint */
+	double verify; /* verified fraction of every job */
+	bool liars;    /* some workers lie; then every result is verified, and all workers have one fingerprint */
 	struct farm *farm;
 	struct farm_config config;
 	struct message *heap;
@@ -83,7 +83,7 @@ struct world {
 	char wrong[256];
 };
 
-/* sim_chance.c: everything that is random, and the messages under way, in the order of their times. */
+/* sim_chance.c: the random numbers, and the messages under way, in the order of their times. */
 uint64_t sim_mix(uint64_t x);
 double sim_uniform(struct world *w);
 uint32_t sim_below(struct world *w, uint32_t n);
@@ -107,7 +107,7 @@ void sim_receive_lease(struct world *w, const struct message *m);
 bool sim_same_key(struct lease_key a, struct lease_key b);
 void sim_receive_revoke(struct world *w, const struct message *m);
 
-/* sim_shell.c: the shell around the core, which checks what it says. */
+/* sim_shell.c: the shell around the core, which checks the core's actions. */
 double sim_error_after(const struct sim_job *j, uint64_t rounds);
 uint64_t sim_undisturbed_rounds(const struct sim_job *j);
 void sim_step(struct world *w, struct event *ev, uint64_t value);
@@ -115,7 +115,7 @@ void sim_step(struct world *w, struct event *ev, uint64_t value);
 /* sim_orders.c */
 void sim_restore(struct world *w, struct sim_job *j, double elapsed);
 void sim_restart(struct world *w);
-void sim_order(struct world *w); /* hold, release, priority, extend: something, of some job */
+void sim_order(struct world *w); /* gives a random order (hold, release, priority, extend) for a random job */
 void sim_release_all(struct world *w);
 
 #endif

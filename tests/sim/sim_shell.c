@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The simulation's shell: carries out the core's actions on simulated workers, disks and clocks, as coordinator/jobs
- * does for real, and checks after each event what must always hold: no lease held by more than two workers, no lease
- * for a worker that must not have one, no round or sum of a job that differs from an undisturbed run's, and a reason
- * wherever a job waits.
+ * does in the real program. After each event it checks the invariants: no lease is held by more than two workers or
+ * given to a worker that must not have one, no round or sum of a job differs from that of an undisturbed run, and a
+ * waiting job states a reason.
  */
 #include "tests/sim/sim_private.h"
 
@@ -114,7 +114,7 @@ uint64_t sim_undisturbed_rounds(const struct sim_job *j)
 {
 	if (j->plan.target_error > 0)
 		for (uint64_t r = 1; r < j->plan.rounds;
-		     r += r < 4 ? 1 : r / 4) /* the ladder, written down once more */
+		     r += r < 4 ? 1 : r / 4) /* the ladder of evaluations, written independently */
 			if (sim_error_after(j, r) <= j->plan.target_error)
 				return r;
 	return j->plan.rounds;
@@ -135,7 +135,7 @@ static uint64_t undisturbed_sum(const struct sim_job *j, uint64_t rounds)
 	return sum;
 }
 
-/* A job whose time is over is looked at once more, and may then end by its error after any number of rounds. */
+/* A job whose time has run out is evaluated once more, and may then end by its error after any number of rounds. */
 static bool ended_by_time(enum job_end end, const struct sim_job *j)
 {
 	bool over = j->plan.seconds > 0 && j->elapsed >= j->plan.seconds;

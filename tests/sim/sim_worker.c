@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The simulated workers: they compute leases at their own speed, crash, freeze, return, fail leases, send wrong results
- * and offer results that nobody asked for, as the seed says. sim_result_of defines the right result of a lease;
- * sim_shell.c checks what is merged against it.
+ * The simulated workers. As the seed determines, they compute leases at their own speed, crash, freeze, return, fail
+ * leases, send wrong results and offer results without a lease. sim_result_of defines the correct result of a lease,
+ * against which sim_shell.c checks what is merged.
  */
 #include "tests/sim/sim_private.h"
 
@@ -74,12 +74,13 @@ void sim_finish(struct world *w, const struct message *m)
 		ev.kind = EVENT_LEASE_RETURNED;
 	uint64_t value = sim_result_of(m->key, m->value);
 	if (!sim_is_calm(w) && k->lie_rate > 0 && sim_chance(w, k->lie_rate))
-		value ^= 1 + sim_mix(w->draws); /* no two lies are alike */
+		value ^= 1 + sim_mix(w->draws); /* two lies are never equal */
 	tell_core(w, k, ev, value);
 	work_on(w, m->worker);
 }
 
-/* An answer that nobody asked for, perhaps of an epoch that is not open, and right should it come when it is. */
+/* Sends a result without a lease, perhaps of an epoch that is not open yet; it is correct if it is still needed when
+ * it arrives. */
 static void offer_capacity(struct world *w, const struct worker *k)
 {
 	const struct sim_job *j = &w->jobs[sim_below(w, w->job_count)];
@@ -127,7 +128,7 @@ void sim_start(struct world *w, uint32_t index)
 	k->busy = k->queued = 0;
 	k->frozen_until = 0;
 	char name[16];
-	/* Honest ones in place of those that lied, as far as the core can see. */
+	/* When the world becomes calm, new names tell the core that liars were replaced by honest workers. */
 	snprintf(name, sizeof name, "%s%u", sim_is_calm(w) ? "calm" : "w", index);
 	struct event ev = {.kind = EVENT_JOINED,
 			   .join = {.peer = k->peer,
@@ -143,7 +144,7 @@ void sim_start(struct world *w, uint32_t index)
 					     .peer = k->peer});
 }
 
-/* Dies with or without a word, or stands still for a while. */
+/* Lets a worker die, with or without notice, or freeze for a while. */
 void sim_crash(struct world *w, const struct message *m)
 {
 	struct worker *k = &w->workers[m->worker];
@@ -173,7 +174,7 @@ void sim_forget_answers(struct world *w)
 
 void sim_calm_down(struct world *w)
 {
-	if (w->liars) /* who has another name may answer again */
+	if (w->liars) /* a worker with another name may answer again */
 		sim_forget_answers(w);
 	for (uint32_t i = 0; i < w->worker_count; i++) {
 		struct worker *k = &w->workers[i];

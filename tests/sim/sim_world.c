@@ -29,7 +29,8 @@ static void plan_job(struct world *w, struct sim_job *j)
 		p->seconds = j->lease_time * 20 * sim_uniform(w);
 }
 
-/* Two honest workers of one fingerprint at least, or a job could not end; one or two that are not. */
+/* Makes at least two workers honest and of one fingerprint, since a job could not end otherwise, and one or two
+ * liars. */
 static void choose_liars(struct world *w)
 {
 	for (uint32_t i = 0; i < w->worker_count; i++) {

@@ -1,17 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A farm in virtual time around the real core: workers that compute, crash, hang, come back, fail, send what is torn or
- * wrong, volunteer, or take what they can get and give nothing; a network that drops, repeats, delays and reorders; a
- * coordinator that dies and remembers what is merged; jobs with priorities and bounds, some cancelled, held, extended
- * while they run or when they are done. Everything follows from one seed. After `calm` seconds the trouble ends and
- * every job must end too.
+ * A farm in virtual time around the real core. Its workers compute, crash, hang, come back, fail, send damaged or wrong
+ * results, send results without a lease, or hoard leases without answering. Its network drops, repeats, delays and
+ * reorders messages. Its coordinator dies and remembers what is merged. Its jobs have priorities and bounds; some are
+ * cancelled, held, or extended while they run or after they are done. Everything follows from one seed. After `calm`
+ * seconds the trouble ends, and then every job must end, too.
  *
- * A lease's result is a number made from its key and from the result of the epoch before, as a chain state is, so an
- * epoch merged out of order or from a wrong state shows in the sums. Checked all the time: each lease is merged once
- * and in the order of its epochs; two rounds are open at most; an ended job's sum is that of the undisturbed run after
- * as many rounds, and the rounds are those of the undisturbed run unless a time ended it; of jobs of which everything
- * is verified no wrong result is merged while some workers lie, and nobody is asked twice; no lease goes to a worker of
- * another fingerprint, nor to more than two at once; progress never falls; every job ends.
+ * The result of a lease is a number computed from its key and from the result of the previous epoch, as a chain state
+ * is, so an epoch that is merged out of order or from a wrong state shows in the sums. The following is checked
+ * throughout: each lease is merged once, in the order of epochs; at most two rounds are open; the sum of an ended job
+ * is that of an undisturbed run after as many rounds, and the number of rounds is the undisturbed one unless the job
+ * ended by time; if everything is verified while some workers lie, no wrong result is merged and no worker is asked
+ * twice; no lease goes to a worker of another fingerprint, or to more than two workers at once; progress never falls;
+ * every job ends.
  */
 #ifndef TESTS_SIM_SIM_WORLD_H
 #define TESTS_SIM_SIM_WORLD_H
@@ -22,12 +23,12 @@
 struct sim_result {
 	uint64_t steps, merged, repeats, refused, crashes, done, failed, cancelled, copies, timeouts, restarts,
 		extended;
-	uint64_t verified, mismatched, lies, quarantined; /* lies: wrong results that were found out */
-	uint64_t hung, hoarded; /* times that a worker stood still; leases that went to workers that never answer */
+	uint64_t verified, mismatched, lies, quarantined; /* lies: wrong results that were detected */
+	uint64_t hung, hoarded; /* hung: how often workers froze; hoarded: leases of workers that never answer */
 	double time;		/* virtual seconds */
 };
 
-/* NULL, or what is wrong, in one sentence. */
+/* Returns NULL, or a sentence that says what is wrong. */
 const char *sim_run(uint64_t seed, int trace, struct sim_result *r);
 
 #endif

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Many seeds of the farm's simulator; FULL=1: more of them; HSLT_SIM_SEED=N: that one, with everything that is said. */
+/* Runs the farm's simulator for many seeds. FULL=1: for more seeds; HSLT_SIM_SEED=N: for that seed, with all
+ * messages. */
 #include "tests/sim/sim_world.h"
 
 #include <inttypes.h>
@@ -57,7 +58,7 @@ static void simulate(void **state)
 		      first, first + count - 1, sum.steps, sum.merged, sum.repeats, sum.refused, sum.crashes, sum.hung,
 		      sum.hoarded, sum.copies, sum.timeouts, sum.restarts, sum.extended, sum.verified, sum.mismatched,
 		      sum.lies, sum.quarantined, sum.done, sum.failed, sum.cancelled);
-	/* The worlds must be wild enough to mean something. */
+	/* The simulated worlds must have enough trouble to be meaningful. */
 	if (!one) {
 		assert_true(sum.repeats > count && sum.copies > count / 4 && sum.timeouts > count / 4);
 		assert_true(sum.restarts > count / 2 && sum.extended > count / 2);
