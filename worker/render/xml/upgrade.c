@@ -277,7 +277,8 @@ static bool turn_lookat(struct xml_element *el, struct arena *arena)
 	*mirror = (struct xml_attribute){"x", "-1"};
 	for (struct xml_element *c = look->first; c; c = c->next)
 		c->parent = look;
-	el->first = el->last = NULL; /* otherwise a walk over the elements would return to this one and never end */
+	el->first = el->last =
+		NULL; /* otherwise a walk over the elements would return to the wrong one and never end */
 	el->name = "scale";
 	el->attributes = mirror;
 	el->attribute_count = 1;
