@@ -4,8 +4,8 @@
  * groups, with a seed of its own; blocks of the image and the mean are compared by Welch's t between the groups' means.
  *
  * Level: 1e-4 over all tests of the suite, shared equally among comparisons and by Holm's method within one. Power: the
- * smallest bias found with 95 % probability is printed; more than 2 % on a block or 0.5 % on the mean is a failure, as
- * is a planted bias of twice the smallest that goes unseen.
+ * smallest bias that is found with 95 % probability is printed. The test fails if it is more than 2 % for a block or
+ * 0.5 % for the mean, or if a planted bias of twice that size is not found.
  */
 #ifndef TESTS_SUPPORT_AGREE_H
 #define TESTS_SUPPORT_AGREE_H
@@ -19,7 +19,7 @@ struct agree_side {
 	const char *integrator;
 	uint64_t spp;
 	uint32_t groups;	       /* 16..64 */
-	uint32_t min_depth, max_depth; /* 0: 1 and the scene's */
+	uint32_t min_depth, max_depth; /* 0: min_depth 1, and the scene's max_depth */
 };
 
 /* Per group: the mean of X+Y+Z over each block, then over the whole film. */
@@ -33,28 +33,28 @@ struct agree_image {
 void agree_render(const struct world *w, const char *test, const char *side, const struct agree_side *how,
 		  struct agree_image *out);
 
-/* The same with `bootstrap` independent paths in each group of chains instead of AGREE_BOOTSTRAP, and a mixture of
- * strategies (NULL: the default one). */
+/* Like agree_render(), with `bootstrap` independent paths in each group of chains instead of AGREE_BOOTSTRAP, and
+ * with a mixture of strategies (NULL: the default one). */
 void agree_render_chains(const struct world *w, const char *test, const char *side, const struct agree_side *how,
 			 uint64_t bootstrap, const char *mutations, struct agree_image *out);
 
-/* Fails the test when the images differ, or when the comparison is too weak to tell. */
+/* Fails the test if the images differ, or if the comparison is too weak to tell. */
 void agree_check(const char *test, const struct agree_image *a, const struct agree_image *b);
 
-/* The same level, but no demand on the power, which is printed: for whole scenes that cannot be rendered to half a
- * percent in a test. Returns the relative difference of the means. */
+/* Like agree_check(), but the power is only printed, not required: for whole scenes that cannot be rendered to half
+ * a percent in a test. Returns the relative difference of the means. */
 double agree_within_errors(const char *test, const struct agree_image *a, const struct agree_image *b);
 
-/* The same as numbers, for tables: of the means and of the block that differs most. */
+/* The result of the comparison as numbers, for tables: of the means, and of the block that differs most. */
 struct agree_difference {
-	double mean, error; /* a's mean against b's, and its standard error, relative to b's */
+	double mean, error; /* a's mean minus b's, and its standard error, both relative to b's mean */
 	double found,
 		found_block; /* smallest bias of the mean, and of any block, that is found with 95 % probability */
 	bool holds;
 };
 void agree_measure(const struct agree_image *a, const struct agree_image *b, struct agree_difference *out);
 
-/* Fails unless every cell's mean is `expected` (same level and power, one-sample t). */
+/* Fails unless the mean of every cell is `expected` (same level and power, one-sample t). */
 void agree_expect(const char *test, const struct agree_image *a, double expected);
 
 #endif

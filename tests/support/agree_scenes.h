@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Scenes that are hard on the numbers, as tests/numerics/test_agree.c compares integrators on them. */
+/* Numerically difficult scenes, on which tests/numerics/test_agree.c compares integrators. */
 #ifndef TESTS_SUPPORT_AGREE_SCENES_H
 #define TESTS_SUPPORT_AGREE_SCENES_H
 
@@ -8,9 +8,9 @@
 struct agree_case {
 	const char *topic, *name;
 	struct world *(*make)(const struct agree_case *k); /* the caller frees it */
-	double a, b;					   /* what make takes */
+	double a, b;					   /* arguments of make */
 	uint32_t max_depth;
-	uint64_t path_spp, spp; /* of path, of the others */
+	uint64_t path_spp, spp; /* samples per pixel: of `path`, of the other integrators */
 	const char *against[4];
 	double find; /* smallest bias of the mean that the table must find */
 };

@@ -7,14 +7,14 @@
 
 #include <stddef.h>
 
-/* Of a frame in one piece, as envelope_pack makes it: malloc'd, never NULL. Hello and its answer, the first in their
- * direction, stay as they are. */
+/* Adds the checksum to a frame in one piece, as made by envelope_pack. The result is allocated with malloc() and
+ * never NULL. A hello and its answer, the first frames in their directions, stay as they are. */
 unsigned char *checksummed_frame(const unsigned char *frame, size_t size, size_t *out_size);
-/* The same of a header and a payload, which need not mean anything; first: it is the first in its direction, and a
- * hello or its answer gets the checksum of its bytes. */
+/* Like checksummed_frame(), for a header and a payload, which need not be valid. first: the frame is the first in
+ * its direction, and a hello or its answer gets the checksum of its bytes. */
 unsigned char *checksummed_parts(const void *header, size_t header_size, const void *payload, size_t payload_size,
 				 bool first, size_t *out_size);
-/* The same of a message. */
+/* Like checksummed_frame(), for a message. */
 unsigned char *checksummed_message(const Farm__Envelope *m, const void *payload, size_t payload_size, size_t *out_size);
 
 #endif

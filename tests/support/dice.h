@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Random numbers and sample counts for tests: a stream of the counter-based generator, seeded by the test's name, so
- * that a run is the same every time. HSLT_TEST_SCALE divides counts (sanitized runs), FULL=1 multiplies them by 8.
+ * that every run is the same. HSLT_TEST_SCALE divides counts (sanitized runs), FULL=1 multiplies them by 8.
  */
 #ifndef TESTS_SUPPORT_DICE_H
 #define TESTS_SUPPORT_DICE_H

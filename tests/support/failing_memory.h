@@ -6,7 +6,7 @@
 #ifndef TESTS_SUPPORT_FAILING_MEMORY_H
 #define TESTS_SUPPORT_FAILING_MEMORY_H
 
-/* The allocation after n successful ones fails, once; n < 0: none does. */
+/* Lets the next n allocations succeed and the one after them fail, once; n < 0: none fails. */
 void mem_fail_after(long n);
 
 #endif

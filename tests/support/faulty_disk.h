@@ -1,5 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
+ * A simulated disk behind common/base/disk.h and SQLite. Below one folder it carries out all calls, and keeps in memory
+ * what would remain after a loss of power. A file's bytes and length are safe after a flush of the file, its name after
+ * a flush of the folder. Of later changes, a loss of power keeps a random part: bytes by sector, lengths, and names one
+ * by one (created, renamed, removed). As on real systems, a failed flush of a file forgets the unwritten bytes, and the
+ * next flush reports success. What remains is written to another folder, and the process ends. Alternatively, calls
+ * fail from the n-th on.
+ *
+ * Must be used in a process of its own (fork): faulty_disk_begin replaces the disk functions and SQLite's default VFS
+ * for good. Any thread; nothing is really flushed. Films mapped into memory (O_TMPFILE) are ignored, because they do
+ * not survive anyway.
+ */
+/*
  * A disk of tests behind common/base/disk.h and behind SQLite: below one folder it does what is asked of it and keeps
  * beside, in memory, what a loss of power would leave. A file's bytes and length are safe after a flush of the file,
  * its name after a flush of the folder; of what was done since, a loss of power keeps a random part: of bytes by the
@@ -22,7 +34,7 @@
 
 enum { FAULTY_DISK_EXIT = 42, FAULTY_DISK_COUNTS = 5 };
 
-/* What is to be forgotten on purpose, to see whether a test notices: calls that do nothing and say that all is well. */
+/* Flushes to be skipped on purpose, to see whether a test notices: these calls do nothing and report success. */
 enum faulty_disk_forget {
 	FAULTY_DISK_FORGET_NOTHING,
 	FAULTY_DISK_FORGET_FILES = 1,
@@ -31,31 +43,31 @@ enum faulty_disk_forget {
 };
 
 struct faulty_disk {
-	const char *root;  /* absolute, there */
-	const char *after; /* what is left is put there; not there yet */
+	const char *root;  /* absolute path of an existing folder */
+	const char *after; /* folder for what remains; must not exist yet */
 	uint64_t seed;
-	uint64_t lose_at;    /* power is lost before this call that changes something, counted from 1; 0: never */
-	uint64_t fail_from;  /* calls fail, from this one of all on; 0: none */
-	uint64_t fail_count; /* so many */
-	int fail_with;	     /* errno */
-	uint64_t lose_after; /* power is lost so many calls that change something after the first that failed; 0: not */
-	bool fail_writes_only; /* as on a disk that is full, or read-only: reading and making room go on */
+	uint64_t lose_at;      /* power is lost before this modifying call, counted from 1; 0: never */
+	uint64_t fail_from;    /* calls fail from this one on, counting all calls; 0: none fails */
+	uint64_t fail_count;   /* number of calls that fail */
+	int fail_with;	       /* errno */
+	uint64_t lose_after;   /* power is lost this many modifying calls after the first failed call; 0: not */
+	bool fail_writes_only; /* as on a disk that is full or read-only: reading and removing still work */
 	enum faulty_disk_forget forget;
-	const char *forget_name; /* only of files or folders with this last part of their name; NULL: all */
-	/* Shared with the parent; NULL: nobody asks. [0]: calls that change something; [1]: all; [2]: those that
-	 * failed; [3]: sectors and names that were lost; [4]: not 0: power is lost before the next call that changes
-	 * something. */
+	const char *forget_name; /* only for files or folders whose last path component is this; NULL: for all */
+	/* Shared with the parent process; may be NULL. [0]: modifying calls; [1]: all calls; [2]: failed calls; [3]:
+	 * lost sectors and names; [4]: if not 0, power is lost before the next modifying call. */
 	_Atomic uint64_t *counts;
 };
 
 void faulty_disk_begin(const struct faulty_disk *l);
-void faulty_disk_power_off(void); /* now */
+void faulty_disk_power_off(void); /* loses power now */
 
 /* ---- for faulty_disk_vfs.c and faulty_disk_calls.c */
 
 struct faulty_disk_node;
 struct faulty_disk_node *faulty_disk_node_of(const char *path, bool create); /* NULL: not below the root */
-/* Before a call: 0, or the errno that it fails with. Locks; faulty_disk_leave unlocks. */
+/* Called before a disk call: returns 0, or the errno with which the call is to fail. Locks; faulty_disk_leave
+ * unlocks. */
 enum faulty_disk_call {
 	FAULTY_DISK_READS,
 	FAULTY_DISK_OPENS,

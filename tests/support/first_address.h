@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The first address that a name stands for. */
+/* Resolves a name to its first address. */
 #ifndef TESTS_SUPPORT_FIRST_ADDRESS_H
 #define TESTS_SUPPORT_FIRST_ADDRESS_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Files as earlier builds wrote them, kept in tests as the runs of their bytes that are not zero. */
+/* Files written by earlier versions, stored in tests as the runs of their non-zero bytes. */
 #ifndef TESTS_SUPPORT_GOLDEN_H
 #define TESTS_SUPPORT_GOLDEN_H
 
@@ -12,12 +12,12 @@ struct golden {
 	const char *hex;
 };
 
-/* Fills `size` bytes with these runs, and zeros between them. */
+/* Fills `size` bytes with these runs, and with zeros between them. */
 void golden_fill(const struct golden *runs, size_t count, unsigned char *bytes, size_t size);
-/* Fails where a file first differs from these bytes. */
+/* Fails at the first byte of the file that differs from these bytes. */
 void golden_compare(const char *path, const unsigned char *bytes, size_t size);
 
-/* Writes a file whose checksum fits, whatever is in it, and opens it. */
+/* Writes a file with a valid checksum, whatever its contents, and opens it. */
 void golden_open(struct checked_file *f, const char *path, const unsigned char *bytes, size_t size);
 
 #endif

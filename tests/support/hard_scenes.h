@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Scenes that are hard on the numbers: each topic a function of one parameter. In a room of side 4 or on a plate under
- * a lamp, 32 x 32 pixels. The caller frees the world.
+ * Numerically difficult scenes: each topic is a function of one parameter. In a room of side 4 or on a plate under a
+ * lamp, with 32 x 32 pixels. The caller frees the world.
  */
 #ifndef TESTS_SUPPORT_HARD_SCENES_H
 #define TESTS_SUPPORT_HARD_SCENES_H
@@ -13,7 +13,7 @@ struct hard_case {
 	struct world *(*make)(double parameter);
 	double parameter;
 	unsigned min_edges, max_edges;
-	const char *mutation; /* looked at alone */
+	const char *mutation; /* the mutation to test alone */
 };
 
 /* Ends with a NULL topic. */

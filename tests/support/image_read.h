@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A whole image from a source of files. */
+/* Reads a whole image from a source of files. */
 #ifndef TESTS_SUPPORT_IMAGE_READ_H
 #define TESTS_SUPPORT_IMAGE_READ_H
 

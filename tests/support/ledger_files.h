@@ -4,7 +4,7 @@
 #define TESTS_SUPPORT_LEDGER_FILES_H
 
 const char *ledger_files_path(const char *file); /* valid until the next call */
-/* As somebody else than the ledger would change it; fails the test where SQLite refuses. */
+/* Changes a file as somebody other than the ledger might; fails the test if SQLite refuses. */
 void ledger_files_change(const char *file, const char *sql);
 
 #endif

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * How long a test is. By default short enough for all of them together to take half an hour on two cores, each
- * comparison with the power that docs/design.md asks for; FULL=1 adds the comparisons left out to save time;
- * HSLT_TEST_SCALE=N takes N times fewer samples and asks for no power (sanitized runs: 20).
+ * The length of tests. By default all of them together take half an hour on two cores, each comparison with the power
+ * that docs/design.md demands; FULL=1 adds the comparisons left out to save time; HSLT_TEST_SCALE=N takes N times fewer
+ * samples and requires no power (sanitized runs: 20).
  */
 #ifndef TESTS_SUPPORT_LENGTH_H
 #define TESTS_SUPPORT_LENGTH_H

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Assets from memory: what a scene refers to, without files. */
+/* A source of assets in memory, for scenes without files. */
 #ifndef TESTS_SUPPORT_MEMORY_ASSETS_H
 #define TESTS_SUPPORT_MEMORY_ASSETS_H
 
@@ -11,7 +11,7 @@ struct memory_file {
 	size_t size;
 };
 
-/* files ends with a NULL name; a name that is not there gives -ENOENT. Must outlive the source. */
+/* files ends with a NULL name; opening any other name gives -ENOENT. The files must outlive the source. */
 struct asset_source memory_assets(const struct memory_file *files);
 
 #endif

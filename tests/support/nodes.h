@@ -10,9 +10,9 @@
 #include "worker/render/scene/scene.h"
 
 struct scene_node *node_make(struct arena *a, enum plugin_class cls, const char *text);
-/* A BSDF and what it holds, each after '|': "mask opacity=0.3 | plastic", a phase function after the word "phase", a
- * texture after the word "texture" or, if it has a name, after "@NAME". What these hold is after '/', and what those
- * hold after ';'. */
+/* Makes a BSDF and what it holds, each after '|': "mask opacity=0.3 | plastic", a phase function after the word
+ * "phase", a texture after the word "texture" or, if it has a name, after "@NAME". Contents of these follow after '/',
+ * and contents of the latter after ';'. */
 struct scene_node *node_bsdf(struct arena *a, const char *text);
 void node_add_child(struct arena *a, struct scene_node *n, const struct scene_node *child); /* without a name */
 void node_add_ref(struct arena *a, struct scene_node *n, const char *name, const struct scene_node *child);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Pictures in memory, as Radiance HDR files behind an asset source: pixel values must be exact in 8 bits of mantissa a
- * pixel (small multiples of powers of two). One thread; names are "p0", "p1", ...
+ * Pictures in memory, as Radiance HDR files behind an asset source. Pixel values must be exact with 8 bits of mantissa
+ * per pixel (small multiples of powers of two). One thread; names are "p0", "p1", ...
  */
 #ifndef TESTS_SUPPORT_PICTURES_H
 #define TESTS_SUPPORT_PICTURES_H

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* One scene in any units and at any place: a ball and a cube on a floor, under a ball that shines. */
+/* A scene in any units and at any position: a ball and a cube on a floor, under a ball that emits. */
 #ifndef TESTS_SUPPORT_PLACED_SCENE_H
 #define TESTS_SUPPORT_PLACED_SCENE_H
 
 #include "worker/render/world/world.h"
 
-enum { PLACED_SIDE = 32 }; /* pixels of its film */
+enum { PLACED_SIDE = 32 }; /* pixels of a side of its film */
 
-/* Scaled by s, then moved by m along all axes. ball, cube: their <bsdf>, or "". */
+/* Returns the scene, scaled by s, then moved by m along all axes. ball, cube: their <bsdf>, or "". */
 struct world *placed_scene(double s, double m, const char *ball, const char *cube);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Files of Mueller matrices (.pbsdf) that were not measured: their first elements by a formula, all others 7. */
+/* Synthetic files of Mueller matrices (.pbsdf): the first elements follow a formula, all others are 7. */
 #ifndef TESTS_SUPPORT_POLARIZED_FILE_H
 #define TESTS_SUPPORT_POLARIZED_FILE_H
 
@@ -10,8 +10,8 @@ typedef double polarized_f(double phi_d, double theta_d, double theta_h, double 
 
 enum { POLARIZED_WAVELENGTHS = 5 }; /* 450, 500, ... nm */
 
-/* With `phis` numbers along phi_d from -pi to pi, and `thetas` along each of the others from 0 to pi / 2. *size bytes;
- * the caller frees it. */
+/* Makes a file with `phis` numbers along phi_d from -pi to pi, and `thetas` along each of the others from 0 to pi /
+ * 2, of *size bytes; the caller frees it. */
 unsigned char *polarized_file_make(polarized_f *f, int phis, int thetas, size_t *size);
 
 #endif

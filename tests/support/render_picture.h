@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A whole picture of a world by plain leases, on two threads, with neither farm nor program: for comparing with
- * references. The same bits at each run. Anything wrong fails the test, contributions that were refused too.
+ * Renders a whole picture of a world with plain leases on two threads, without a farm or a program, for comparison with
+ * references. Every run gives the same bits. Any error, including contributions that were refused, fails the test.
  */
 #ifndef TESTS_SUPPORT_RENDER_PICTURE_H
 #define TESTS_SUPPORT_RENDER_PICTURE_H
@@ -12,13 +12,13 @@
 #include <stdint.h>
 
 struct render_picture_how {
-	const char *integrator; /* one that samples pixels */
-	const char *test;	/* the seed is this name's */
+	const char *integrator; /* must be one that samples pixels */
+	const char *test;	/* its name gives the seed */
 	uint64_t spp;
 	uint32_t max_depth; /* 0: the scene's */
 };
 
-/* At the world's film size. R, G, B of the picture are CIE X, Y, Z. picture_fini frees it. */
+/* Renders at the world's film size. R, G, B of the picture are CIE X, Y, Z. picture_fini frees it. */
 void render_picture_xyz(const struct world *w, const struct render_picture_how *how, struct picture *out);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Many renders of one world that differ in their seeds only, as hslt-render makes them, on two threads: for tests of
- * what is said about errors. Seeds follow from the test's name, so that results are the same at each run.
+ * Many renders of one world that differ only in their seeds, made as by hslt-render, on two threads: for tests of
+ * stated errors. Seeds follow from the test's name, so that results are the same in each run.
  */
 #ifndef TESTS_SUPPORT_REPEATS_H
 #define TESTS_SUPPORT_REPEATS_H
@@ -12,19 +12,19 @@
 struct repeats_how {
 	const char *integrator, *test;
 	uint32_t count;
-	uint64_t spp, bootstrap, epoch; /* 0: by the plan's rule; spp 0: until the target is met */
+	uint64_t spp, bootstrap, epoch; /* 0: by the plan's rule; for spp, until the target is met */
 	uint32_t chains, groups;
 	double target_error;
 };
 
-/* Looks at a render after each complete round; from one of two threads, but for one render from one only. */
+/* Examines a render after each complete round. Called from two threads, but for each render from only one of them. */
 typedef void repeats_look(void *user, uint32_t render, uint64_t rounds, const struct canvas *c);
 
 struct repeats {
 	uint32_t count, values; /* values: width x height x 3 */
-	struct plan plan;	/* of the first */
+	struct plan plan;	/* of the first render */
 	struct canvas_image *images;
-	double cpu_seconds; /* of all, in leases */
+	double cpu_seconds; /* of all leases together */
 };
 
 void repeats_run(const struct world *w, const struct repeats_how *how, repeats_look *look, void *user,

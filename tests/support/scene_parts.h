@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What a scene that was read says and has. One thread. */
+/* Looks up notes and objects of a scene that was read. One thread. */
 #ifndef TESTS_SUPPORT_SCENE_PARTS_H
 #define TESTS_SUPPORT_SCENE_PARTS_H
 
@@ -7,9 +7,9 @@
 
 #include <stdbool.h>
 
-/* A note that contains the text. */
+/* Returns whether there is a note that contains the text. */
 bool scene_has_note(const struct scene *s, const char *text);
-/* The object with that id; fails the test where there is none. */
+/* Returns the object with that id; fails the test if there is none. */
 const struct scene_node *scene_named(const struct scene *s, const char *id);
 
 #endif

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Peers of a coordinator, of a few lines each: a client, and a worker whose results depend on the lease alone and take
- * no time. Blocking, one thread. A coordinator that hangs up is an answer (NULL), one that says nothing for a minute
- * fails the test.
+ * Scripted peers of a coordinator: a client, and a worker whose results depend on the lease alone and take no time.
+ * Blocking, one thread. A coordinator that hangs up is reported as NULL; one that is silent for a minute fails the
+ * test.
  */
 #ifndef TESTS_SUPPORT_SCRIPTED_H
 #define TESTS_SUPPORT_SCRIPTED_H
@@ -16,36 +16,36 @@ struct scripted {
 	unsigned char bytes[1 << 16];
 	size_t at, size;
 	struct envelope env;
-	unsigned heartbeats; /* heard */
+	unsigned heartbeats; /* number received */
 };
 
-/* The port that a coordinator writes into this file once it listens; 0: not within a minute. */
+/* Returns the port that a coordinator writes into this file once it listens; 0: not within a minute. */
 uint16_t scripted_port(const char *port_file);
-struct scripted *scripted_connect(uint16_t port); /* without a word; NULL: nobody answers */
+struct scripted *scripted_connect(uint16_t port); /* sends nothing; NULL: nobody answers */
 const Farm__HelloAck *scripted_hello(struct scripted *p, uint32_t version, Farm__Role role); /* NULL: no such answer */
 struct scripted *scripted_call(uint16_t port, Farm__Role role);				     /* NULL: nobody answers */
 void scripted_hang_up(struct scripted *p);						     /* NULL: nothing */
 bool scripted_say(const struct scripted *p, const Farm__Envelope *m, const void *payload,
 		  size_t size); /* false: it hung up */
-/* The next message but heartbeats, valid until the next call; the payload is in p->reader. */
+/* Returns the next message that is not a heartbeat, valid until the next call; the payload is in p->reader. */
 const Farm__Envelope *scripted_hear(struct scripted *p);
-bool scripted_is_merged(const Farm__Envelope *m);	 /* the word that a result is, and stored; NULL is not */
-bool scripted_has(struct scripted *p, int milliseconds); /* something to hear, or the end */
+bool scripted_is_merged(const Farm__Envelope *m);	 /* m says that a result is merged and stored; not NULL */
+bool scripted_has(struct scripted *p, int milliseconds); /* there is a message, or the connection has ended */
 
 /* Two groups of eight chains on a film of 20 x 10. */
 extern const struct plan_request scripted_request;
 bool scripted_submit(const struct scripted *p, const struct plan_request *r, const char *scene);
-/* Sends the scene, too, if it is asked for. The job; a refusal fails the test. */
+/* Sends the scene as well if it is asked for. Returns the job; a refusal fails the test. */
 uint64_t scripted_submit_whole(struct scripted *p, const struct plan_request *r, const char *scene);
 bool scripted_send_scene(const struct scripted *p, const char *scene);
 bool scripted_want(const struct scripted *p, uint32_t leases);
 bool scripted_list(const struct scripted *p);
 bool scripted_fetch(const struct scripted *p, uint64_t job, Farm__What what, uint64_t offset);
 
-/* Even-tempered light that is another in every lease; chain states of so many bytes that begin with a number of the
- * lease. */
+/* Makes a result: uniform light that differs for every lease, and chain states of state_bytes bytes that begin with
+ * the lease's tag. */
 struct batch scripted_batch(const struct lease_key *k, const struct plan *plan, uint32_t state_bytes);
 bool scripted_send(const struct scripted *p, const struct batch *b, const struct plan *plan);
-uint64_t scripted_tag(const struct lease_key *k); /* the number that its chain states begin with */
+uint64_t scripted_tag(const struct lease_key *k); /* the number with which the lease's chain states begin */
 
 #endif

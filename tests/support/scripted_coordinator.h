@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A coordinator of a few lines for one worker. Both are in this thread, and the coordinator runs the worker's loop, so
- * the order of messages does not depend on chance. Jobs 1 to 4 have a scene file each, which holds no scene, so that
- * leases fail as soon as all files are there; and they share the file of a mesh. A message that is not the expected one
- * fails the test.
+ * A scripted coordinator for one worker. Both run in this thread, and the coordinator runs the worker's loop, so that
+ * the order of messages is deterministic. Each of jobs 1 to 4 has its own scene file, which contains no scene, so that
+ * leases fail as soon as all files have arrived; the jobs share one mesh file. An unexpected message fails the test.
  */
 #ifndef TESTS_SUPPORT_SCRIPTED_COORDINATOR_H
 #define TESTS_SUPPORT_SCRIPTED_COORDINATOR_H
@@ -38,23 +37,22 @@ void coord_finish(void);
 void coord_welcome(void); /* accepts a connection of the worker */
 void coord_hang_up(void);
 
-const Farm__Envelope *coord_hear(void); /* NULL: it hung up */
+const Farm__Envelope *coord_hear(void); /* NULL: the worker hung up */
 void coord_hear_job_get(uint64_t job);
 void coord_hear_blob_get(const struct coord_file *f, uint64_t offset);
 uint64_t coord_hear_failed(const char *why); /* with `why` in its text; returns the job */
-void coord_hear_built(int count); /* so many jobs had all files: their leases fail, as their scenes cannot be read */
-void coord_hear_silence(void);	  /* nothing is on its way: the answer to another message comes first */
+void coord_hear_built(int count); /* `count` jobs had all files: their leases fail, as their scenes cannot be read */
+void coord_hear_silence(void);	  /* checks that no message is on its way: the answer to another message comes first */
 
 void coord_say_grant(uint64_t job);
-void coord_grant(uint64_t job); /* of a job that the worker does not know: it must ask for it */
+void coord_grant(uint64_t job); /* a lease of a job that the worker does not know, so that it asks for the job */
 void coord_say_revoke(uint64_t job);
 void coord_describe(uint64_t job);
 void coord_end_job(uint64_t job);
 void coord_send_piece(struct coord_file *f, uint64_t offset);
 /* Sends pieces from .. to - 1 of the mesh, each after the worker has asked for it. */
 void coord_serve_mesh(int from, int to);
-/* Grants a lease of each of jobs 1 to count, and sends their scene files. The worker then asks for the mesh, once for
- * all. */
+/* Grants one lease each of jobs 1 to count, and sends their scene files. The worker then asks for the mesh once. */
 void coord_begin_jobs(uint64_t count);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A test program in several processes side by side, where most of the time somebody waits: each does its share of the
- * runs. What the others print is shown when one of them fails.
+ * Runs a test program as several processes side by side, for tests that spend most of their time waiting; each runs its
+ * share of the cases. The output of the others is shown if one of them fails.
  */
 #ifndef TESTS_SUPPORT_SHARES_H
 #define TESTS_SUPPORT_SHARES_H
@@ -10,9 +10,9 @@
 
 enum { SHARES = 4 };
 
-/* Makes the others; which share is this process's, from 0. */
+/* Starts the other processes. Returns the number of this process's share, from 0. */
 unsigned shares_begin(void);
-/* In share 0: waits for the others. false: one of them failed. */
+/* In share 0, waits for the others. Returns false if one of them failed. */
 bool shares_pass(void);
 
 #endif

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/* Grids of numbers (worker/render/volume/grid.h), evaluated slowly: values as weighted sums over points; integrals
+ * by three points, exact for cubic polynomials, between all planes that the ray crosses, sorted. */
 /*
  * Grids of numbers (worker/render/volume/grid.h) the slow way: values as weighted sums over points, integrals by
  * three points, which are exact for cubic polynomials, between all planes that the ray crosses anywhere, sorted.
@@ -8,12 +10,12 @@
 
 #include "worker/render/volume/grid.h"
 
-/* Of a ray's point. */
+/* Computes the position, in cells, of the ray's point at t. */
 void slow_grid_cells(const struct grid *g, const struct grid_ray *r, double t, double x[3]);
-/* At a place in cells. */
+/* Returns the value at a position in cells. */
 double slow_grid_value(const struct grid *g, const double x[3], int channel);
-bool slow_grid_has(const struct grid *g, vec3 p); /* its box does, a place in the world */
-/* Up to 1000 at most. */
+bool slow_grid_has(const struct grid *g, vec3 p); /* whether the grid's box contains p, a point in the world */
+/* Returns the integral along the ray, up to t = 1000 at most. */
 double slow_grid_integral(const struct grid *g, const struct grid_ray *r, int channel);
 
 #endif

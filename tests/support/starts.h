@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Whole paths in exact proportion to f, for tests of what a Markov chain does with them: the paths that bdpt makes of
- * independent pairs of sub-paths, resampled by what each contributes there. A group's paths are independent of all
- * other groups'; within one they may repeat. One thread.
+ * Whole paths in exact proportion to f, for tests of what a Markov chain makes of them: the paths that bdpt makes of
+ * independent pairs of sub-paths, resampled by their contributions. The paths of a group are independent of those of
+ * all other groups; within a group they may repeat. One thread.
  */
 #ifndef TESTS_SUPPORT_STARTS_H
 #define TESTS_SUPPORT_STARTS_H
@@ -11,10 +11,10 @@
 
 enum { STARTS_MAX_EDGES = 8 };
 
-struct start { /* technique s of that pair of sub-paths */
+struct start { /* technique s of pair `index` of sub-paths */
 	uint64_t index;
 	unsigned s, passed;
-	double sum; /* of the contributions up to here */
+	double sum; /* sum of the contributions up to this one */
 };
 
 struct starts {
@@ -27,18 +27,19 @@ struct starts {
 	uint64_t pairs;
 };
 
-/* A context for films of 32 x 32 and paths of min_depth..max_depth edges; counters are the caller's. */
+/* Makes a context for films of 32 x 32 and paths of min_depth..max_depth edges; the caller owns the counters. */
 void starts_context(struct path_context *c, const struct world *w, unsigned min_depth, unsigned max_depth,
 		    uint64_t *counters);
 
-/* The group's own pairs. starts_fini frees. */
+/* Samples the group's own pairs. starts_fini frees them. */
 void starts_init(struct starts *s, struct path_context *c, uint64_t seed, uint64_t group, uint64_t pairs);
 void starts_fini(struct starts *s);
 
-/* Contribution of all paths of that many edges, per pair: its expectation is the integral of f. */
+/* Returns the contribution of all paths with that number of edges, per pair: its expectation is the integral of f. */
 double starts_weight(const struct starts *s, unsigned edges);
 
-/* The path at u in [0,1) of the sum. false: there is none (or it lies just outside the film's border). */
+/* Makes the path at the fraction u in [0,1) of the sum. Returns false if there is none (or if it lies just outside
+ * the film's border). */
 bool starts_path(struct starts *s, unsigned edges, double u, struct full_path *x);
 
 #endif

@@ -1,18 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Does a mutation leave the distribution of paths as it is? A test of one mutation alone, also of one forced (b, c), on
+ * Does a mutation leave the distribution of paths unchanged? Tests a single mutation, possibly forced to (b, c), on
  * paths of given lengths.
  *
- * Paths are drawn in proportion to f, by resampling bdpt's bootstrap; each makes STATIONARY_STEPS mutations. Whatever
- * one looks at then has the same mean after the mutations as before, and only the difference is looked at: what makes
- * bdpt and plain chains noisy, where the paths are and what b is, is the same in both and cancels. The mean over the
- * steps is the image of a chain of which each STATIONARY_STEPS-th proposal is an independent one that is always
- * accepted: the bias found is the bias of that image.
+ * Paths are drawn in proportion to f, by resampling bdpt's bootstrap, and each makes STATIONARY_STEPS mutations. Any
+ * function then has the same mean after the mutations as before, and only the difference is tested: the positions of
+ * the paths and the value of b, which make bdpt and plain chains noisy, are the same in both and cancel. The mean over
+ * the steps is the image of a chain of which every STATIONARY_STEPS-th proposal is an independent one that is always
+ * accepted, so the bias found is the bias of that image.
  *
- * Looked at: four soft quarters of the film (bilinear, so that a step of some pixels is a small change), the shares of
- * X and Z of the whole image, and of some vertices place, slope of the half vector and cosine; geometry terms; point of
- * the aperture, wavelength. Groups are independent; by Student's t between them, level 1e-6 a case, shared by Holm's
- * method. Deterministic.
+ * The functions are: four soft quarters of the film (bilinear, so that a step of some pixels is a small change); the
+ * fractions of X and Z of the whole image; for some vertices the position, the slope of the half vector and the cosine;
+ * geometry terms; the point on the aperture; the wavelength. Groups are independent; Student's t between them, at level
+ * 1e-6 per case, shared by Holm's method. Deterministic.
  */
 #ifndef TESTS_SUPPORT_STATIONARY_H
 #define TESTS_SUPPORT_STATIONARY_H
@@ -28,13 +28,13 @@ enum {
 	STATIONARY_COLOURS = 2
 };
 
-/* Faults planted in the acceptance, to see that they are found. */
+/* Faults planted in the acceptance probability, to see that they are found. */
 enum stationary_fault { STATIONARY_SOUND, STATIONARY_NO_TRANSFER, STATIONARY_NO_DENSITY, STATIONARY_NO_GEOMETRY };
 
 struct stationary_how {
 	const char *mutation; /* "hslt@b2c0" */
 	unsigned min_edges, max_edges;
-	uint32_t starts, bootstrap; /* a group; divided by HSLT_TEST_SCALE */
+	uint32_t starts, bootstrap; /* per group; divided by HSLT_TEST_SCALE */
 	enum stationary_fault fault;
 };
 
@@ -42,35 +42,35 @@ struct stationary_result {
 	uint64_t starts, proposals, accepted;
 	uint64_t counters[BATCH_COUNTERS];
 	uint64_t strategy[STRATEGY_COUNTERS];
-	uint64_t checked;						/* end states that path_check looked at */
-	char failure[256];						/* of path_check, or the bootstrap; "": none */
+	uint64_t checked;  /* number of final states examined by path_check */
+	char failure[256]; /* message of path_check or the bootstrap; "": none */
 	double bias[STATIONARY_FUNCTIONS], error[STATIONARY_FUNCTIONS]; /* of the mean; relative; 0: never changes */
 	double least_block, least_colour,
-		least_other; /* smallest bias found with 95 % probability: largest of their kind */
+		least_other; /* smallest bias found with 95 % probability: the largest for each kind of function */
 	int worst;	     /* the function that differs most */
-	double p;	     /* of it, times the number of functions */
-	double share;	     /* accepted mutations of accepted mutations and starts */
+	double p;	     /* p of that function, times the number of functions */
+	double share;	     /* accepted mutations as a fraction of accepted mutations and starts */
 	double seconds;	     /* CPU */
 };
 
-/* Before runs on paths of given lengths: the bootstrap's roulette would leave few of the long ones. */
+/* Call before runs on paths of given lengths: otherwise the bootstrap's roulette would leave few long paths. */
 void stationary_keep_long_starts(struct world *w);
 
-/* What mutations on paths of the same world and the same lengths may start from together: finding the starts takes a
- * third of the time of a mutation. Begins as zeros; the first run finds them, with its own seed. */
+/* Common starts of several mutations on paths of the same world and the same lengths: finding starts takes a third
+ * of the time of a mutation. Initialize with zeros; the first run finds the starts, with its own seed. */
 struct stationary_starts {
-	uint64_t seed, *index; /* of the bootstrap, all groups after each other */
+	uint64_t seed, *index; /* indices in the bootstrap, for all groups in turn */
 	double weight[STATIONARY_GROUPS];
 };
 void stationary_forget(struct stationary_starts *s);
 
-/* As many starts and as long a bootstrap as in the run that found `from`. */
+/* Needs as many starts and as long a bootstrap as the run that found `from`. */
 void stationary_run_from(const struct world *w, const char *test, const struct stationary_how *how,
 			 struct stationary_starts *from, struct stationary_result *out);
 void stationary_run(const struct world *w, const char *test, const struct stationary_how *how,
 		    struct stationary_result *out);
 const char *stationary_function(int i);
-/* p above the level, no path that fails its check, nothing invalid. */
+/* Returns whether p is above the level, no path failed its check, and nothing was invalid. */
 bool stationary_holds(const struct stationary_result *r);
 
 #endif

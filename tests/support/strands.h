@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Chains of round cones for tests, and their distance found by searching along their axes: the union of all spheres
- * between neighbours, without any formula for cones.
+ * Chains of round cones for tests, and their distance, found by searching along their axes: each is the union of all
+ * spheres between neighbouring points, without any formula for cones.
  */
 #ifndef TESTS_SUPPORT_STRANDS_H
 #define TESTS_SUPPORT_STRANDS_H
@@ -11,7 +11,7 @@
 
 enum { STRAND_MAX = 64 };
 
-/* One chain, with the arrays that its curves point to. Not to be copied. */
+/* One chain, with the arrays to which its curves point. Must not be copied. */
 struct strand {
 	struct curves c;
 	float point[STRAND_MAX][4], start[STRAND_MAX], v[STRAND_MAX], tangent[STRAND_MAX][3];
@@ -20,16 +20,17 @@ struct strand {
 
 void strand_begin(struct strand *s);
 void strand_add(struct strand *s, vec3 p, double radius);
-/* The last ends there; another begins. */
+/* Ends the chain at its last point; the next point begins another. */
 void strand_end(struct strand *s);
-/* Tangents, in the mean of the axes around each point and off by up to `turn`. */
+/* Sets tangents: the mean of the axes around each point, rotated by up to `turn`. */
 void strand_smooth(struct strand *s, double turn, struct dice *d);
-/* A chain that turns at random by at most `turn`, around the origin; lengths of pieces and radii in these ranges. */
+/* Makes a chain around the origin that turns at random by at most `turn` at each point; lengths of pieces and radii
+ * are in the given ranges. */
 void strand_random(struct strand *s, uint32_t count, double turn, const double length[2], const double radius[2],
 		   struct dice *d);
 
-/* The distance of p from the sphere that is the nearest of all between both centers, in double. */
+/* Returns the distance of p from the nearest of all spheres between the two centres, in double. */
 double strand_cone_distance(const float a[4], const float b[4], vec3 p);
-double strand_distance(const struct strand *s, vec3 p); /* the least of all cones' */
+double strand_distance(const struct strand *s, vec3 p); /* the least distance over all cones */
 
 #endif

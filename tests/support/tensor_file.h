@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Writes files of arrays of numbers (worker/render/bsdf/tensor.h). One thread; out of memory aborts. */
+/* Writes tensor files, arrays of numbers (worker/render/bsdf/tensor.h). One thread; out of memory aborts. */
 #ifndef TESTS_SUPPORT_TENSOR_FILE_H
 #define TESTS_SUPPORT_TENSOR_FILE_H
 
@@ -18,12 +18,12 @@ struct tensor_file {
 	size_t count;
 };
 
-/* Its bytes, zeros. */
+/* Returns the bytes of a new array, which are zeros. */
 unsigned char *tensor_file_add(struct tensor_file *f, const char *name, unsigned type, unsigned dimensions,
 			       const int *shape);
-void tensor_file_put(unsigned char **at, double x); /* a float, and goes on to the next */
+void tensor_file_put(unsigned char **at, double x); /* stores a float and advances *at */
 
-/* The file, of *size bytes; the caller frees it. */
+/* Returns the file, of *size bytes; the caller frees it. */
 unsigned char *tensor_file_end(struct tensor_file *f, size_t *size);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Mitsuba's files of grids (.vol), made from functions. */
+/* Mitsuba's grid files (.vol), made from functions. */
 #ifndef TESTS_SUPPORT_VOL_H
 #define TESTS_SUPPORT_VOL_H
 
@@ -18,9 +18,9 @@ struct vol {
 /* x, y, z: from 0 at the first point to 1 at the last. */
 typedef double vol_field(double x, double y, double z, uint32_t channel);
 
-/* The box is the unit cube. */
+/* Makes a grid whose box is the unit cube. */
 void vol_make(struct vol *v, const uint32_t side[3], uint32_t channels, vol_field *f);
-/* The bytes of its values as they are now. */
+/* Writes the current values into the bytes. */
 void vol_write(struct vol *v);
 void vol_set_box(struct vol *v, const float low[3], const float high[3]);
 void vol_put32(struct vol *v, size_t at, uint32_t word);
