@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Do two integrators render the same image? (agree.h) Groups are rendered by threads, each batch's film is added up
- * per block; judge_cells tests the differences of the blocks' means by Welch's t between groups, at a level shared by
+ * Do two integrators render the same image? (agree.h) Groups are rendered by threads; the film of each batch is summed
+ * per block. judge_cells tests the differences of the blocks' means by Welch's t between groups, at a level shared by
  * all cells, and prints which bias would have been found.
  */
 #include "worker/render/render.h"
@@ -22,7 +22,7 @@
 
 #include <cmocka.h>
 
-/* Comparisons in the whole suite, at most: the family-wise level of 1e-4 is shared among them. */
+/* Limit on the comparisons in the whole suite: they share the family-wise level of 1e-4. */
 enum { COMPARISONS = 128 };
 #define LEVEL (1e-4 / COMPARISONS)
 
@@ -30,7 +30,7 @@ enum { COMPARISONS = 128 };
 struct group_run {
 	const struct world *w;
 	const struct plan *p;
-	const struct brightness *map; /* of all groups, as in a render */
+	const struct brightness *map; /* shared by all groups, as in a render */
 	uint32_t group;
 	double *mean;
 	double sum[AGREE_CELLS + 1];
@@ -231,7 +231,7 @@ void agree_render(const struct world *w, const char *test, const char *side, con
 }
 
 struct cell {
-	double mean, error2, degrees; /* squared standard error */
+	double mean, error2, degrees; /* error2: squared standard error */
 };
 
 static struct cell cell_stats(const struct agree_image *a, int c)
@@ -282,7 +282,7 @@ static double p_of(const struct verdict *v)
 	return v->error > 0 ? stats_student_t_p(v->difference / v->error, v->degrees) : v->difference == 0;
 }
 
-/* Holm over the cells; the power is that of the strictest step. */
+/* Tests the cells by Holm's method; the power is that of the strictest step. */
 static void judge_cells(const char *test, const struct verdict *v, bool powerful)
 {
 	int cells = AGREE_CELLS + 1;
@@ -293,11 +293,11 @@ static void judge_cells(const char *test, const struct verdict *v, bool powerful
 			worst_block = fmax(worst_block, least);
 		else
 			mean_power = least;
-		/* A bias of twice the least that is found must be found here and now. */
+		/* A planted bias of twice the smallest detectable one must be found. */
 		double planted = v[c].difference + copysign(2 * least, v[c].difference);
 		if (v[c].error > 0 && stats_student_t_p(planted / v[c].error, v[c].degrees) > LEVEL / cells)
 			fail_msg("%s: cell %d does not see a planted bias of %.2g %%", test, c, 200 * least);
-		/* Holm's first step: the smallest of the p-values against level / cells. */
+		/* Holm's first step: the smallest p-value is compared with level / cells. */
 		if (p < LEVEL / cells)
 			fail_msg("%s: cell %d differs by %.3g %% +- %.2g %% (p = %.1e)", test, c, 100 * v[c].difference,
 				 100 * v[c].error, p);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Scenes that are hard on the numbers, for the comparison of integrators: very small and very large things, tilted
- * planes, glass inside glass, fibres, poles, clouds, media that contradict each other. Each function makes one world;
- * the table at the end says at which sizes, with how many samples, and which bias must be found.
+ * Numerically difficult scenes for the comparison of integrators: very small and very large objects, tilted planes,
+ * glass inside glass, fibres, poles, clouds, media that contradict each other. Each function makes one world; the table
+ * at the end gives the sizes, the numbers of samples, and the bias that must be found.
  */
 /* Scenes are laid out by hand. */
 /* clang-format off */
@@ -21,8 +21,8 @@
 #define FILM "<film type='hdrfilm'><rfilter type='box'/></film>"
 #define ALL {"bdpt", "pssmlt", "hslt"}
 
-/* A cube and a ball of metal under a lamp, a few `a` large, on a ground that is `b` wide. TURN: the same for all, so
- * that nothing is along the axes. */
+/* A cube and a ball of metal under a lamp, a few `a` large, on a ground that is `b` wide. TURN rotates all of them,
+ * so that nothing is aligned with the axes. */
 #define TURN "<rotate x='1' z='0.3' angle='20'/>"
 #define SCALED "<scale value='%.17g'/>" TURN
 #define SMALL_THINGS                                                                                                            \
@@ -44,8 +44,8 @@ static struct world *on_a_floor(const struct agree_case *k)
 			     SMALL_VALUES(k->a), k->b);
 }
 
-/* The floor is turned about an axis that it does not lie along, and its middle is elsewhere: each of its vertices is
- * rounded in another way. */
+/* The floor is rotated about an axis that it does not contain, and its centre is elsewhere: each of its vertices is
+ * rounded differently. */
 static struct world *on_a_tilted_floor(const struct agree_case *k)
 {
 	return world_of_text(32, 32, SMALL_THINGS
@@ -54,7 +54,7 @@ static struct world *on_a_tilted_floor(const struct agree_case *k)
 			     SMALL_VALUES(k->a), k->b);
 }
 
-/* The floor is not under its own centre, a second one hangs far above, and the sun is a ball as far away as that. */
+/* The floor is off-centre, a second one hangs far above, and the sun is a ball at the same distance. */
 static struct world *beside_a_floor(const struct agree_case *k)
 {
 	double b = k->b;
@@ -73,7 +73,7 @@ static struct world *on_a_ball(const struct agree_case *k)
 			     SMALL_VALUES(k->a), k->b);
 }
 
-/* What is small stands on a table, that on the floor. */
+/* The small objects stand on a table, which stands on the floor. */
 static struct world *on_a_table(const struct agree_case *k)
 {
 	return world_of_text(32, 32, SMALL_THINGS
@@ -83,7 +83,7 @@ static struct world *on_a_table(const struct agree_case *k)
 			     SMALL_VALUES(k->a), sqrt(k->a * k->b), k->b);
 }
 
-/* All walls mirror `a` of the light; a lamp hangs within. */
+/* All walls mirror the fraction `a` of the light; a lamp hangs inside. */
 static struct world *mirror_box(const struct agree_case *k)
 {
 	return world_of_text(32, 32, SENSOR("0,0.2,0.9", "0.1,-0.1,-1")
@@ -94,9 +94,9 @@ static struct world *mirror_box(const struct agree_case *k)
 			     k->a);
 }
 
-/* A rod of glass, `a` wide and 2 long, that is lit at one end and looked into at the other, from so near that light has
- * bounced 64 times and more. Nothing is lost on the way: roulette would keep one path in thirty, and those would be the
- * noise of the image. */
+/* A glass rod, `a` wide and 2 long, lit at one end and seen at the other, from so near that light has bounced 64
+ * times and more. Nothing is lost on the way: roulette would keep one path in thirty, and these would be the noise of
+ * the image. */
 static struct world *fibre(const struct agree_case *k)
 {
 	return world_of_text(32, 32, "<integrator type='path'><integer name='rr_depth' value='128'/></integrator>"
@@ -119,8 +119,8 @@ static struct world *fibre(const struct agree_case *k)
 		FILM \
 	"</sensor>"
 
-/* A lamp that shines down lies in the lower side of a slab of glass and across its rim; another, which shines up, in
- * the upper side, a times as wide as the slab. */
+/* A lamp that shines down lies in the lower side of a slab of glass and across its rim; another one, `a` times as
+ * wide as the slab, shines up from the upper side. */
 static struct world *lamp_in_glass(const struct agree_case *k)
 {
 	return world_of_text(32, 32, LOOK_AT_IT GROUND SKY
@@ -134,7 +134,7 @@ static struct world *lamp_in_glass(const struct agree_case *k)
 			     0.8 * k->a, 0.8 * k->a);
 }
 
-/* Glass and water, side by side with a face in common, on a ground whose plane holds the lower faces of both. */
+/* Glass and water, side by side with a common face, on a ground whose plane contains the lower faces of both. */
 static struct world *glass_and_water(const struct agree_case *k)
 {
 	(void)k;
@@ -144,7 +144,8 @@ static struct world *glass_and_water(const struct agree_case *k)
 				GLASS("1.33") "</shape>");
 }
 
-/* A ball of glass holds one of water, that one of air, and there is another ball of glass in the same place. */
+/* A ball of glass contains one of water, which contains one of air, and there is another ball of glass in the same
+ * place. */
 static struct world *balls_in_balls(const struct agree_case *k)
 {
 #define BALL(radius, bsdf) \
@@ -163,7 +164,7 @@ static struct world *balls_in_balls(const struct agree_case *k)
 			     BALL("0.4", BETWEEN("1", "1.33")) BALL("0.8", GLASS("2.4")));
 }
 
-/* A ball of water in a skin of glass that is a of its radius thick. */
+/* A ball of water in a shell of glass whose thickness is the fraction `a` of its radius. */
 static struct world *balls_in_a_shell(const struct agree_case *k)
 {
 	return world_of_text(32, 32, LOOK_AT_IT GROUND SKY BALL("0.8", GLASS("1.5"))
@@ -172,7 +173,7 @@ static struct world *balls_in_a_shell(const struct agree_case *k)
 			     0.8 * (1 - k->a));
 }
 
-/* The same lamp three times, as someone pastes it: it shines once. */
+/* The same lamp three times, as if pasted by mistake: it shines once. */
 static struct world *lamp_pasted(const struct agree_case *k)
 {
 #define LAMP "<shape type='rectangle'>" AT("<scale value='0.6'/><rotate x='1' angle='90'/><translate y='1.6'/>" TURN) \
@@ -182,8 +183,8 @@ static struct world *lamp_pasted(const struct agree_case *k)
 			     "<shape type='cube'>" AT("<scale value='0.3'/><translate y='0.3'/>" TURN) GREY("0.5") "</shape>");
 }
 
-/* The pole of a displaced ball, where the meridians of its texture meet: steps as high as a, near and from above; of
- * metal (b = 0) or glass. */
+/* The pole of a displaced ball, where the meridians of its texture meet: steps of height `a`, seen from near and
+ * above; of metal (b = 0) or glass. */
 static struct world *displaced_pole(const struct agree_case *k)
 {
 	static const char *const matter[] = {"<bsdf type='roughconductor'><string name='material' value='Au'/>"
@@ -203,7 +204,7 @@ static struct world *displaced_pole(const struct agree_case *k)
 			     k->a, matter[(int)k->b]);
 }
 
-/* A lamp lies on a block of glass, which it touches in a point; another stands on it with its edge. */
+/* A lamp lies on a block of glass, touching it in a point; another stands on it on its edge. */
 static struct world *lamp_on_glass(const struct agree_case *k)
 {
 	(void)k;
@@ -216,8 +217,8 @@ static struct world *lamp_on_glass(const struct agree_case *k)
 			     "<emitter type='area'><rgb name='radiance' value='3'/></emitter></shape>");
 }
 
-/* A sheet that shines on both sides, between balls; and a half transparent box around a ball that does, so that light
- * from its inside comes out. */
+/* A sheet that emits from both sides, between balls, and a semitransparent box around an emitting ball, so that
+ * light leaves the box. */
 static struct world *two_sided_lamps(const struct agree_case *k)
 {
 	(void)k;
@@ -236,7 +237,7 @@ static struct world *two_sided_lamps(const struct agree_case *k)
 			     "<shape type='sphere'>" AT("<scale value='0.2'/><translate y='0.5' z='-1'/>" TURN) GREY("0.7") "</shape>");
 }
 
-/* A square and a disk that shine along their normals, on a ball and on a ground. */
+/* A square and a disk that emit along their normals, onto a ball and a ground. */
 static struct world *beams(const struct agree_case *k)
 {
 	(void)k;
@@ -249,8 +250,8 @@ static struct world *beams(const struct agree_case *k)
 			     "<emitter type='directionalarea'><rgb name='radiance' value='5'/></emitter></shape>");
 }
 
-/* A wall stands before the near plane and another behind the far one, which cuts the ground: of neither does the camera
- * see anything. a = 1: the camera is orthographic, and the first wall behind it. */
+/* One wall is in front of the near plane and another behind the far plane, which cuts the ground: the camera sees
+ * neither. a = 1: the camera is orthographic, and the first wall is behind it. */
 static struct world *clipped_view(const struct agree_case *k)
 {
 #define CLIPPED(type, more, turn) "<sensor type='" type "'>" more "<float name='near_clip' value='2'/><float name='far_clip' value='7'/>" \
@@ -268,7 +269,7 @@ static struct world *clipped_view(const struct agree_case *k)
 			     k->a > 0 ? 6. : 4.);
 }
 
-/* A sky of 16 x 8 texels of about 1, one of which is 1.3e8. */
+/* A sky of 16 x 8 texels of about 1, except for one of 1.3e8. */
 static struct world *bright_texel(const struct agree_case *k)
 {
 	enum { WIDTH = 16, HEIGHT = 8 };
@@ -290,7 +291,7 @@ static struct world *bright_texel(const struct agree_case *k)
 	return world_of_files(32, 32, files);
 }
 
-/* The unit sphere by 8 meridians and 4 circles, with its normals and texture coordinates. */
+/* The unit sphere, made of 8 meridians and 4 circles of latitude, with its normals and texture coordinates. */
 static size_t coarse_sphere(char *out, size_t size)
 {
 	size_t at = 0;
@@ -311,7 +312,7 @@ static size_t coarse_sphere(char *out, size_t size)
 }
 
 /* Anisotropic metal, anisotropic glass, and a normal map on meshes of few triangles, one of them a stretched and
- * mirrored instance: their frames turn within each triangle. */
+ * mirrored instance: their frames rotate within each triangle. */
 static struct world *smooth_tangents(const struct agree_case *k)
 {
 	static char xml[1 << 12], obj[1 << 13];
@@ -338,7 +339,7 @@ static struct world *smooth_tangents(const struct agree_case *k)
 	return world_of_files(32, 32, files);
 }
 
-/* Each material has parts with different normals, some by a bump map with 8 x 8 heights. a = 1: among them glass. */
+/* Each material has parts with different normals, some from a bump map with 8 x 8 heights. a = 1: some are glass. */
 static struct world *tilted_parts(const struct agree_case *k)
 {
 	enum { SIDE = 8 };
@@ -382,7 +383,7 @@ static struct world *tilted_parts(const struct agree_case *k)
 	return world_of_files(32, 32, files);
 }
 
-/* Normals bent so far that many face away from the camera. a = 1: rough glass among them. */
+/* Normals bent so far that many face away from the camera. a = 1: some on rough glass. */
 static struct world *turned_normals(const struct agree_case *k)
 {
 #define STEEP(inner) \
@@ -406,8 +407,8 @@ static struct world *turned_normals(const struct agree_case *k)
 	return world_of_text(32, 32, "%s", xml);
 }
 
-/* A ball of coloured glass around a stone, which states no medium, and a bubble; beside it water with a lamp in it. All
- * in haze of that density, in which the camera stands. */
+/* A ball of coloured glass around a stone, which states no medium, and a bubble; beside it water with a lamp in it.
+ * Everything is in haze of that density, and so is the camera. */
 #define WITHIN(side, sigma) \
 	"<medium type='homogeneous' name='" side "'>" \
 		"<rgb name='sigma_a' value='" sigma "'/>" \
@@ -445,8 +446,8 @@ static struct world *absorbing_media(const struct agree_case *k)
 			     "<emitter type='area'><rgb name='radiance' value='5'/></emitter></shape>", k->a);
 }
 
-/* A coloured cloud around a stone and a lamp, which state no medium, beside milk in rough glass; and all that in fog in
- * which the camera stands. */
+/* A coloured cloud around a stone and a lamp, which state no medium, beside milk in rough glass; everything,
+ * including the camera, is in fog. */
 static struct world *scattering_media(const struct agree_case *k)
 {
 #define SCATTERS(side, sigma, albedo, phase) \
@@ -469,8 +470,8 @@ static struct world *scattering_media(const struct agree_case *k)
 			     "<emitter type='area'><rgb name='radiance' value='5'/></emitter></shape>", k->a);
 }
 
-/* A cloud of three colours around a stone and a lamp, with holes in it, beside rough glass that is clouded within; a >
- * 0: they only absorb. Their grids are upright, the scene is not. */
+/* A cloud of three colours around a stone and a lamp, with holes, beside rough glass that contains a cloud; a > 0:
+ * both only absorb. Their grids are aligned with the axes, the scene is not. */
 static double puffs(double x, double y, double z, uint32_t channel)
 {
 	return fmax(0, 0.4 + sin(9 * x + 0.3 * channel) * cos(8 * y) * sin(7 * z + channel));
@@ -511,7 +512,7 @@ static struct world *uneven_media(const struct agree_case *k)
 	return world_of_files(32, 32, files);
 }
 
-/* A cloud of flakes that turn from place to place around a stone and a lamp, beside rough glass with other flakes
+/* A cloud of flakes whose orientation varies, around a stone and a lamp, beside rough glass with other flakes
  * inside. */
 static double flakes(double x, double y, double z, uint32_t channel)
 {
@@ -547,8 +548,8 @@ static struct world *flaky_media(const struct agree_case *k)
 	return world_of_files(32, 32, files);
 }
 
-/* A lamp in a cloud that says something else of what is around it; and a lamp outside, from which light enters the
- * cloud through a face that states haze there. Most light sub-paths are in other media than the camera's. */
+/* A lamp in a cloud that states a different medium around itself, and a lamp outside, whose light enters the cloud
+ * through a face that states haze there. Most light sub-paths are in other media than the camera's. */
 static struct world *media_that_do_not_fit(const struct agree_case *k)
 {
 	(void)k;

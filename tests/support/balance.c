@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Detailed balance (balance.h): starts in proportion to f, a proposal from each, and sums per group of a phi(X, Y) for
- * all functions; balance_judge tests each against 0 by Student's t and works out the smallest fault that it would
+ * Detailed balance (balance.h): starts in proportion to f, a proposal from each, and sums of a phi(X, Y) per group for
+ * all functions. balance_judge tests each sum against 0 by Student's t and computes the smallest fault that it would
  * find.
  */
 #include "tests/support/balance.h"
@@ -19,7 +19,7 @@
 
 #include <cmocka.h>
 
-/* Comparisons in the whole suite, at most. */
+/* Limit on the comparisons in the whole suite. */
 #define COMPARISONS 16384
 #define LEVEL (1e-4 / COMPARISONS)
 
@@ -28,7 +28,7 @@ enum {
 	FUNCTION_H_1 = 14,
 	FUNCTION_H_K_1,
 	FUNCTION_TURN = 20,
-	/* Not of x and y alone, but of the move between them. */
+	/* The following depend on the move between x and y, not only on x and y. */
 	FUNCTION_TRANSFER,
 	FUNCTION_STEPS,
 	FUNCTION_CHOICE,
@@ -69,19 +69,19 @@ static const char *const functions[BALANCE_FUNCTIONS] = {
 	"way back",
 };
 
-/* A ray that found a vertex and a ray that asks whether it is seen go to points that differ by rounding: at the edge of
- * a triangle the answers may differ. One in some 100,000 accepted proposals is seen to. */
+/* The ray that found a vertex and the ray that tests its visibility end at points that differ by rounding, so at the
+ * edge of a triangle the answers may differ. Allowed for about one in 100,000 accepted proposals. */
 #define MOST_DOUBTS 2
 
-/* Ways back are asked for that part of the proposals. */
+/* The way back is tested for one in so many proposals. */
 enum { WAYS_BACK = 4 };
 
-/* Half vectors and what follows from them are as exact as walks are: differences below this mean nothing. */
+/* Half vectors, and values derived from them, are as exact as walks are: smaller differences are meaningless. */
 #define WALK_BLUR 0.003
-/* Rounding, of numbers that are equal otherwise. */
+/* Rounding error of numbers that should be equal. */
 #define ROUNDING 1e-9
 
-/* |h_j|, and how exactly; nothing where it is exactly specular, or an event in a medium. */
+/* Returns |h_j| and its accuracy; 0 at exactly specular vertices and events in a medium. */
 static double slope(const struct full_path *x, unsigned j, double *blur)
 {
 	if (j == 0 || j >= x->edges || x->v[j].delta || x->v[j].kind == VERTEX_MEDIUM)
@@ -139,8 +139,8 @@ struct run {
 	struct path_context *c;
 	struct mutation_ctx *m;
 	struct full_path *x, *y;
-	double weight, strict_weight;			      /* of strategies that keep the number of edges; of all */
-	double g[BALANCE_FUNCTIONS], blur[BALANCE_FUNCTIONS]; /* of x */
+	double weight, strict_weight; /* weight: of strategies that keep the number of edges; strict_weight: of all */
+	double g[BALANCE_FUNCTIONS], blur[BALANCE_FUNCTIONS]; /* values for x */
 	uint64_t checked, doubts;
 };
 
@@ -159,7 +159,7 @@ static bool is_sound(const struct balance_trial *t, double log_weight)
 	return log_weight > -INFINITY;
 }
 
-/* As the chain does it. */
+/* Computes the acceptance probability as the chain does. */
 static double acceptance(struct run *r, struct balance_trial *t, struct move *move)
 {
 	enum proposal_end end = t->ops->propose(t->ops, r->m, &t->how, r->x, r->y, move);
@@ -198,7 +198,7 @@ static bool same_media(const struct path_edge *a, const struct path_edge *b)
 	       memcmp(&a->free, &b->free, sizeof a->free) == 0;
 }
 
-/* y becomes x again by the vertices that the move names. */
+/* Turns y back into x, by the vertices that the move names. */
 static void restore(struct run *r, const struct balance_trial *t, const struct move *move)
 {
 	const struct full_path *x = r->x;
@@ -227,14 +227,14 @@ static void compare(const struct run *r, const double *g, const double *blur, do
 {
 	for (int i = 0; i < FUNCTION_TRANSFER; i++) {
 		double d = g[i] - r->g[i];
-		/* An angle: its sine, so that about half of the pairs from each x have either sign. */
+		/* An angle enters by its sine, so that about half of the pairs from each x have either sign. */
 		if (i == FUNCTION_TURN)
 			d = sin(2 * M_PI * d);
 		phi[i] = fabs(d) > blur[i] + r->blur[i] ? copysign(1, d) : 0;
 	}
 }
 
-/* log P(b) P(c | b) by the heuristic. */
+/* Returns log P(b) P(c | b) by the heuristic. */
 static double log_choice(struct run *r, const struct full_path *x, const struct move *move)
 {
 	double weight[FULL_PATH_MAX_VERTICES], p;
@@ -255,7 +255,7 @@ static double log_fixed(struct run *r, struct full_path *x, const struct move *m
 	return sum;
 }
 
-/* Half vectors of x, asked of a walk that begins at y, do not lead to x: there is no way back. */
+/* Returns whether a walk from y towards the half vectors of x fails to lead to x: there is no way back. */
 static bool stays_away(struct run *r, const struct move *move)
 {
 	static struct full_path back;
@@ -285,8 +285,8 @@ static bool stays_away(struct run *r, const struct move *move)
 	return false;
 }
 
-/* Parts of the densities themselves, by as much as they differ: what is left out of the ratio shows there first. And
- * whether there is a way back: where there is none phi is 1, and nobody ever proposes the pair for which it is -1. */
+/* Adds the differences of the parts of the densities, in which an omission from the ratio shows first, and whether
+ * there is a way back: if there is none phi is 1, and the pair for which it is -1 is never proposed. */
 static void compare_moves(struct run *r, const struct balance_trial *t, double log_f, const struct move *move,
 			  double *phi)
 {
@@ -363,7 +363,7 @@ void balance_run(const struct world *w, const char *test, struct balance_trial *
 	m.limits = walk_limits_of(&accuracy_settings_default);
 	struct run r = {.test = test, .c = &c, .m = &m, .x = &x, .y = &y};
 	static struct starts s[BALANCE_GROUPS];
-	double scale[BALANCE_EDGES + 1] = {0}; /* all lengths are to count alike */
+	double scale[BALANCE_EDGES + 1] = {0}; /* gives all lengths equal weight */
 	for (unsigned g = 0; g < BALANCE_GROUPS; g++) {
 		starts_init(&s[g], &c, m.seed, g, pairs);
 		for (unsigned k = 1; k <= BALANCE_EDGES; k++)
@@ -393,7 +393,8 @@ static double critical_t(void)
 	return high;
 }
 
-/* What function i says of the ratio's relative fault, and its standard error; false: nothing. */
+/* Estimates the ratio's relative fault from function i, with its standard error. Returns false if that is
+ * impossible. */
 static bool fault_of(const struct balance_trial *t, int i, double *fault, double *error)
 {
 	double column[BALANCE_GROUPS], size = 0;
@@ -404,7 +405,7 @@ static bool fault_of(const struct balance_trial *t, int i, double *fault, double
 	struct stats_mean s = stats_mean_test(column, BALANCE_GROUPS, 0);
 	if (!(s.error > 0) || !(size > 0))
 		return false;
-	/* A ratio that is wrong by 1 + d one way shifts a phi by d / 2 of |a phi|. */
+	/* A ratio that is wrong by the factor 1 + d in one direction shifts a phi by d / 2 of |a phi|. */
 	*fault = 2 * s.mean / size;
 	*error = 2 * s.error / size;
 	return true;

@@ -85,7 +85,7 @@ void chains_run(const struct world *w, const struct chains_how *how, struct chai
 	out->black = !bootstrap(w, &p, seeds, out);
 	for (uint32_t i = 0; i < how->chains; i++)
 		seeds[i] = out->black ? UINT64_MAX : how->seeds ? how->seeds[i] : seeds[i];
-	/* What only the bootstrap has counted is not the chains'. */
+	/* Events counted by the bootstrap alone do not belong to the chains. */
 	uint64_t unsound = out->counters[COUNT_NAN] + out->counters[COUNT_INFINITE] + out->counters[COUNT_NEGATIVE];
 	assert_int_equal(unsound, 0);
 	memset(out->counters, 0, sizeof out->counters);

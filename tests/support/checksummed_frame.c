@@ -44,7 +44,8 @@ unsigned char *checksummed_frame(const unsigned char *frame, size_t size, size_t
 			     out_size);
 }
 
-/* Of what may have been changed since it was packed; NULL: it is none, or has fields of another version. */
+/* Returns a hello with its checksum, since it may have been changed after packing; NULL: it is not a hello, or has
+ * fields of another version. */
 static unsigned char *checked_hello(const void *header, size_t size, size_t *out_size)
 {
 	Farm__Envelope *m = farm__envelope__unpack(NULL, size, header);

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * All densities of a path once more (density.h), from positions, normals and BSDFs alone: per solid angle from the
- * BSDF's pdf, per area by the cosine over the squared distance, in media times the density of the distance, along both
- * directions of each route. Paths whose geometry makes rounding decide (grazing angles, vertices that nearly touch)
- * are left out and counted.
+ * Recomputes all densities of a path (density.h) from positions, normals and BSDFs alone: per solid angle from the
+ * BSDF's pdf, per area by the cosine over the squared distance, in media times the density of the distance, in both
+ * directions of each route. Paths for which rounding is decisive (grazing angles, vertices that nearly touch) are left
+ * out and counted.
  */
 #include "tests/support/density.h"
 
@@ -60,7 +60,7 @@ static double per_area(const struct path_vertex *at, const struct path_vertex *t
 	return fabs(vec3_dot(to->x.ng, towards(at, to))) / vec3_dot(d, d);
 }
 
-/* By how much a channel of the grid counts in sigma_t along d; of a medium that is the same everywhere, sigma_t. */
+/* Returns by how much a channel of the grid enters sigma_t along d; in a homogeneous medium, sigma_t. */
 static double coefficient(const struct path_context *c, vec3 d, int channel, int lane)
 {
 	const struct medium *m = &c->w->media[0];
@@ -77,7 +77,7 @@ static double coefficient(const struct path_context *c, vec3 d, int channel, int
 	return m->per_length * own / sum;
 }
 
-/* Sigma_t of the only medium there is, which is everywhere. */
+/* Returns sigma_t of the only medium, which is everywhere. */
 static double sigma_at(const struct path_context *c, const struct path_vertex *v, vec3 d, int lane)
 {
 	const struct grid *g = c->w->media[0].first.grid;
@@ -90,7 +90,7 @@ static double sigma_at(const struct path_context *c, const struct path_vertex *v
 	return sum;
 }
 
-/* Its optical depth; before a camera's near plane there is none. */
+/* Returns the medium's optical depth; before a camera's near plane there is none. */
 static spectrum depth_between(const struct path_context *c, const struct path_vertex *a, const struct path_vertex *b)
 {
 	const struct grid *g = c->w->media[0].first.grid;
@@ -109,7 +109,7 @@ static spectrum depth_between(const struct path_context *c, const struct path_ve
 	return depth;
 }
 
-/* What the distance contributes to the density of `to`: by one wavelength of four, that of an event or of none. */
+/* Returns the factor of the distance in the density of `to`: for one wavelength of four, of an event or of none. */
 static double by_distance(const struct path_context *c, const struct path_vertex *at, const struct path_vertex *to)
 {
 	double sum = 0;
@@ -121,7 +121,7 @@ static double by_distance(const struct path_context *c, const struct path_vertex
 	return sum / SPECTRUM_LANES;
 }
 
-/* Of the first wavelength. */
+/* Returns the transmittance at the first wavelength. */
 static double left_over(const struct path_context *c, const struct path_vertex *a, const struct path_vertex *b)
 {
 	if (!c->w->effects.scattering)
@@ -136,8 +136,8 @@ static struct emitter_point emitter_point_of(const struct path_vertex *v)
 	return p;
 }
 
-/* Where relief turns a normal away from the camera, it is mirrored at the geometric one: the shapes with such relief
- * are flat or spheres here. */
+/* A normal that relief turns away from the camera is mirrored at the geometric one: shapes with such relief are flat
+ * or spheres here. */
 static bool turned_from(const struct path_vertex *at, const struct path_vertex *camera, struct surface_point *x)
 {
 	vec3 w = towards(at, camera);
@@ -149,7 +149,7 @@ static bool turned_from(const struct path_vertex *at, const struct path_vertex *
 	return true;
 }
 
-/* The specular lobe that leads from `from` over `at` to `to`. */
+/* Returns the specular lobe that leads from `from` over `at` to `to`. */
 static struct bsdf_sample specular_lobe(const struct path_context *c, const struct path_vertex *from,
 					const struct path_vertex *at, const struct path_vertex *to,
 					enum transport transport)
@@ -167,9 +167,9 @@ static struct bsdf_sample specular_lobe(const struct path_context *c, const stru
 	return (struct bsdf_sample){.pdf = 0};
 }
 
-/* Density of `to`, generated from `at`, come from `from`. Specular lobes: a distribution in the direction towards the
- * light, projected on the geometric normal. Towards the camera the two solid angles are to each other as the squared
- * indices and the cosines with the shading normal, about which light is refracted (etendue). */
+/* Returns the density of `to`, generated at `at` when coming from `from`. For specular lobes it is a distribution in
+ * the direction towards the light, projected on the geometric normal. The solid angle towards the camera is related to
+ * it by the squared indices and the cosines with the shading normal, about which light is refracted (etendue). */
 static double scattering_pdf(const struct path_context *c, const struct path_vertex *from, const struct path_vertex *at,
 			     bool delta, const struct path_vertex *to, enum transport transport)
 {
@@ -226,7 +226,7 @@ static double density_from_camera(const struct path_context *c, const struct rou
 	       by_distance(c, &x[r->k], &x[i]);
 }
 
-/* False where double cannot tell: two points almost the same, or seen almost from the side. */
+/* Returns false if double precision cannot decide: two points almost coincide, or are seen at a grazing angle. */
 static bool well_conditioned(const struct route *r)
 {
 	for (unsigned i = 0; i < r->k; i++) {
@@ -248,7 +248,7 @@ static double relative(double a, double b)
 	return a == b ? 0 : fabs(a - b) / fmax(fabs(a), fabs(b));
 }
 
-/* The path that technique s made. */
+/* Assembles the path that technique s made. */
 static void take_route(const struct path_context *c, unsigned s, unsigned t, const struct path_vertex *light,
 		       struct route *r)
 {
@@ -269,9 +269,9 @@ static void fill_densities(const struct path_context *c, struct route *r)
 	}
 }
 
-/* Directions between points are 1e-13 off at the distances and cosines allowed; lobes as narrow as alpha 0.1 take that
- * times 1e3. A hit that Embree's floats put just beside its triangle is moved by up to 1e-7 off the ray: rare, and
- * counted. */
+/* At the distances and cosines allowed, directions between points are off by 1e-13, which lobes as narrow as alpha
+ * 0.1 amplify by 1e3. A hit that Embree's floats place just beside its triangle is moved by up to 1e-7 off the ray,
+ * which is rare and is counted. */
 static void compare(struct density_tally *tally, double a, double b)
 {
 	if (relative(a, b) < 1e-9)
@@ -289,13 +289,13 @@ static void check_walk(const struct route *r, unsigned s, struct density_tally *
 		double own = light ? r->from_light[i] : r->from_camera[i],
 		       other = light ? r->from_camera[i] : r->from_light[i];
 		compare(tally, r->x[i].pdf, own);
-		/* Two more vertices of the same sub-path have made the reverse density. */
+		/* The reverse density needs two more vertices of the same sub-path. */
 		if (light ? i + 3 <= s : i >= s + 2 && i < r->k)
 			compare(tally, r->x[i].pdf_rev, other);
 	}
 }
 
-/* F of path.h's head comment; of a specular lobe what stands before the delta distribution. */
+/* Returns F of path.h's head comment; for a specular lobe, the factor before the delta distribution. */
 static double scatter(const struct path_context *c, const struct path_vertex *camera, const struct path_vertex *at,
 		      const struct path_vertex *light)
 {
@@ -314,7 +314,7 @@ static double scatter(const struct path_context *c, const struct path_vertex *ca
 	return f.v[0] * fabs(vec3_dot(x.sh.n, wi) / vec3_dot(x.ng, wi));
 }
 
-/* Along a sub-path: beta x densities = source x product of F x product of G. */
+/* Checks, along a sub-path: beta x densities = source x product of F x product of G. */
 static void check_beta(const struct path_context *c, const struct path_vertex *v, unsigned n,
 		       struct density_tally *tally)
 {
@@ -342,7 +342,7 @@ static void check_beta(const struct path_context *c, const struct path_vertex *v
 	}
 }
 
-/* The first vertex from x_j on that technique j joins: light goes straight through those before it. */
+/* Returns the first vertex from x_j on that technique j joins: light goes straight through those before it. */
 static unsigned joined_to(const struct path_context *c, const struct route *r, unsigned j)
 {
 	while (c->w->effects.transparent_shadows && j < r->k && r->delta[j] && (r->x[j].mode & BSDF_STRAIGHT))
@@ -350,7 +350,7 @@ static unsigned joined_to(const struct path_context *c, const struct route *r, u
 	return j;
 }
 
-/* Of x_0, as next event estimation draws it. */
+/* Returns the density of x_0 as next event estimation draws it. */
 static double direct_pdf(const struct path_context *c, const struct route *r)
 {
 	const struct emitter *em = &c->w->emitters[r->x[0].emitter];
@@ -384,8 +384,8 @@ static bool is_joint(const struct path_context *c, const struct route *r, unsign
 	return !r->delta[j - 1] && !r->delta[end];
 }
 
-/* Logarithm of the density of the whole path by technique j. What it passes follows from the ends: the geometry terms
- * of the small edges stand for the long one's. */
+/* Returns the logarithm of the density of the whole path by technique j. Vertices that light passes straight follow
+ * from the ends: the geometry terms of the small edges replace the long one's. */
 static double technique_pdf(const struct path_context *c, const struct route *r, unsigned j)
 {
 	unsigned end = j > 0 ? joined_to(c, r, j) : 0;
@@ -403,7 +403,7 @@ static double technique_pdf(const struct path_context *c, const struct route *r,
 	return sum - log(r->from_light[0]) + log(direct_pdf(c, r));
 }
 
-/* The edge between two points, as a sub-path makes it. */
+/* Returns the edge between two points, as a sub-path makes it. */
 static struct path_edge edge_between(const struct path_context *c, const struct path_vertex *a,
 				     const struct path_vertex *b)
 {
@@ -414,7 +414,7 @@ static struct path_edge edge_between(const struct path_context *c, const struct 
 	return e;
 }
 
-/* As if technique s had made it. */
+/* Relabels the path as if technique s had made it. */
 static void relabel_vertices(const struct path_context *c, struct route *r, unsigned s, struct joined_path *p,
 			     struct path_edge *joint)
 {
@@ -431,7 +431,7 @@ static void relabel_vertices(const struct path_context *c, struct route *r, unsi
 		struct path_vertex *v = &r->x[i];
 		v->delta = r->delta[i];
 		v->pdf = i < s ? r->from_light[i] : r->from_camera[i];
-		/* What the sub-path has not gone far enough to know. */
+		/* The sub-path does not reach far enough to know this. */
 		v->pdf_rev = NAN;
 		if (i + 3 <= s || i >= s + p->passed + 2)
 			v->pdf_rev = i < s ? r->from_camera[i] : r->from_light[i];
@@ -441,8 +441,8 @@ static void relabel_vertices(const struct path_context *c, struct route *r, unsi
 		r->x[0].kind = s ? VERTEX_EMITTER : VERTEX_SURFACE;
 }
 
-/* Where only one in eight samples has a light sub-path, techniques with two light vertices or more count an eighth, and
- * so does the one that joins an emitter to the lens. */
+/* If only one in eight samples has a light sub-path, techniques with two light vertices or more count for an eighth,
+ * and so does the one that joins an emitter to the lens. */
 static void check_rare_light(struct path_context *c, const struct route *r, const struct joined_path *p,
 			     const double *ratio)
 {
@@ -471,7 +471,7 @@ static void check_ratios(struct path_context *c, struct route *r, struct density
 	for (unsigned s = 0; s <= r->k; s++) {
 		struct joined_path joined;
 		struct path_edge joint;
-		/* No technique makes a path that is 1e100 times less likely than by another. */
+		/* Techniques whose density is 1e100 times smaller than that of another never make the path. */
 		if (!is_joint(c, r, s) || most - p[s] > 230)
 			continue;
 		relabel_vertices(c, r, s, &joined, &joint);
@@ -493,7 +493,7 @@ static void check_ratios(struct path_context *c, struct route *r, struct density
 				fail_msg("made by %u of %u, up to %u: weight %.12g, not %.12g", s, r->k, max_s, weight,
 					 1 / sum);
 		}
-		check_rare_light(c, r, &joined, ratio); /* of all techniques */
+		check_rare_light(c, r, &joined, ratio); /* for all techniques */
 		tally->relabelled++;
 	}
 }
@@ -540,7 +540,7 @@ static void check_route(struct path_context *c, unsigned s, unsigned t, struct d
 	check_ratios(c, &r, tally);
 }
 
-/* What is joined to the camera lands where the film sees it from this x_k. */
+/* A vertex that is joined to the camera must land where the film sees it from this x_k. */
 static void check_landing(struct path_context *c, unsigned s)
 {
 	double film[2];
@@ -565,7 +565,7 @@ struct density_tally density_check(const char *name, struct world *w, size_t wal
 		struct sampler_random s;
 		double film[2];
 		sampler_random_init(&s, stats_seed(name), RNG_TEST, i, 0);
-		/* On a film so large emitters are small enough to be joined to the lens. */
+		/* On such a large film, emitters are small enough to be joined to the lens. */
 		c.joins_lens = i % 4 == 1;
 		const double border = c.joins_lens ? 10.0 * w->settings.width : 1;
 		c.window = (struct film_window){-border, -border, w->settings.width + 2 * border,

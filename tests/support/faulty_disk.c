@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A tree of names and files in memory that holds what a loss of power would leave (faulty_disk.h). Calls on the real
- * disk are carried out and told here: writes go into a list of changes, which a flush applies to the safe bytes; names
- * go through a list of renamings, which a flush of their folder applies. When power is lost, the safe state and a
+ * A tree of names and files in memory that holds what a loss of power would leave (faulty_disk.h). Calls are carried
+ * out on the real disk and recorded here: writes go into a list of changes, which a flush applies to the safe bytes;
+ * names go into a list of renamings, which a flush of their folder applies. When power is lost, the safe state and a
  * random part of the rest are written to the other folder.
  *
- * The hooks themselves are in faulty_disk_calls.c and, for SQLite, faulty_disk_vfs.c. Memory that runs out ends the
- * process.
+ * The hooks are in faulty_disk_calls.c and, for SQLite, in faulty_disk_vfs.c. Running out of memory ends the process.
  */
 #include "tests/support/faulty_disk.h"
 
@@ -23,11 +22,11 @@
 
 enum { SECTOR = 512, PATH_MOST = 4400 };
 
-/* Done to a file since its last flush. */
+/* A change to a file since its last flush. */
 struct change {
 	struct change *next;
 	uint64_t at, size;
-	unsigned char *bytes; /* NULL: it was cut to `size` */
+	unsigned char *bytes; /* NULL: the file was cut to `size` */
 };
 
 struct name {
@@ -36,7 +35,8 @@ struct name {
 	struct faulty_disk_node *node;
 };
 
-/* Done to a folder since its last flush: `gone` is no name any more, `made` is one (either may be NULL). */
+/* A change to a folder since its last flush: the name `gone` was removed, the name `made` was added (either may be
+ * NULL). */
 struct renaming {
 	struct renaming *next;
 	char *gone, *made;
@@ -45,11 +45,11 @@ struct renaming {
 
 struct faulty_disk_node {
 	bool folder;
-	char last[64];	      /* of its first name */
-	unsigned char *bytes; /* a file: what is safe */
+	char last[64];	      /* last component of its first name */
+	unsigned char *bytes; /* for a file: the safe bytes */
 	uint64_t size;
 	struct change *changes, **changes_last;
-	struct name *live, *safe; /* a folder: its names */
+	struct name *live, *safe; /* for a folder: its names */
 	struct renaming *renamings, **renamings_last;
 };
 
@@ -138,7 +138,8 @@ static void rename_in(struct faulty_disk_node *folder, const char *gone, const c
 	folder->renamings_last = &r->next;
 }
 
-/* The folder that the path's last part is in; NULL: the path is not below the root, or there is no such folder. */
+/* Returns the folder that contains the path's last component; NULL: the path is not below the root, or there is no
+ * such folder. */
 static struct faulty_disk_node *parent_of(const char *path, const char **last)
 {
 	size_t n = strlen(setup.root);
@@ -198,7 +199,7 @@ void faulty_disk_renamed(const char *from, const char *to)
 		return;
 	struct name *n = *find(&a->live, gone);
 	assert(n && b);
-	if (a != b) { /* each folder for itself: one of them may keep what the other does not */
+	if (a != b) { /* the folders are separate: one of them may keep its change while the other does not */
 		rename_in(b, NULL, made, n->node);
 		rename_in(a, gone, NULL, NULL);
 	} else {
@@ -310,7 +311,7 @@ void faulty_disk_removed(const char *path)
 /* ---- loss of power ---- */
 
 struct odds {
-	double bytes, lengths, names; /* that what was not flushed is there all the same */
+	double bytes, lengths, names; /* probabilities that unflushed changes survive */
 };
 
 static void write_out(const struct faulty_disk_node *n, const char *path, const struct odds *p, uint64_t *lost)
@@ -412,7 +413,7 @@ void faulty_disk_leave(void)
 	pthread_mutex_unlock(&mutex);
 }
 
-/* ---- the start: all that is there is safe ---- */
+/* ---- the start: everything that exists is safe */
 
 static void load_file(struct faulty_disk_node *n, const char *path)
 {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The calls of common/base/disk.h: each asks whether it is to fail, makes the real call, and says what it changed. */
+/* The calls of common/base/disk.h: each determines whether it is to fail, makes the real call, and records its
+ * changes. */
 #include "tests/support/faulty_disk.h"
 
 #include <assert.h>
@@ -21,7 +22,7 @@ static bool is_refused(enum faulty_disk_call what)
 	return true;
 }
 
-/* Keeps errno. */
+/* Preserves errno. */
 static long leave_with(long result)
 {
 	faulty_disk_leave();
@@ -43,7 +44,7 @@ static int do_open(const char *path, int flags, mode_t mode)
 
 static int do_close(int fd)
 {
-	faulty_disk_enter(FAULTY_DISK_READS); /* a close that fails has closed all the same */
+	faulty_disk_enter(FAULTY_DISK_READS); /* a failed close closes all the same */
 	if (fd >= 0 && fd < FDS)
 		open_files[fd] = NULL;
 	return (int)leave_with(close(fd));

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* SQLite on the disk of faulty_disk.h: a VFS around the system's. */
+/* SQLite on the simulated disk of faulty_disk.h: a VFS around the system's. */
 #include "tests/support/faulty_disk.h"
 
 #include <errno.h>
@@ -10,7 +10,7 @@ struct file {
 	sqlite3_file base;
 	struct faulty_disk_node *node;
 	char *name;
-	bool tell_folder; /* its name is flushed with its first flush, as the system's VFS does for journals */
+	bool tell_folder; /* its first flush also flushes its name, as the system's VFS does for journals */
 	sqlite3_file *real;
 };
 
@@ -167,7 +167,7 @@ static int x_delete(sqlite3_vfs *v, const char *name, int and_folder)
 void faulty_disk_vfs_begin(void)
 {
 	system_vfs = sqlite3_vfs_find(NULL);
-	vfs = *system_vfs; /* what is not of files is the system's */
+	vfs = *system_vfs; /* calls that do not concern files stay the system's */
 	vfs.zName = "faulty_disk";
 	vfs.szOsFile = sizeof(struct file);
 	vfs.xOpen = x_open;

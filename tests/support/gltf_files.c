@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Makes glTF files from one JSON text with a few marks in it and one buffer: with the buffer in a file beside it, in a
- * data URI, or in the binary form. Nothing is shared with the reader under test.
+ * Makes glTF files from one JSON text with a few placeholders and one buffer: with the buffer in a file beside it, in a
+ * data URI, or in the binary form. Shares no code with the reader under test.
  */
 #include "tests/support/gltf_files.h"
 #include "worker/render/render.h"
@@ -20,7 +20,7 @@
 #include <cmocka.h>
 #include <meshoptimizer.h>
 
-/* BUFFER stands for what names the buffer's bytes. One entry a line, as messages name lines. */
+/* BUFFER stands for the reference to the buffer's bytes. One entry per line, because messages state lines. */
 static const char template[] =
 	"{\"asset\": {\"version\": \"2.0\"}, \"scene\": 0, \"extensionsUsed\": [\"KHR_lights_punctual\"],\n"
 	"\"extensions\": {\"KHR_lights_punctual\": {\"lights\": [\n"
@@ -117,7 +117,7 @@ void gltf_files_make(struct gltf_files *f)
 			 fan_uv[4][2] = {{0, 0}, {0, 1}, {1, 1}, {1, 0}};
 	memset(f, 0, sizeof *f);
 	memcpy(f->json, template, sizeof template);
-	put_bits(f, 0x55, 1); /* nothing begins at a multiple of anything */
+	put_bits(f, 0x55, 1); /* so that nothing begins at a multiple of anything */
 	put_floats(f, solid_position[0], 3 * SOLID_VERTICES);
 	put_floats(f, solid_uv[0], 2 * SOLID_VERTICES);
 	for (int size = 2; size > 0; size = size == 2 ? 4 : size == 4 ? 1 : 0)
@@ -136,7 +136,7 @@ void gltf_files_make(struct gltf_files *f)
 		put_bits(f, fan_uv[i / 2][i % 2] ? 255 : 0, 1);
 }
 
-/* Into `out`: its size. Indices of two bytes as a sequence, of four as triangles. */
+/* Compresses into `out` and returns the size. Two-byte indices are coded as a sequence, four-byte ones as triangles. */
 static size_t compress(unsigned char *out, size_t room, const unsigned char *from, size_t count, size_t stride,
 		       char mode)
 {
@@ -224,7 +224,7 @@ static void put_word(unsigned char *to, size_t x)
 		to[i] = (unsigned char)(x >> 8 * i);
 }
 
-/* Header, JSON with blanks behind it, buffer with zeros behind it. */
+/* Packs a header, the JSON padded with blanks, and the buffer padded with zeros. */
 static void pack_binary(struct gltf_files *f)
 {
 	size_t json = (strlen(f->json) + 3) / 4 * 4, binary = (f->buffer_size + 3) / 4 * 4;

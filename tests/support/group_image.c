@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-static const float white[3] = {0.95046F, 1, 1.08906F}; /* D65: red, green and blue are 1 to four digits */
+static const float white[3] = {0.95046F, 1, 1.08906F}; /* of D65, so that red, green and blue are 1 to four digits */
 static const float blue_primary[3] = {0.18048F, 0.07219F, 0.95053F};
 
 struct plan group_image_plan(enum plan_kind kind, uint32_t width, uint32_t height)

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Small scenes in which one number goes to its limit: smooth metal, thin bubbles, grazing light, narrow gaps, slivers,
- * a distant sun. Each function takes that number and makes the world; tests let it approach the limit and look for what
- * is not finite, and for bias.
+ * Small scenes in which one number approaches its limit: smooth metal, thin bubbles, grazing light, narrow gaps,
+ * slivers, a distant sun. Each function makes the world for a value of that number; tests let it approach the limit and
+ * look for values that are not finite, and for bias.
  */
 /* Scenes are laid out by hand. */
 /* clang-format off */
@@ -34,7 +34,7 @@
 		bsdf \
 	"</shape>"
 #define BALL(bsdf) "<shape type='sphere'><point name='center' value='0,-0.6,-0.3'/><float name='radius' value='0.8'/>" bsdf "</shape>"
-/* Looks at the ball's centre through a field of view of so many degrees. */
+/* A camera that looks at the ball's centre with a field of view in degrees. */
 #define NEAR(o, t)                                                                                                              \
 	"<sensor type='perspective'><float name='fov' value='%.9g'/><transform name='to_world'><lookat origin='" o "' target='" t    \
 	"' up='0.1,1,0.05'/></transform><film type='hdrfilm'><integer name='width' value='32'/><integer name='height' value='32'/>"   \
@@ -51,7 +51,7 @@ static struct world *rough_glass(double alpha)
 	return world_of_text(32, 32, VIEW WALLS LAMP BALL(ROUGH_GLASS), 1.5, 1.0, alpha);
 }
 
-/* Of the inside; the outside has 1. */
+/* inside: the index inside; the index outside is 1. */
 static struct world *index_of(double inside)
 {
 	return world_of_text(32, 32, VIEW WALLS LAMP BALL(ROUGH_GLASS), inside, 1.0, 0.1);
@@ -62,7 +62,7 @@ static struct world *smooth_index_of(double inside)
 	return world_of_text(32, 32, VIEW WALLS LAMP BALL(GLASS), inside);
 }
 
-/* A bubble: total reflection around its rim. */
+/* A bubble, with total reflection around its rim. */
 static struct world *bubble(double outside)
 {
 	return world_of_text(32, 32, VIEW WALLS LAMP BALL(ROUGH_GLASS), 1.0, outside, 0.05);
@@ -76,7 +76,7 @@ static struct world *critical(double alpha)
 				ROUGH_GLASS "</shape>", 1.333, 1.0, alpha);
 }
 
-/* Along a rough plate that is seen at so many radians, with the light low behind it. */
+/* A rough plate seen at this angle in radians, with the light low behind it. */
 static struct world *grazing(double angle)
 {
 	return world_of_text(32, 32,
@@ -128,7 +128,7 @@ static struct world *focus(double off)
 			     off, 0.05);
 }
 
-/* A ball of that radius fills the image. */
+/* A ball of this radius fills the image. */
 static struct world *curved(double radius)
 {
 	double distance = fmax(2.2, 1.2 * radius);
@@ -146,14 +146,14 @@ static struct world *curved(double radius)
 			     radius > 1 ? -radius : 0.0, radius, 0.2);
 }
 
-/* The image holds the pole, so many radii across. */
+/* The image contains the pole and is this many radii wide. */
 static struct world *pole(double across)
 {
 	return world_of_text(32, 32, NEAR("0.4,0.3,1.9", "0,-0.6,0.5") WALLS LAMP BALL(METAL), 2 * atan(across * 0.8 / 1.7) * DEGREES, 0.2);
 }
 
-/* A ball as a mesh. uv 0: with coordinates and a seam; 1: none; 2: the same everywhere. slivers: so much thinner faces
- * around, and faces without area. */
+/* A ball as a mesh. uv 0: with texture coordinates and a seam; 1: without; 2: the same everywhere. slivers: by how
+ * much some faces are thinner; there are also faces without area. */
 static struct world *mesh(double uv, double thin, const char *bsdf)
 {
 	enum { AROUND = 12, UP = 8, SIZE = 1 << 16 };
@@ -161,7 +161,7 @@ static struct world *mesh(double uv, double thin, const char *bsdf)
 	size_t n = 0;
 	for (int i = 0; i <= UP; i++)
 		for (int j = 0; j <= AROUND; j++) {
-			/* Every other circle of latitude lies near the one before it. */
+			/* Every other circle of latitude lies close to the previous one. */
 			double t = M_PI * (i % 2 && i < UP ? i - 1 + thin : i) / UP;
 			double p = 2 * M_PI * (j % AROUND) / AROUND;
 			double x = sin(t) * cos(p), y = cos(t), z = sin(t) * sin(p), shared = uv == 2;
@@ -219,7 +219,7 @@ static struct world *displaced(double level)
 	return w;
 }
 
-/* A plate of the floor's own material stands in the light's way. */
+/* A plate of the same material as the floor blocks the light. */
 static struct world *occluder(double side)
 {
 	return world_of_text(32, 32, VIEW "<bsdf type='roughconductor' id='m'><string name='material' value='Au'/>"
@@ -253,14 +253,14 @@ static struct world *sun(double radiance)
 			     1.5, 1.0, 0.2, radiance);
 }
 
-/* Into the corner of the room, so narrowly: edges from wall to wall as short as one likes. */
+/* Looks into the corner of the room with this field of view: edges between the walls become arbitrarily short. */
 static struct world *corner(double degrees)
 {
 	return world_of_text(32, 32, NEAR("0,0.2,1.5", "-2,-2,-2") LAMP "<shape type='cube'>" AT("<scale value='2'/>")
 		METAL "</shape>", degrees, 0.3);
 }
 
-/* Two balls that nearly touch, looked at between them. */
+/* Two balls that nearly touch, seen at the gap. */
 static struct world *gap(double width)
 {
 	return world_of_text(32, 32, NEAR("0,0.2,1.9", "0,-0.6,-0.3") WALLS LAMP
@@ -271,7 +271,7 @@ static struct world *gap(double width)
 			     3.0, -0.6 - width / 2, 0.2, 0.6 + width / 2, 0.2);
 }
 
-/* So many pixels in a column: the border is everywhere. */
+/* A column of this many pixels: the border is everywhere. */
 static struct world *narrow(double width)
 {
 	return world_of_text((uint32_t)width, 32, VIEW WALLS LAMP BALL(ROUGH_GLASS), 1.5, 1.0, 0.2);

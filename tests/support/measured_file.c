@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The formulas, then the warp of a table of normals, then each array of the file, then the file. Warps are inverted by
- * bisection of sums over the nodes: slow, and nothing that could be wrong the same way as the renderer's.
+ * The formulas come first, then the warp of a table of normals, the arrays of the file, and the file. Warps are
+ * inverted by bisection of sums over the nodes: slow, but with no error in common with the renderer.
  *
- * Failures: out of memory aborts.
+ * Running out of memory aborts.
  */
 #include "tests/support/measured_file.h"
 #include "tests/support/polarized_file.h"
@@ -34,7 +34,7 @@ static double phi_of(const struct measured_kind *k, int i)
 
 /* ---- the formulas ---- */
 
-/* By the axes of the facets. */
+/* Transforms a direction to the axes of the facets. */
 static vec3 into_facet_frame(const struct measured_kind *k, vec3 w)
 {
 	double c = cos(k->turn), s = sin(k->turn);
@@ -56,7 +56,7 @@ static double visible_factor(const struct measured_kind *k, vec3 v)
 	return 0.5 * (w.z + sqrt(w.z * w.z + x * x + y * y));
 }
 
-/* What the file has for light from wi. */
+/* Returns what the file stores for light from wi. */
 static double color_of(const struct measured_kind *k, double tint, vec3 wo, vec3 wi)
 {
 	vec3 h = vec3_normalize(vec3_add(wo, wi));
@@ -80,7 +80,7 @@ static vec3 direction(double x, double y)
 
 /* ---- the warp of a grid of n x n values ---- */
 
-/* The integral from 0 to x of what is linear between n values. */
+/* Returns the integral from 0 to x of the piecewise linear function with these n values. */
 static double integral(const double *value, int n, double x)
 {
 	double sum = 0, step = 1.0 / (n - 1);
@@ -167,7 +167,7 @@ static void find_visible(const struct measured_kind *k, vec3 wo, double *grid)
 		}
 }
 
-/* Luminance differs from the colours, which it may: it is what samples follow. */
+/* The luminance differs from the colours, which is allowed: it only guides sampling. */
 static void add_slices(struct tensor_file *f, const struct measured_kind *k)
 {
 	int n = k->fine, side = k->side, channels = k->rgb ? 3 : WAVELENGTHS;
@@ -208,7 +208,7 @@ unsigned char *measured_file_make(const struct measured_kind *k, size_t *size)
 	return tensor_file_end(&f, size);
 }
 
-/* Brighter where facets are flat, unlike on either side of them, with a corner that was not measured. */
+/* Brighter where facets are flat, different on either side of these, with a corner that was not measured. */
 static double flat_facets(double phi_d, double theta_d, double theta_h, double nm)
 {
 	if (theta_d + theta_h > 2.5)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Writers of PLY (text, both byte orders) and of Mitsuba's serialized format (versions 3 to 5), one value after the
- * other into a fixed buffer, so that they share nothing with the readers under test.
+ * Writers of PLY (text, both byte orders) and of Mitsuba's serialized format (versions 3 to 5), which put one value
+ * after the other into a fixed buffer and share no code with the readers under test.
  */
 #include "tests/support/mesh_files.h"
 
@@ -117,8 +117,8 @@ static void put_text(struct mesh_file *f, const char *text)
 	append(f, text, strlen(text));
 }
 
-/* Flags are those of version 4. Both maps are there, and behind the colours an attribute of the triangles, and one that
- * a spectral variant wrote. */
+/* Flags are those of version 4. Both maps exist, and after the colours there are an attribute of the triangles and
+ * one that a spectral variant writes. */
 void mesh_stream_5(struct mesh_file *f, uint32_t flags, int scale)
 {
 	f->size = 0;

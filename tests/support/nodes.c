@@ -75,10 +75,11 @@ void node_add_transform(struct arena *a, struct scene_node *n, const char *name,
 	add(a, n, name, (struct value){.type = VALUE_TRANSFORM, .as.transform = transform});
 }
 
-/* A BSDF and its parts, which the first of these characters separates, and theirs the next. */
+/* Makes a BSDF and its parts, which are separated by the first of these characters; their parts are separated by the
+ * next. */
 static struct scene_node *nested_node(struct arena *a, char *text, const char *separators);
 
-/* " diffuse", or " texture checkerboard", or " texture scale texture checkerboard", or " phase hg", or a BSDF with
+/* Parses " diffuse", " texture checkerboard", " texture scale texture checkerboard", " phase hg", or a BSDF with
  * parts. */
 static struct scene_node *node_of_part(struct arena *a, char *text, const char *separators)
 {
@@ -98,7 +99,7 @@ static struct scene_node *node_of_part(struct arena *a, char *text, const char *
 	return n;
 }
 
-/* " @alpha checkerboard": a texture of that name. Any other is a child without one. */
+/* Adds " @alpha checkerboard" as a texture of that name, and any other part as an unnamed child. */
 static void add_part(struct arena *a, struct scene_node *n, char *text, const char *separators)
 {
 	char *at = strchr(text, '@'), *space = at ? strchr(at, ' ') : NULL;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Runs of a coordinator, one after the other, on a faulty disk (outage.h). outage_work submits jobs, answers leases and
- * notes every acknowledgement until the process has gone; the next run starts from what the disk has kept; each run
- * begins with fetching all images, from whose counters one sees how many results each holds, and whose pixels must have
- * the bits of the undisturbed run.
+ * records every acknowledgement until the process has ended; the next run starts from what the disk has kept. Each run
+ * begins by fetching all images: their counters show how many results each contains, and their pixels must have the
+ * bits of the undisturbed run.
  */
 #include "tests/support/outage.h"
 
@@ -33,7 +33,7 @@ static const char scene[] = "<scene/>";
 
 struct outage outage;
 static struct exr_image reference;
-static uint64_t reference_results; /* that its film holds */
+static uint64_t reference_results; /* number of results in its film */
 static bool has_reference;
 static char port_file[80], listens_file[80], after[80];
 
@@ -43,7 +43,7 @@ static void serve(const struct farm_run *f)
 {
 	struct server_config c;
 	struct error e = {""};
-	prctl(PR_SET_PDEATHSIG, SIGKILL); /* a test that fails leaves nobody behind */
+	prctl(PR_SET_PDEATHSIG, SIGKILL); /* a failing test leaves no process behind */
 	server_config_init(&c);
 	c.listen = "127.0.0.1:0";
 	c.spool = outage.root;
@@ -72,7 +72,7 @@ static void serve(const struct farm_run *f)
 	_exit(rc ? 1 : 0);
 }
 
-/* 0: it runs; else its exit code, -1 for 0: it is gone. */
+/* Returns 0 while the coordinator runs, otherwise its exit code, or -1 for exit code 0. */
 int outage_gone(struct farm_run *f, bool wait)
 {
 	int status;
@@ -83,7 +83,7 @@ int outage_gone(struct farm_run *f, bool wait)
 	return f->code;
 }
 
-/* false: power was lost before it had read its jobs. */
+/* Returns false if power was lost while it read its jobs, or if it did not start. */
 bool outage_start(struct farm_run *f)
 {
 	unlink(port_file);
@@ -113,7 +113,7 @@ bool outage_start(struct farm_run *f)
 	return false;
 }
 
-/* What the disk kept becomes the spool. */
+/* Makes what the disk kept the spool. */
 void outage_swap_folders(struct farm_run *f)
 {
 	char command[512];
@@ -129,7 +129,7 @@ void outage_hang_up(struct farm_run *f)
 	f->client = f->worker = NULL;
 }
 
-/* ---- what it must say ---- */
+/* ---- checks of its answers */
 
 static void count_harm(enum harm what, uint64_t times, const char *text)
 {
@@ -150,7 +150,7 @@ static const Farm__Envelope *answer_to(struct scripted *p, bool said)
 	return said ? scripted_hear(p) : NULL;
 }
 
-/* Every result of these plans brings as many accepted mutations as any other. */
+/* Each result of these plans has the same number of accepted mutations. */
 static uint64_t results_in(const struct exr_image *img, const struct plan *p)
 {
 	struct lease_key k = {.kind = LEASE_RENDER};
@@ -192,7 +192,7 @@ static void check_image(const unsigned char *bytes, size_t size, const struct pl
 		count_harm(UNEQUAL, 1, "an image has other bits");
 }
 
-/* false: it hung up. */
+/* Returns false if the coordinator hung up. */
 static bool fetch(struct farm_run *f, uint64_t id, bool *there)
 {
 	const Farm__Envelope *m = answer_to(f->client, scripted_fetch(f->client, id, FARM__WHAT__WHAT_RESULT, 0));
@@ -209,8 +209,8 @@ static bool fetch(struct farm_run *f, uint64_t id, bool *there)
 	return true;
 }
 
-/* Checks that all acknowledged jobs are there, that none failed, and that those reported as done are done. false: the
- * coordinator hung up. */
+/* Checks that all acknowledged jobs exist, that none failed, and that those reported as done are done. Returns false
+ * if the coordinator hung up. */
 static bool check_jobs(struct farm_run *f)
 {
 	bool seen[IDS_MAX] = {false}, done[IDS_MAX] = {false};
@@ -250,7 +250,7 @@ static bool check_jobs(struct farm_run *f)
 	return true;
 }
 
-/* ---- the work of a run; false: the power was lost ---- */
+/* ---- the work of a run; functions return false if power was lost */
 
 static bool submit(struct farm_run *f)
 {
@@ -268,7 +268,7 @@ static bool submit(struct farm_run *f)
 		fail_msg("%s", m->submit_answer->refusal);
 	assert_in_range(m->submit_answer->job, 1, IDS_MAX - 1);
 	struct outage_job *j = &f->jobs[m->submit_answer->job];
-	assert_false(j->submitted); /* an id is given out once */
+	assert_false(j->submitted); /* an id is assigned only once */
 	j->submitted = true;
 	f->accepted++;
 	return true;
@@ -384,7 +384,7 @@ void outage_stop(struct farm_run *f)
 	assert_int_equal(outage_gone(f, true), -1);
 }
 
-/* All is done and the coordinator idle: another job, and at its first call power is lost. */
+/* Submits another job when everything is done and the coordinator is idle; power is lost at its first call. */
 void outage_cut_power(struct farm_run *f)
 {
 	atomic_store(&outage.counts[4], 1);

@@ -3,7 +3,7 @@
 
 #include <stdio.h>
 
-/* Cached and fresh values may differ by rounding, amplified where a lobe is narrow. */
+/* Cached and fresh values may differ by rounding, which narrow lobes amplify. */
 #define CHECK_TOLERANCE 1e-6
 
 static bool close_to(double a, double b)
@@ -25,8 +25,8 @@ static bool same_vector(vec3 a, vec3 b)
 	return vec3_dot(d, d) <= CHECK_TOLERANCE * CHECK_TOLERANCE * fmax(vec3_dot(b, b), 1);
 }
 
-/* The checks change what they look at. A path is 64 kB, most of it unused: of 25 s of detailed balance, copying all of
- * it took 6. */
+/* The checks change the path that they examine, so they work on a copy. A path is 64 kB, most of it unused: copying
+ * all of it took 6 of 25 s in a test of detailed balance. */
 static struct full_path *copy_of(const struct full_path *x)
 {
 	static _Thread_local struct full_path copy;
@@ -64,7 +64,7 @@ static bool check_edges(struct path_context *c, const struct full_path *x, char 
 	return true;
 }
 
-/* The specular direction is met as exactly as walks do. */
+/* The specular direction is met as accurately as by walks. */
 #define SPECULAR_TOLERANCE 1e-6
 
 static bool check_specular(const struct full_path *x, unsigned j, char *text, size_t size)
@@ -103,7 +103,8 @@ static bool check_vertices(const struct path_context *c, const struct full_path 
 	return true;
 }
 
-/* Seen from the camera: a ray that meets a triangle in float and just misses it in double ends on its edge. */
+/* For vertices seen from the camera: a ray that hits a triangle in float and just misses it in double ends on its
+ * edge. */
 #define FILM_TOLERANCE 0x1p-22
 
 bool path_check(struct path_context *c, const struct full_path *x, char *text, size_t size)

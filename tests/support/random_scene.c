@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Writes the XML piece by piece: camera, walls, shapes, environment, lamp, beam. A material's nodes
- * become nested elements. What does not fit into the body fails the test.
+ * Writes the XML piece by piece: camera, walls, shapes, environment, lamp, beam. A material's nodes become nested
+ * elements. If the text does not fit into the body, the test fails.
  */
 #include "tests/support/random_scene.h"
 
@@ -41,7 +41,7 @@ static double random_between(struct maker *m, double low, double high)
 	return dice_between(&m->d, low, high);
 }
 
-/* One number a call: the order in which arguments are evaluated is the compiler's. */
+/* Draws one number per call, because the order in which arguments are evaluated is the compiler's choice. */
 static void put_between(struct maker *m, const char *before, double low, double high, const char *after)
 {
 	PUT(m, "%s%.3f%s", before, random_between(m, low, high), after);
@@ -96,7 +96,7 @@ static void put_node(struct maker *m, const struct scene_node *n, const char *na
 	PUT(m, "</%s>", element);
 }
 
-/* Tiles of two normals, up to 60 degrees off the surface's. */
+/* Begins a normal map of tiles with two normals, up to 60 degrees from the surface's. */
 static void begin_relief(struct maker *m)
 {
 	PUT(m, "<bsdf type='normalmap'><texture type='checkerboard'>");
@@ -123,7 +123,8 @@ static void put_material(struct maker *m)
 		PUT(m, "</bsdf>");
 }
 
-/* Of shapes of about the unit ball: stretched, turned, and put into a box around (0, y, 0). */
+/* Adds a transform for shapes of about the size of the unit ball: stretched, rotated, and moved into a box around
+ * (0, y, 0). */
 static void put_place(struct maker *m, double size, double y, double reach)
 {
 	vec3 axis = dice_direction(&m->d);
@@ -151,7 +152,7 @@ static void put_phase(struct maker *m)
 	PUT(m, "</phase>");
 }
 
-/* That absorbs, or in fog may scatter. */
+/* Adds a medium that absorbs or, in fog, may scatter. */
 static void put_medium(struct maker *m, const char *name)
 {
 	PUT(m, "<medium type='homogeneous' name='%s'>", name);
@@ -186,7 +187,7 @@ enum { SHAPES = sizeof shapes / sizeof *shapes };
 static void put_shape(struct maker *m)
 {
 	unsigned k = dice_below(&m->d, SHAPES + 1);
-	if (k == SHAPES) { /* the same mesh in two places */
+	if (k == SHAPES) { /* the same mesh at two places */
 		size_t id = m->s->used;
 		PUT(m, "<shape type='shapegroup' id='g%zu'><shape type='cylinder'>", id);
 		put_material(m);
@@ -206,7 +207,7 @@ static void put_shape(struct maker *m)
 		PUT(m, "<bsdf type='null'/>");
 	else
 		put_material(m);
-	/* on either side of any shape, whether it is closed or not: most of them do not fit together */
+	/* on either side of any shape, closed or not: most of these media contradict each other */
 	if (is_drawn(m, m->fog ? 0.7 : 0.2))
 		put_medium(m, is_drawn(m, 0.7) ? "interior" : "exterior");
 	PUT(m, "</shape>");
@@ -259,10 +260,10 @@ static void put_environment(struct maker *m)
 	}
 }
 
-/* A lamp that paths can hit. */
+/* Adds an emitter that paths can hit. */
 static void put_lamp(struct maker *m)
 {
-	unsigned k = dice_below(&m->d, SHAPES - 1); /* not the displaced ball */
+	unsigned k = dice_below(&m->d, SHAPES - 1); /* any shape except the displaced ball */
 	PUT(m, "<shape type='%s'>%s<emitter type='area'>", shapes[k].type, shapes[k].inner);
 	if (is_drawn(m, 0.2))
 		PUT(m,
@@ -276,7 +277,7 @@ static void put_lamp(struct maker *m)
 	PUT(m, "</shape>");
 }
 
-/* Under the ceiling, aimed at the floor. */
+/* Adds an emitter under the ceiling, aimed at the floor. */
 static void put_aimed(struct maker *m, const char *type)
 {
 	PUT(m, "<emitter type='%s'><transform name='to_world'><lookat target='0,-1,0' up='0,0,1' origin='", type);

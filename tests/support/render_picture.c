@@ -93,8 +93,8 @@ void render_picture_xyz(const struct world *w, const struct render_picture_how *
 {
 	struct plan p = make_plan(w, how);
 	make_black(out, p.width, p.height);
-	/* Two parts at a time, added in order: where strips overlap by the filter, sums do not depend on which ends
-	 * first. */
+	/* Two parts at a time, added in order: where their strips overlap because of the filter, sums do not depend on
+	 * which part ends first. */
 	for (uint32_t part = 0; part < p.parts; part += 2) {
 		struct part_run run[2] = {{.w = w, .p = &p, .part = part}, {.w = w, .p = &p, .part = part + 1}};
 		pthread_t other;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Small rooms for tests of mutations and densities, each with one more kind of transport: glass, mirrors, bent normals,
- * fog, clouds, a sky, point lights, thin lenses, moving things. Few surfaces and a lamp, so that a pass over all rooms
- * takes seconds.
+ * fog, clouds, a sky, point lights, thin lenses, moving objects. Each has few surfaces and a lamp, so that a pass over
+ * all rooms takes seconds.
  */
 /* Scenes are laid out by hand. */
 /* clang-format off */
@@ -68,7 +68,7 @@ static struct world *mirror(void)
 			     "<bsdf type='mask'><float name='opacity' value='0.4'/><bsdf type='diffuse'/></bsdf></shape>");
 }
 
-/* Normals of vertices up to 40 degrees off the triangles'. */
+/* Normals of vertices up to 40 degrees from those of the triangles. */
 static const char bent_obj[] = "v -3 -1 -3\nv 3 -1.2 -3\nv 3 -1 3\nv -3 -1.1 3\nv 0 -.7 0\n"
 			       "vn -.5 1 .3\nvn .4 1 -.4\nvn .6 1 .2\nvn -.2 1 .7\nvn .3 1 -.5\n"
 			       "f 1//1 5//5 2//2\nf 2//2 5//5 3//3\nf 3//3 5//5 4//4\nf 4//4 5//5 1//1\n";
@@ -93,7 +93,7 @@ static struct world *sky(void)
 			     "<emitter type='constant'><rgb name='radiance' value='0.8,0.9,1'/></emitter>");
 }
 
-/* A picture around, unlike on all sides. */
+/* An environment map that differs on all sides. */
 static struct world *picture(void)
 {
 	static const char scene[] = "<scene version='3.0.0'>" SENSOR("0,1,5", "0,0,0")
@@ -157,7 +157,7 @@ static struct world *dents(void)
 			     "<float name='displacement_scale' value='0.06'/><integer name='displacement_level' value='3'/></shape>");
 }
 
-/* In it a stone, which states no medium; beside it a lamp in clear glass. */
+/* Coloured glass with a stone in it, which states no medium; beside it a lamp in clear glass. */
 static struct world *coloured_glass(void)
 {
 	return world_of_text(32, 32, ROOM LAMP BALL(CLOUDY("0.25") "<medium type='homogeneous' name='interior'>"
@@ -180,7 +180,7 @@ static struct world *tilted_parts(void)
 						    "<float name='alpha' value='0.3'/></bsdf></bsdf></bsdf>"));
 }
 
-/* Steep enough that many face away from the camera. */
+/* Relief so steep that many normals face away from the camera. */
 static struct world *turned_normals(void)
 {
 	return world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='normalmap'><texture type='checkerboard'>"
@@ -188,7 +188,7 @@ static struct world *turned_normals(void)
 						    "<rgb name='color1' value='0.15,0.8,0.75'/></texture>" METAL("0.3") "</bsdf>"));
 }
 
-/* A cloud of three colours that its null faces let light into, and milk in rough glass. */
+/* A cloud of three colours that light enters through its null faces, and milk in rough glass. */
 static struct world *clouds(void)
 {
 	return world_of_text(32, 32, ROOM LAMP
@@ -214,9 +214,10 @@ static struct world *fog(void)
 				"<ref name='exterior' id='fog'/></shape>");
 }
 
-/* Fog of which only the camera knows: the light's own sub-paths begin outside of it, and many paths that the camera
- * could have are none of any technique. The strips before the wall end it: there the light's sub-paths bring what a
- * mirror sends, and beside them no technique does, so that a mutation that leaves a strip leaves what is rendered. */
+/* Fog that only the camera states: light sub-paths begin outside it, and many paths that the camera could start are
+ * made by no technique. The strips before the wall end the fog: there light sub-paths bring the light that a mirror
+ * sends, and beside them no technique does, so that a mutation which leaves a strip leaves the paths that are
+ * rendered. */
 #define STRIP(x)                                                                                                                \
 	"<shape type='rectangle'>" AT("<scale x='0.2' y='1.2'/><translate x='" x "' y='-0.5' z='-1.9'/>") PLAIN("0.5,0.45,0.35")  \
 	INSIDE("<float name='sigma_t' value='0.3'/><float name='albedo' value='0.8'/>") "</shape>"
@@ -241,8 +242,8 @@ static struct world *misfit(void)
 #define FROM(t, inner) "<transform time='" t "'>" inner "</transform>"
 #define MOVES(a, b) "<animation name='to_world'>" FROM("0", a) FROM("1", b) "</animation>"
 
-/* While the shutter is open the camera follows a little, a ball of metal rolls and shrinks, cloudy glass turns, a group
- * slides, and the lamp swings and is stretched. */
+/* While the shutter is open, the camera moves a little, a ball of metal rolls and shrinks, cloudy glass turns, a
+ * group slides, and the lamp swings and is stretched. */
 static struct world *moving(void)
 {
 	static const char scene[] = "<scene version='3.0.0'>"

@@ -53,7 +53,7 @@ unsigned char *sample_png(size_t width, size_t height, enum sample_pixels kind, 
 	png_bytep *rows = malloc(height * sizeof *rows);
 	for (size_t y = 0; y < height; y++) {
 		rows[y] = pixels + y * stride;
-		for (size_t i = 0; i < stride; i++) { /* both bytes of 16 bits the same */
+		for (size_t i = 0; i < stride; i++) { /* with 16 bits both bytes are the same */
 			size_t sample = i / ((size_t)bits / 8);
 			rows[y][i] = (png_byte)sample_value(sample / channels[kind], y, (int)(sample % channels[kind]));
 		}

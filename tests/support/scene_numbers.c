@@ -71,7 +71,7 @@ static const char *const extremes[] = {
 };
 enum { EXTREMES = sizeof extremes / sizeof *extremes };
 
-/* The end of the number at p; NULL: none begins there. */
+/* Returns the end of the number at p; NULL if none begins there. */
 static const char *number_at(const char *p)
 {
 	const char *digits = p + (*p == '-' || *p == '+');
@@ -147,7 +147,7 @@ size_t scene_numbers_count(const char *text)
 	return find(text, spans);
 }
 
-/* Half of them from the list, with any sign; the others are what was there, times a power of ten. */
+/* Replaces half of the numbers by values from the list, with any sign, and multiplies the others by a power of ten. */
 static void replace(struct span s, struct dice *d, char out[NUMBER_BYTES])
 {
 	if (dice_below(d, 2) == 0) {

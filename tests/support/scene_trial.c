@@ -97,7 +97,7 @@ static int try_in_child(const struct memory_file *files)
 		rc = render_check(&s, &assets, &o, &summary, &e);
 	if (rc)
 		return end_with(has_place(e.text) ? TRIAL_REFUSED : TRIAL_NO_PLACE, e.text);
-	o.width = o.height = 24; /* the film's numbers have been looked at: they cost memory, no more */
+	o.width = o.height = 24; /* a larger film costs only memory, and its numbers have been checked already */
 	if (world_new(&w, &s, &assets, &o, &e))
 		return end_with(TRIAL_FAILED, e.text);
 	world_summary(w, &summary);

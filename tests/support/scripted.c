@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Peers of a coordinator (scripted.h): frames over a blocking socket, and messages with the least that each needs.
- * Results are computed from the lease's tag, so that a test can tell from an image which leases it has, and how often.
+ * Peers of a coordinator (scripted.h): frames over a blocking socket, and messages with the minimum that each needs.
+ * Results are computed from the lease's tag, so that a test can tell from an image which leases it contains, and how
+ * often.
  */
 #include "tests/support/scripted.h"
 
@@ -52,7 +53,7 @@ uint16_t scripted_port(const char *port_file)
 	return (uint16_t)port;
 }
 
-/* Frees the bytes. */
+/* Sends the bytes and frees them. */
 static bool send_all(const struct scripted *p, unsigned char *bytes, size_t size)
 {
 	size_t done = 0;
@@ -163,7 +164,7 @@ void scripted_hang_up(struct scripted *p)
 	free(p);
 }
 
-/* ---- what a client says ---- */
+/* ---- the messages of a client */
 
 static ProtobufCBinaryData hash_of(const char *text, struct blob_hash *h)
 {
@@ -247,7 +248,7 @@ bool scripted_fetch(const struct scripted *p, uint64_t job, Farm__What what, uin
 	return scripted_say(p, &m, NULL, 0);
 }
 
-/* ---- what a worker makes ---- */
+/* ---- the results of a worker */
 
 uint64_t scripted_tag(const struct lease_key *k)
 {

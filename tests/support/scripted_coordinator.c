@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Says and hears the messages of a coordinator, one at a time. While nothing has come, coord_hear runs the worker's
- * loop, for a minute at most; whatever else than the expected message comes fails the test at the line that expected
+ * Sends and receives the messages of a coordinator, one at a time. While nothing has arrived, coord_hear runs the
+ * worker's loop, for a minute at most. Any message other than the expected one fails the test at the line that expected
  * it.
  */
 #include "tests/support/scripted_coordinator.h"
@@ -105,7 +105,7 @@ void coord_grant(uint64_t job)
 	coord_hear_job_get(job);
 }
 
-/* A scene of its own, which is none, and the mesh that all have. */
+/* Describes a job by its own scene file, which contains no scene, and the common mesh. */
 void coord_describe(uint64_t job)
 {
 	struct coord_file *all[2] = {&coord.scenes[job - 1], &coord.mesh};
@@ -160,7 +160,7 @@ void coord_send_piece(struct coord_file *f, uint64_t offset)
 	send_message(&m, FARM__ENVELOPE__BODY_BLOB_CHUNK, f->bytes + offset, left < PIECE ? left : PIECE);
 }
 
-/* Each piece is asked for once, from the given one on; the last one is asked for. */
+/* Each piece is requested once, from the given one on, including the last one. */
 void coord_serve_mesh(int from, int to)
 {
 	for (int i = from; i < to; i++) {
@@ -180,7 +180,7 @@ void coord_end_job(uint64_t job)
 	send_message(&m, FARM__ENVELOPE__BODY_JOB_END, NULL, 0);
 }
 
-/* The lease of a job that could be fetched fails with its scene, which is none. */
+/* The lease of a job that could be fetched fails, because its file contains no scene. */
 uint64_t coord_hear_failed(const char *why)
 {
 	const Farm__Envelope *m = coord_hear();
@@ -201,7 +201,7 @@ void coord_hear_built(int count)
 	assert_int_equal(__builtin_popcount(jobs), count);
 }
 
-/* It says nothing more: the answer to something else comes next. */
+/* Checks that the worker sends nothing more: the answer to another message comes next. */
 void coord_hear_silence(void)
 {
 	coord_grant(4);
@@ -238,7 +238,7 @@ void coord_finish(void)
 	close(coord.listener);
 }
 
-/* Jobs 1 to count, with their own files; whoever asked first has asked for the mesh. */
+/* Jobs 1 to count have their own files; the first one to need the mesh asks for it. */
 void coord_begin_jobs(uint64_t count)
 {
 	for (uint64_t j = 1; j <= count; j++)

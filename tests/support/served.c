@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The server of tests about peers (served.h): a child process with its own spool, and a timer that carries out the
- * test's wishes there. The parent waits for its port, and at the end asks it to stop and looks at its exit code, so
- * that leaks and errors of sanitizers in the child fail the test.
+ * The server for tests of peers (served.h): a child process with its own spool, and a timer in it that carries out the
+ * test's requests. The parent waits for its port; at the end it asks the child to stop and checks its exit code, so
+ * that leaks and sanitizer errors in the child fail the test.
  */
 #include "tests/support/served.h"
 
@@ -39,9 +39,9 @@ static uint16_t port;
 static void (*prepare)(const char *path);
 static struct {
 	_Atomic unsigned count, at_once;
-} * turns; /* of its loop; shared with it */
+} * turns; /* turns of its loop, shared with the child */
 
-/* While the folder has a file `busy` nobody may look at the films of jobs. */
+/* While the folder contains a file `busy`, access to the films of jobs is forbidden. */
 static void on_look(uv_timer_t *t)
 {
 	static bool held;
@@ -51,7 +51,7 @@ static void on_look(uv_timer_t *t)
 	bool wanted = access(path, F_OK) == 0;
 	snprintf(path, sizeof path, "%s/nomem", folder);
 	if (remove(path) == 0)
-		mem_fail_after(1); /* a caller's session is made, and its connection is not */
+		mem_fail_after(1); /* the caller's session is allocated, but its connection is not */
 	if (held == wanted)
 		return;
 	held = wanted;

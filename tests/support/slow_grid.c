@@ -99,7 +99,8 @@ double slow_grid_integral(const struct grid *g, const struct grid_ray *r, int ch
 		double x[3], v[3], length = cut[i + 1] - cut[i];
 		if (!slow_grid_has(g, vec3_madd(r->o, cut[i] + length / 2, r->d)))
 			continue;
-		/* Halfway towards the ends, where a value may jump: three points are exact for a cubic anywhere. */
+		/* Points halfway towards the ends, because a value may jump there: any three points are exact for a
+		 * cubic. */
 		for (int k = 0; k < 3; k++) {
 			slow_grid_cells(g, r, cut[i] + length * (k + 1) / 4, x);
 			v[k] = slow_grid_value(g, x, channel);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A coordinator whose disk calls meet the test's wishes (staged.h): the functions behind common/base/disk.h look at
- * flags in memory that both processes share, wait until they are told to go on, or fail. Which call is meant is told
- * by its file's name.
+ * A coordinator whose disk calls obey the test (staged.h): the functions behind common/base/disk.h look at flags in
+ * memory that both processes share, and wait until they are told to go on, or fail. The name of its file identifies a
+ * call.
  */
 #include "tests/support/staged.h"
 
@@ -106,7 +106,7 @@ static int refuse_commit(void *user)
 	return staged_disk->fail_ledger;
 }
 
-/* SQLite calls it for each connection that it opens. */
+/* SQLite calls this for each connection that it opens. */
 int staged_hook_commits(sqlite3 *db, const char **text, const struct sqlite3_api_routines *api)
 {
 	(void)text;
@@ -146,7 +146,7 @@ void staged_start(void)
 	fflush(NULL);
 	pid = fork();
 	if (pid == 0) {
-		signal(SIGSEGV, SIG_DFL); /* or the test would go on in it */
+		signal(SIGSEGV, SIG_DFL); /* otherwise the test would continue in the child */
 		serve();
 	}
 	uint16_t port = scripted_port(port_file);

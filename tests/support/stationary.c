@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Stationarity of a mutation (stationary.h): groups of starts on all processors, each with its own seed; the functions
- * looked at; the test of their differences.
+ * Stationarity of a mutation (stationary.h): groups of starts on all processors, each with its own seed; the test
+ * functions; the test of their differences.
  *
- * A group takes its starts from bdpt's samples in proportion to f, runs STATIONARY_STEPS mutations from each, and adds
- * up each function before and after, where a proposal counts with its acceptance and the state before it with the
- * rest. judge_groups then tests the mean difference between groups. The result does not depend on the number of
+ * A group takes its starts from bdpt's samples in proportion to f, runs STATIONARY_STEPS mutations from each, and sums
+ * each function before and after, where a proposal counts with its acceptance probability and the state before it with
+ * the rest. judge_groups then tests the mean difference between groups. The result does not depend on the number of
  * threads.
  */
 #include "tests/support/length.h"
@@ -28,7 +28,7 @@
 #include <time.h>
 
 #define LEVEL 1e-6
-/* One end state in so many is checked. */
+/* CHECK_INTERVAL: one in so many final states is checked. */
 enum { CHECK_INTERVAL = 16, INNER = 3, FROM_LIGHT = 4, EDGES = 6 };
 
 struct group {
@@ -37,7 +37,7 @@ struct group {
 	const struct mixture_entry *entry;
 	uint64_t seed, start_seed;
 	uint32_t number, starts, bootstrap;
-	bool resampled; /* starts are known: indices of the bootstrap */
+	bool resampled; /* the starts are known, as indices into the bootstrap */
 	uint64_t *index;
 	double weight;							  /* mean of the bootstrap */
 	double first[STATIONARY_FUNCTIONS], change[STATIONARY_FUNCTIONS]; /* means over the starts, times weight */
@@ -75,7 +75,7 @@ static double unit(double a, double radius)
 	return 0.5 * (1 + a / radius);
 }
 
-/* By their geometry terms: both ends move, and a join depends on nothing else. */
+/* Computes functions of edges from their geometry terms: both ends move, and a join depends on nothing else. */
 static void look_at_edges(const struct path_context *c, const struct full_path *x, double out[EDGES])
 {
 	unsigned k = x->edges;
@@ -91,7 +91,7 @@ static void look_at_edges(const struct path_context *c, const struct full_path *
 	}
 }
 
-/* All between 0 and 1, or nearly so. */
+/* Computes all functions, whose values are between 0 and 1, or nearly so. */
 static void look_at(const struct path_context *c, struct full_path *x, double out[STATIONARY_FUNCTIONS])
 {
 	const struct film_window *f = &c->window;
@@ -136,7 +136,7 @@ static double evaluate(struct group *g, uint64_t index)
 	return sample.intensity;
 }
 
-/* Indices in proportion to their weights, systematically. */
+/* Selects indices in proportion to their weights, by systematic resampling. */
 static void resample(struct group *g)
 {
 	double *sum = calloc(g->bootstrap, sizeof *sum), total = 0, r[4];
@@ -153,7 +153,7 @@ static void resample(struct group *g)
 	g->weight = total / g->bootstrap;
 }
 
-/* Of the edge at which x_b was joined. */
+/* Returns the logarithm of the geometry term of the edge at which x_b was joined. */
 static double log_geometry(const struct full_path *x, unsigned b)
 {
 	return b > 0 ? log(path_cosine(&x->v[b - 1], x->edge[b - 1].w) / x->edge[b - 1].distance2) : 0;
@@ -175,7 +175,7 @@ static double planted_factor(enum stationary_fault fault, const struct move *m, 
 	return 0;
 }
 
-/* What may not come up; the state itself may not be black either. */
+/* Counts values that must not occur; the state itself must not be black either. */
 static void count_unsound(struct group *g, double log_weight, bool state)
 {
 	if (isnan(log_weight))
@@ -184,7 +184,7 @@ static void count_unsound(struct group *g, double log_weight, bool state)
 		g->counters[COUNT_INFINITE]++;
 }
 
-/* The probability of acceptance of y. */
+/* Proposes y and returns its acceptance probability. */
 static double propose(struct group *g, struct full_path *x, struct full_path *y, struct move *move)
 {
 	const struct mutation_ops *ops = g->entry->ops;
@@ -312,7 +312,7 @@ static void judge_groups(const struct group *groups, struct stationary_result *o
 			scale += groups[g].first[f] / STATIONARY_GROUPS;
 		}
 		struct stats_mean m = stats_mean_test(change, STATIONARY_GROUPS, 0);
-		/* What never changes is 0 up to rounding. */
+		/* A function that never changes is 0 up to rounding. */
 		if (!(scale > 0) || !(m.error > 1e-12 * weight))
 			continue;
 		out->bias[f] = m.mean / scale;

@@ -95,7 +95,7 @@ double stats_counts_p(const uint64_t *observed, const double *expected, size_t c
 		pooled_observed += sorted[i].observed;
 		if (sorted[i].expected == 0 && sorted[i].observed > 0)
 			p = 0;
-		/* The last cells, the largest, close the last pool. */
+		/* The last cells, the largest, are added to the last pool. */
 		if (pooled_expected >= 5) {
 			double d = pooled_observed - pooled_expected;
 			chi2 += d * d / pooled_expected;

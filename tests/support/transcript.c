@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Transcripts (transcript.h): a line's words become an event, the core handles it, and its actions become text that is
- * compared with what stands behind the arrow. A line that cannot be parsed ends the test with its text; one that
- * differs is printed as it is and as it should be.
+ * compared with the part after the arrow. A line that cannot be parsed ends the test with its text; one that differs is
+ * printed as it is and as it should be.
  */
 #include "tests/support/transcript.h"
 
@@ -224,7 +224,7 @@ static void take_submit(const char **at, struct event *ev, struct plan *p, char 
 	p->chains = p->kind == PLAN_CHAINS ? p->groups * p->parts * 4 : 0;
 }
 
-/* [certificate=C] [name=N] [home=H] [start=K], texts of a letter. */
+/* Parses [certificate=C] [name=N] [home=H] [start=K], each one letter. */
 static void take_identity(const char **at, struct event_join *j)
 {
 	static const char *const letters[] = {"a", "b", "c", "d"};
@@ -290,7 +290,8 @@ static void take_worker(const char **at, struct event *ev, char *name, char *fin
 	}
 }
 
-/* restore [asked] J boot|render N,N,... [fingerprint=F] [elapsed=T] [completed=T] [black] [options of submit] */
+/* Parses restore [asked] J boot|render N,N,... [fingerprint=F] [elapsed=T] [completed=T] [black] [options of
+ * submit]. */
 static void take_restore(const char **at, struct event *ev, struct plan *p, char *fingerprint, uint64_t *next,
 			 const struct forecast_history *looks, char owner[WORD])
 {
@@ -366,7 +367,7 @@ static void take_job(const char **at, struct event *ev)
 		ev->tag = 7;
 		ev->job = take_id(at, "j");
 		ev->priority = (int)take_number(at);
-	} else if (skip_word(at, "quarantined")) { /* NAME's letter, as when it joins */
+	} else if (skip_word(at, "quarantined")) { /* the letter of NAME, as for `joins` */
 		ev->kind = EVENT_QUARANTINED;
 		take_identity(at, &ev->join);
 	} else if (skip_word(at, "broken")) {
@@ -445,7 +446,8 @@ struct farm *transcript_farm(void)
 	return f;
 }
 
-/* A living job for which nobody works, or that is held, says what it waits for; also to its owner. */
+/* Returns whether a job that is active but has no leases, or is held, states what it waits for, to its owner as
+ * well. */
 static bool says_why(const struct farm *f, const char *line)
 {
 	enum { JOBS = 64 };

@@ -30,7 +30,7 @@ static struct world *build(const struct asset_source *assets, const char *name, 
 	struct render_options o = options(width, height);
 	int rc = scene_read(&s, assets, name, render_plugins(), NULL, 0, &e);
 	if (!rc) {
-		/* Scenes of tests need not care which way their surfaces face, unless they say so. */
+		/* Scenes of tests need not care which way their surfaces face, unless they set `backs`. */
 		s.black_backs &= strstr(o.accuracy, "backs=") != NULL;
 		rc = world_new(&w, &s, assets, &o, &e);
 		scene_fini(&s);
