@@ -11,17 +11,6 @@
  * for good. Any thread; nothing is really flushed. Films mapped into memory (O_TMPFILE) are ignored, because they do
  * not survive anyway.
  */
-/*
- * A disk of tests behind common/base/disk.h and behind SQLite: below one folder it does what is asked of it and keeps
- * beside, in memory, what a loss of power would leave. A file's bytes and length are safe after a flush of the file,
- * its name after a flush of the folder; of what was done since, a loss of power keeps a random part: of bytes by the
- * sector, of lengths, of names one by one (made, renamed, gone). A flush of a file that fails forgets what it did not
- * write, and the next one says that all is well, as systems do. What is left is written to another folder, and the
- * process ends. Or calls fail, from the n-th on.
- *
- * For a process of its own (fork): faulty_disk_begin replaces the door and SQLite's default VFS for good. Any thread;
- * nothing is flushed for real. Films mapped into memory (O_TMPFILE) are not looked at: nobody finds them again.
- */
 #ifndef TESTS_SUPPORT_FAULTY_DISK_H
 #define TESTS_SUPPORT_FAULTY_DISK_H
 

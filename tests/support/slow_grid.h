@@ -1,9 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Grids of numbers (worker/render/volume/grid.h), evaluated slowly: values as weighted sums over points; integrals
- * by three points, exact for cubic polynomials, between all planes that the ray crosses, sorted. */
 /*
- * Grids of numbers (worker/render/volume/grid.h) the slow way: values as weighted sums over points, integrals by
- * three points, which are exact for cubic polynomials, between all planes that the ray crosses anywhere, sorted.
+ * Grids of numbers (worker/render/volume/grid.h), evaluated slowly: values as weighted sums over points; integrals by
+ * three points, exact for cubic polynomials, between all planes that the ray crosses, sorted.
  */
 #ifndef TESTS_SUPPORT_SLOW_GRID_H
 #define TESTS_SUPPORT_SLOW_GRID_H

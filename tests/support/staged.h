@@ -1,11 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A coordinator in a process of its own, whose disk calls wait or fail on the test's demand, with one client and one
- * worker. The test and the coordinator share struct staged_disk. One coordinator at a time; a failed check ends the
- * test. */
 /*
- * A coordinator in a process of its own, whose disk calls wait or fail when the test says so, with one client and one
- * worker. The test and the coordinator share struct staged_disk. One coordinator at a time; a check that fails ends
- * the test.
+ * A coordinator in a process of its own, whose disk calls wait or fail on the test's demand, with one client and one
+ * worker. The test and the coordinator share struct staged_disk. One coordinator at a time; a failed check ends the
+ * test.
  */
 #ifndef TESTS_SUPPORT_STAGED_H
 #define TESTS_SUPPORT_STAGED_H

@@ -1,12 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Each primitive of triangles becomes a shape of type "gltf" that names its buffer and the position of its numbers
- * there, or that contains its vertices if they have to be computed (gltf_pose.h). Points and lines have no area and are
- * left out, with a note. A large mesh of several nodes becomes a shapegroup, and each of its nodes an instance.
- * Failures: accessors of a type that the attribute cannot have, accessors that exceed their views. */
 /*
  * Each primitive of triangles becomes a shape of type "gltf" that names its buffer and the position of its numbers
- * there, or has its vertices itself where they have to be computed (gltf_pose.h). Points and lines have no area and are
- * left out, with a note. A mesh of several nodes that is large becomes a shapegroup, and each of its nodes an instance.
+ * there, or that contains its vertices if they have to be computed (gltf_pose.h). Points and lines have no area and are
+ * left out, with a note. A large mesh of several nodes becomes a shapegroup, and each of its nodes an instance.
  * Failures: accessors of a type that the attribute cannot have, accessors that exceed their views.
  */
 #include "worker/render/gltf/gltf_mesh.h"

@@ -5,12 +5,6 @@
  *
  * Failures: attributes of different lengths, joints that do not exist, more than EMBEDDED_MAX bytes in one file.
  */
-/*
- * Reads all attributes as numbers, adds the morph targets by their weights (glTF 2.0, section 3.7.2.2), moves the
- * vertices by the skin's joints (3.7.3), and puts floats and indices into the shape as
- * base64 (asset/asset_range.h). Failures: attributes of different lengths, joints that are none, more bytes than
- * EMBEDDED_MAX in one file.
- */
 #include "worker/render/gltf/gltf_pose.h"
 
 #include "common/base/liveness.h"

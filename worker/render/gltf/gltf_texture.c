@@ -8,13 +8,6 @@
  * an image in an unsupported format a texture of such a type: both are refused with that name, or left out with
  * --lenient.
  */
-/*
- * A texture becomes a `bitmap` with the sampler's wrap modes and the transform of KHR_texture_transform, inside a
- * `scale` if it has a factor. Of a material's sets of texture coordinates one is the shape's, by which normal maps
- * bend, and another its attribute vertex_texcoord. Failures: indices of nothing, textures without a source. A third set
- * becomes a property that no table knows, and an image of a format that is not read a texture of such a type: refused
- * with its name, or left out with --lenient.
- */
 #include "worker/render/gltf/gltf_texture.h"
 #include "worker/render/gltf/gltf_buffer.h"
 

@@ -90,9 +90,8 @@ struct plugin_decl {
 	const char *type;	    /* as written in type="..." */
 	const struct param *params; /* ends with a row whose name is NULL; NULL: no parameters */
 	unsigned nested_classes;    /* bits 1 << enum plugin_class */
-	enum param_class status;    /* PARAM_IGNORED: the plug-in (a sampler, say) has no effect except through the
-				       parameters that it understands, and everything else in it is skipped. PARAM_REFUSED
-				       is never used here: a plug-in that is not listed is refused. */
+	enum param_class status;    /* PARAM_IGNORED: only the parameters that it understands have an effect, as for
+				       samplers. Never PARAM_REFUSED: a plug-in that is not listed is refused. */
 };
 
 /* A list of parameters, terminated. */

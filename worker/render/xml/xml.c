@@ -117,8 +117,7 @@ static int out_of_memory(struct reader *r)
 			 r->file, line_now(r), XML_MEMORY_MAX >> 20);
 }
 
-/* Adds the error to the list of missing things: all names without a value and all missing files are reported, not
- * only the first. */
+/* Adds the error to the list of missing things: all undefined names and all missing files are reported. */
 static int note_missing(struct reader *r)
 {
 	const char *text = arena_strdup(r->arena, r->error->text);
@@ -193,8 +192,7 @@ static int needs_version(const struct reader *r, const struct xml_element *el)
 	return xml_error(el, r->error, EINVAL, "needs a version, such as version=\"0.6.0\" or version=\"3.0.0\"");
 }
 
-/* Files from before 0.3 state no version. A main file without one is first read as such a file, and checked at its
- * end; the files that it includes need no version either. */
+/* A file without a version is read as one from before 0.3, and checked at its end; so are files that it includes. */
 static const char *version_of(const struct reader *r, const struct xml_element *el)
 {
 	const char *version = xml_attribute(el, "version");
@@ -202,8 +200,7 @@ static const char *version_of(const struct reader *r, const struct xml_element *
 	return old ? "0.2" : version;
 }
 
-/* Selects the dialect, whose names and rules apply, by the file's version. An included file may hold a single object
- * instead of a <scene>. */
+/* Selects the file's dialect by its version. An included file may hold a single object instead of a <scene>. */
 static int begin_file(struct reader *r, struct xml_element *el)
 {
 	if (!el->parent && strcmp(el->name, "scene") != 0)
@@ -278,8 +275,7 @@ static int read_path(struct reader *r, const struct xml_element *el)
 	return 0;
 }
 
-/* Notes that a file was found by the end of its path: once for the whole scene, which often has hundreds of such
- * paths. */
+/* Notes that a file was found by the end of its path, once per scene: there are often hundreds of such paths. */
 static int note_end(struct reader *r, const char *written, const char *name)
 {
 	if (!name || r->by_end || r->tree->note_count == XML_NOTES_MAX)
@@ -298,9 +294,8 @@ static int note_end(struct reader *r, const char *written, const char *name)
 	return 0;
 }
 
-/* Finds the files named by <include filename>, <spectrum filename> and <string name="filename" value>. The last is
- * opened by a plug-in; Mitsuba's plug-ins do not know which scene file names it, so it is not searched for beside that
- * file. */
+/* Finds the files named by <include filename>, <spectrum filename> and <string name="filename" value>. The last is for
+ * a plug-in; as Mitsuba's do not know which scene file names it, it is not looked for beside that file. */
 static int find_files(struct reader *r, struct xml_element *el)
 {
 	const char *named = xml_attribute(el, "name");
@@ -367,8 +362,7 @@ static int open_element(struct reader *r, const char *name, const char **attribu
 
 static int read_file(struct reader *r, const char *name);
 
-/* Marks an element that is still open where a file breaks off. The file of an open <include> was not read, because
- * that happens at its end tag. */
+/* Marks an element that is still open where a file breaks off. An open <include> has not been read yet. */
 static void leave_open(struct xml_element *el)
 {
 	el->told = true;
@@ -413,8 +407,7 @@ static int read_include(struct reader *r, struct xml_element *el)
 	if (!name)
 		return xml_error(el, r->error, EINVAL, "needs filename");
 	if (!at_top && r->minor >= 0)
-		return xml_error(el, r->error, EINVAL,
-				 "in files of versions before 0.5 it must be directly in <scene>");
+		return xml_error(el, r->error, EINVAL, "in files before 0.5 it must be directly in <scene>");
 	int c = at_top ? 0 : element_check(el, "filename", false, r->error);
 	if (c)
 		return c;
@@ -470,8 +463,7 @@ static void on_start(void *user, const char *name, const char **attributes)
 		stop(r, c);
 }
 
-/* Text between elements is most often a stray character. Mitsuba ignores it silently, so one note per scene is
- * enough. */
+/* Notes text between elements, most often a stray character: once per scene, since Mitsuba ignores it silently. */
 static int note_text(struct reader *r, const struct xml_element *el)
 {
 	if (!el->text || el->ignored || r->worded || r->tree->note_count == XML_NOTES_MAX)

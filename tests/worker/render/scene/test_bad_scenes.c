@@ -455,7 +455,7 @@ static void test_bad_includes(void **state)
 	refuses(S "<bsdf type='diffuse'><include filename='s.xml'/></bsdf>" END, "more than 15 deep");
 	refuses(S "<bsdf type='mask'><include filename='s.xml' nme='x'/></bsdf>" END, "has no attribute `nme`");
 	refuses("<scene version='0.4.0'><bsdf type='mask'>\n<include filename='i.xml'/></bsdf>" END,
-		"s.xml:2: <include>: in files of versions before 0.5 it must be directly in <scene>");
+		"s.xml:2: <include>: in files before 0.5 it must be directly in <scene>");
 	refuses(S "<include filename='s.xml'/>" END, "files include each other more than 15 deep");
 	static const char main_file[] = S "<include filename='i.xml'/>" END,
 			  broken[] = S "\n\n<bsdf type='difuse'/>" END,
