@@ -121,8 +121,8 @@ static bool is_foreign_parameter(const struct maker *m, const struct draft *d, c
 	return meant->status == PARAM_IGNORED;
 }
 
-/* Of an integrator or a sampler, everything but a few parameters is ignored. A name that resembles one of these may
- * be a misspelling of it, which is noted. */
+/* Everything but a few parameters of an integrator or a sampler is ignored. A name that resembles one of these may be a
+ * misspelling of it, which is noted. */
 static int note_resembling(const struct maker *m, const struct draft *d, const struct xml_element *owner,
 			   const struct xml_element *el, const char *name)
 {

@@ -8,8 +8,8 @@
 #include "worker/render/scene/notes.h"
 #include "worker/render/plugin/param.h"
 
-/* Checks *v. If p takes no colour, a colour with three equal components is converted to a number; if p takes no
- * integer, an integer is. Errors have the place of el: -EINVAL for a wrong type or choice, with what is supported;
+/* Checks *v. A colour with three equal components is converted to a number if p takes no colour, and an integer to a
+ * float if p takes no integer. Errors have the place of el: -EINVAL for a wrong type or choice, with what is supported;
  * -ERANGE for a value outside the range. */
 int param_check(const struct xml_element *el, const struct param *p, struct value *v, struct error *e);
 

@@ -32,7 +32,8 @@ static const char *lenient_hint(const struct xml_element *el, enum plugin_class 
 	return text;
 }
 
-/* Returns the name here of an element that other programs, or people, call differently; NULL if none is known. */
+/* Returns the name in this scene language of an element that other programs, or people, call differently; NULL if none
+ * is known. */
 static const char *usual_name(const char *name)
 {
 	static const struct {

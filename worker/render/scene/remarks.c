@@ -192,8 +192,8 @@ static int on_filter(struct report *r, const struct scene_node *n, struct error 
 	return report_text(r, n->file, filter, text, e);
 }
 
-/* Notes a `scale` with both a value and a texture: Mitsuba 0.6 takes each of them for what is to be scaled and uses
- * the one read last, which is the texture inside. */
+/* Notes a `scale` with both a value and a texture. Mitsuba 0.6 scales whichever it reads last, which is the texture
+ * inside. */
 static int on_texture(struct report *r, const struct scene_node *n, struct error *e)
 {
 	if (strcmp(n->type, "bitmap") == 0)
