@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What the core makes of a worker's answer to a lease.
+ * Handles a worker's answer to a lease: a result, a failure, or the lease returned unfinished.
  *
- * Happy path: answer_batch judges a result (judge_result). One that is next for its slot is merged: the action tells
- * the shell to add it, the worker is acknowledged, other copies of the lease are revoked, and job_merge completes the
- * round if it was the last. If the lease is verified, the result counts only when a second worker has sent the same
- * (verify). answer_stored does the same for results read from a journal.
+ * Happy path: answer_batch judges a result (judge_result). If it is the next epoch of its slot it is merged: the
+ * action tells the shell to add it to the films, the worker is acknowledged, other copies of the lease are revoked,
+ * and job_merge reports whether the round is complete. If the lease is verified, the result counts only once a second
+ * worker has sent an equal one (verify). answer_stored does the same for results read from a journal.
  *
- * Failures: REPEAT, a result that was merged before; REFUSE, one that does not count now, through no fault of the
- * worker; FAULT, content that cannot be right, which counts towards quarantine. A lease that failed (answer_failed)
- * makes its worker pause; several workers failing alike end the job (failure_quorum.h), and refused chain states are
- * settled in doubt.c.
+ * Failures: a verdict of REPEAT means that the lease was merged before; REFUSE that the result does not count now,
+ * through no fault of the worker; FAULT that no correct worker sends such content, which counts towards quarantine. A
+ * lease that failed (answer_failed) makes its worker pause with the job; several workers that fail alike end the job
+ * (failure_quorum.h), and refused chain states are settled in doubt.c.
  */
 #include "coordinator/core/answer.h"
 
@@ -46,7 +46,8 @@ static bool is_next(const struct job *j, const struct slot *s, const struct leas
 	return s && k->kind == j->kind && k->epoch == s->next;
 }
 
-/* The prefix that is being evaluated must not change. */
+/* Whether merging the slot's next epoch would complete the round. While the error of the complete rounds is being
+ * estimated such a result is refused, because the prefix of the image must not change meanwhile. */
 static bool would_complete(const struct job *j, const struct slot *s)
 {
 	return s->next == j->rounds && j->done + 1 == j->slot_count;
@@ -118,7 +119,7 @@ static void merge(struct farm *f, struct peer *p, struct job *j, struct slot *s,
 	if (l)
 		lease_drop(f, l);
 	for (const struct lease *k = s->leases; k; k = k->next)
-		if (k->sent < sent && !k->delivered && !k->overdue) /* overtaken by a copy */
+		if (k->sent < sent && !k->delivered && !k->overdue) /* a copy sent later has overtaken this one */
 			peer_was_late(f, k->peer);
 	lease_revoke_slot(f, s);
 	j->counts.verified += verified;
@@ -146,11 +147,12 @@ static void count(struct peer *p, struct job *j, enum verdict v)
 	}
 }
 
-/* The result counts only if two workers agree. */
+/* Decides a result of a verified lease, which is merged only if another worker has sent an equal one. */
 static enum verdict verify(struct farm *f, struct job *j, struct slot *s, struct peer *p, const struct event *ev,
 			   const char **why)
 {
-	/* A late answer from a class that the job no longer belongs to must not be compared with those of another. */
+	/* A late answer may come from a class that the job no longer belongs to. It must not be compared with answers
+	 * of another class. */
 	if (!j->class && !verify_may_begin(f, j, p->class)) {
 		*why = "the job is not pinned, and cannot be to a lone worker";
 		return REFUSE;
@@ -175,8 +177,8 @@ static enum verdict verify(struct farm *f, struct job *j, struct slot *s, struct
 	return FAULT;
 }
 
-/* Either the job's workers cannot compute this lease reproducibly, or one of them is wrong in the same way each
- * time: another opinion will not help. */
+/* Ends the job if VERIFY_MOST workers gave as many different answers. Either the job's workers cannot compute this
+ * lease reproducibly, or some are wrong in the same way each time, and a further answer would not help. */
 static void give_up_where_hopeless(struct farm *f, struct job *j, struct slot *s, const struct lease_key *k)
 {
 	char names[160], text[256];
@@ -250,14 +252,15 @@ bool answer_all_failed(const struct farm *f, const struct job *j)
 	return here > 0;
 }
 
-/* Nothing of the job was ever computed, and no worker is left that might: there is nothing to lose or wait for.
- * Workers whose own machine is at fault do not count. */
+/* Nothing of the job was ever computed, and no connected worker is left that might compute it: there is nothing to
+ * lose and nobody to wait for. Workers whose own machine is at fault do not count. */
 static bool never_works(const struct farm *f, const struct job *j)
 {
 	return j->tries >= TRIES_FATAL && answer_all_failed(f, j);
 }
 
-/* The slot whose next lease this is; NULL: unknown worker or job, or not the next lease. */
+/* Returns the slot whose next lease the event is about; NULL if the worker or job is unknown or this is not the next
+ * lease. */
 static struct slot *next_slot(const struct farm *f, const struct event *ev)
 {
 	struct job *j = farm_find_job(f, ev->lease.key.job);
@@ -273,25 +276,26 @@ static struct lease *lease_held_by_sender(const struct farm *f, const struct eve
 	return s ? lease_of(s, farm_find_peer(f, ev->peer)) : NULL;
 }
 
-/* The refusal concerns an earlier grant of this lease. Its worker has, or will get, the grant with the current
- * states. */
+/* Whether the refusal of the chain states concerns an earlier grant of this lease, so that the worker has, or will
+ * get, a grant with the current states. */
 static bool is_late_refusal(const struct slot *s, const struct event *ev)
 {
 	return ev->lease.bad_states && (ev->lease.other_states || s->doubt.anew);
 }
 
-/* The lease was granted before the job's files were repaired: the failure is probably due to the damaged files. */
+/* Whether the lease was granted before the job's files were repaired: the failure is probably due to the damaged
+ * files. */
 static bool is_files_fault(const struct lease *l, const struct event *ev)
 {
 	return l && !ev->lease.own && !ev->lease.bad_states && l->sent < l->job->files_changed;
 }
 
-/* Keeps its text, which the status shows. */
+/* Keeps the text of the failure, which the status shows. */
 static void note_failure(struct farm *f, struct peer *p, struct job *j, const struct event *ev)
 {
 	text_copy(p->text, sizeof p->text, ev->text ? ev->text : "");
 	text_print(f->text, sizeof f->text, "%s: %s", p->name, p->text);
-	if (!ev->lease.later) /* this is not a failure, and lasts only a while: status.c reads it from the worker */
+	if (!ev->lease.later) /* this is no failure, and it passes: status.c reads the text from the worker */
 		text_copy(j->text, sizeof j->text, f->text);
 }
 
@@ -302,7 +306,7 @@ void answer_failed(struct farm *f, const struct event *ev)
 		return;
 	struct peer *p = farm_find_peer(f, ev->peer);
 	struct lease *l = s ? lease_of(s, p) : NULL;
-	/* It may report a lease of an earlier process, which that lease ended. */
+	/* A worker's supervisor may report, after reconnecting, a lease that ended the previous process. */
 	bool was_lost = s && lost_holders_remove(&s->lost, p->who);
 	if (!l && !was_lost)
 		return;
@@ -323,11 +327,12 @@ void answer_failed(struct farm *f, const struct event *ev)
 		note_failure(f, p, j, ev);
 		return;
 	}
-	bool again = peer_avoids_until(p, j->id) > f->now && !peer_lacks(p, j->id); /* several at once count as one */
+	/* Several leases that fail at once count as one. */
+	bool again = peer_avoids_until(p, j->id) > f->now && !peer_lacks(p, j->id);
 	peer_failed(f, p, j->id, ev->lease.own);
 	note_failure(f, p, j, ev);
 	j->counts.failures++;
-	if (ev->lease.own) /* says nothing about the job */
+	if (ev->lease.own) /* a fault of the worker's machine says nothing about the job */
 		return;
 	j->tries += !again;
 	bool fatal = failure_quorum_add(&s->failure_quorum, f, p->who),

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Handles what workers send back. */
+/* Handles the answers of workers to leases. Each function takes one kind of event (event.h). */
 #ifndef COORDINATOR_CORE_ANSWER_H
 #define COORDINATOR_CORE_ANSWER_H
 
@@ -14,15 +14,15 @@ void answer_stored(struct farm *f, const struct event *ev);
 void answer_failed(struct farm *f, const struct event *ev);
 void answer_delivered(struct farm *f, const struct event *ev);
 void answer_returned(struct farm *f, const struct event *ev);
-bool answer_all_failed(const struct farm *f,
-		       const struct job *j); /* every worker present, since it last returned a result */
+/* Whether every connected worker that the job accepts has failed with it since it last returned a result. */
+bool answer_all_failed(const struct farm *f, const struct job *j);
 
-/* Whether a failure of this lease counts: its worker holds it, or was lost with it. */
+/* Whether a failure of this lease counts: the worker holds the lease, or was lost while it held it. */
 bool answer_counts(const struct farm *f, uint64_t peer, const struct lease_key *k);
 
-/* Whether a result of this lease that cannot be judged yet is worth keeping. Awaited: the worker holds the lease and
- * has not delivered it (EVENT_DELIVERED). Open: it may still be merged; the worker may have held the lease before it
- * reconnected. Useless: EVENT_BATCH would refuse it, whatever it contains. */
+/* Says whether a result of this lease that cannot be judged yet is worth keeping. AWAITED: the worker holds the lease
+ * and has not delivered it (EVENT_DELIVERED). OPEN: it may still be merged, for instance because the worker held the
+ * lease before it reconnected. USELESS: EVENT_BATCH would refuse it, whatever it contains. */
 enum farm_delivery answer_awaits(const struct farm *f, uint64_t peer, const struct lease_key *k);
 
 #endif

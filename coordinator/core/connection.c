@@ -39,7 +39,7 @@ struct peer *connection_join(struct farm *f, const struct event_join *e, const c
 		*refused = e->threads ? "the fingerprint is too long" : "a worker without threads";
 		return NULL;
 	}
-	/* Room for 1.5 leases per thread, and some overdue ones. */
+	/* Room for 1.5 leases per thread and for some overdue leases. */
 	uint32_t limit = f->config.max_peer_leases;
 	if (e->threads < limit / 2)
 		limit = 2 * e->threads < 4 ? (limit < 4 ? limit : 4) : 2 * e->threads;

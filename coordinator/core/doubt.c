@@ -22,7 +22,7 @@ const char *doubt_maker(const struct farm *f, const struct lease_key *k)
 		j && job_is_live(j) && k->kind == j->kind && k->group < j->plan.groups && k->part < j->plan.parts;
 	const struct slot *s = known_slot ? job_slot(j, k->group, k->part) : NULL;
 	return s && s->next == k->epoch && k->epoch > 0 ? name_of(f, s->doubt.maker)
-							: "?"; /* the makers of other states are not known */
+							: "?"; /* only the maker of the latest states is known */
 }
 
 static bool is_party(const struct slot *s, uint64_t who)
@@ -31,7 +31,7 @@ static bool is_party(const struct slot *s, uint64_t who)
 	return who == d->barred || (doubt_waits(s) && (who == d->maker || who == d->refuser));
 }
 
-/* A worker that could be asked and is neither of them. */
+/* Whether a connected worker is neither the maker nor a refuser of the states, so that it could be asked. */
 static bool third_is_here(const struct farm *f, const struct job *j, const struct slot *s)
 {
 	for (uint32_t i = 0; i < f->peer_count; i++) {
@@ -47,8 +47,8 @@ bool doubt_bars(const struct farm *f, const struct job *j, const struct slot *s,
 	return is_party(s, p->who->id) && third_is_here(f, j, s);
 }
 
-/* Undoes the slot's last epoch, which becomes the next again. Its rounds are open again, and leases more than one
- * round ahead of them are revoked. */
+/* Takes the slot's last epoch back, so that it becomes the slot's next epoch again. If its round was complete, that
+ * round and all later ones are open again, and leases more than one round ahead are revoked. */
 static void open_again(struct farm *f, struct job *j, struct slot *s)
 {
 	assert(j->kind == LEASE_RENDER && s->next > 0);
@@ -61,7 +61,9 @@ static void open_again(struct farm *f, struct job *j, struct slot *s)
 	j->leases_merged--;
 	if (s->next < j->rounds) {
 		j->rounds = s->next;
-		j->evaluating = false; /* the update has other actions, too */
+		/* a pending estimate would be of rounds that are no longer complete; the update may contain other
+		 * actions, too */
+		j->evaluating = false;
 	}
 	for (uint32_t i = 0; i < j->slot_count; i++)
 		if (j->slots[i].next - j->rounds > 1)
@@ -69,7 +71,8 @@ static void open_again(struct farm *f, struct job *j, struct slot *s)
 	job_place_all(j);
 }
 
-/* The states may be wrong even if that epoch's sums are not, so it is not verified. */
+/* Asks the shell to take the batch of the last epoch out of the films. The epoch's sums are not verified even if they
+ * were before: its chain states may be wrong although the sums are right. */
 static void take_back(struct farm *f, struct job *j, struct slot *s, const char *refusers)
 {
 	struct doubt *d = &s->doubt;
@@ -89,7 +92,7 @@ static void take_back(struct farm *f, struct job *j, struct slot *s, const char 
 static void begin_anew(struct farm *f, struct job *j, struct slot *s, const char *refusers)
 {
 	const struct lease_key k = slot_key(j, s);
-	lease_revoke_slot(f, s); /* workers that still have the states */
+	lease_revoke_slot(f, s); /* some workers may still hold the refused states */
 	s->doubt.anew = true;
 	text_print(f->text, sizeof f->text,
 		   "the chains of group %u part %u start epoch %llu from their seeds: their states, made by %s, were "

@@ -1,17 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Chain states that a worker refuses to continue from. Neither the worker nor the maker of the states is blamed until a
- * second worker has judged them: the lease goes to a third worker if there is one.
- * - If the third continues, the refusal was wrong and counts as a wrong result.
- * - If it refuses, too, the states are wrong, which counts against their maker. The epoch that ends with them is taken
- *   back, including its sums, and computed again from the states before it, by another worker if possible: the job gets
- *   the bits it would have had.
- * - Without a third worker the same happens, and nobody is blamed.
+ * Settles who is right when a worker refuses to continue from the chain states of its lease. Neither the worker nor
+ * the maker of the states is blamed until a second worker has judged the states: the lease goes to a third worker if
+ * there is one.
+ * - If the third worker continues, the refusal was wrong and counts as a wrong result.
+ * - If the third worker refuses, too, the states are wrong, which counts against their maker. The epoch that ends
+ *   with these states is taken back, including its sums, and computed again from the states before it, by another
+ *   worker if possible. The job gets the bits it would have had.
+ * - Without a third worker the epoch is taken back as well, and nobody is blamed.
  *
  * If the caller no longer has the earlier states, or an epoch was computed again AGAIN_MOST times and its states are
- * still refused, the chains start again from their seeds: that epoch depends on the plan alone, and earlier epochs stay
- * in the films. The job does not fail. All memory is in the slot; except for the maker of its states nothing survives a
- * restart of the coordinator, which asks again.
+ * still refused, the chains start again from their seeds: that epoch depends on the plan alone, and earlier epochs
+ * stay in the films. The job does not fail. All this is stored in the slot. Only the maker of its states survives a
+ * restart of the coordinator, which then asks again.
  */
 #ifndef COORDINATOR_CORE_DOUBT_H
 #define COORDINATOR_CORE_DOUBT_H
@@ -29,15 +30,18 @@ struct slot;
 
 enum { AGAIN_MOST = 4 };
 
-/* The worker's lease has already been dropped. can: the caller can have the previous epoch computed again. */
+/* Handles a refusal of chain states by p, whose lease has already been dropped. can: the caller can take back the
+ * previous epoch (its batch and the states before it are available). text: the worker's reason. */
 void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct peer *p, bool can, const char *text);
+/* Whether p may not get the slot's lease because it made or refused the states and another worker is available. */
 bool doubt_bars(const struct farm *f, const struct job *j, const struct slot *s, const struct peer *p);
-/* Call when a result of the slot's next epoch is merged, before job_merge: its sender accepted the states. */
+/* Call when a result of the slot's next epoch is merged, before job_merge: the sender `who` has accepted the states. */
 void doubt_settle(struct farm *f, const struct job *j, struct slot *s, const struct identity *who,
 		  const struct lease_key *k);
-/* Who made the chain states that this lease begins with; "?": it is not the next lease of its group and part. */
+/* Returns the name of the worker that made the chain states this lease begins with; "?" if it is not the next lease
+ * of its group and part. */
 const char *doubt_maker(const struct farm *f, const struct lease_key *k);
-/* Why the job waits for another worker; false: it does not wait. */
+/* Writes why the job waits for a worker to judge chain states. Returns false if it does not wait for that. */
 bool doubt_why(const struct farm *f, const struct job *j, char *text, size_t size);
 
 #endif

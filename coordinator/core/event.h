@@ -1,7 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The input of the coordinator's core (farm.h). The caller owns everything in an event; the core copies what it keeps.
- * Times are seconds of a monotonic clock (an earlier time counts as "no time has passed").
+ * The input of the coordinator's core (farm.h). The caller owns everything in an event; the core copies what it
+ * keeps. Times are seconds of a monotonic clock; an event with an earlier time than the last one is treated as
+ * simultaneous with it.
+ *
+ * The comment on each kind of event names the members of struct event that the caller sets.
  */
 #ifndef COORDINATOR_CORE_EVENT_H
 #define COORDINATOR_CORE_EVENT_H
@@ -12,36 +15,40 @@
 #include "coordinator/core/job_fields.h"
 
 enum event_kind {
-	EVENT_TICK,	 /* only time has passed: due at update.wake at the latest */
+	EVENT_TICK,	 /* none: time has passed; due at update.wake at the latest */
 	EVENT_JOINED,	 /* join */
 	EVENT_LEFT,	 /* peer: its connection is closed */
-	EVENT_HEARTBEAT, /* peer: a heartbeat (every other event of a peer counts as one, too) */
+	EVENT_HEARTBEAT, /* peer: every other event of a peer counts as a heartbeat, too */
 	EVENT_REQUEST,	 /* peer, want */
 	EVENT_BATCH,	 /* peer, key, valid, text: the result of a lease */
-	EVENT_STORED,	 /* key, digest: a stored result of an earlier run, which may count now */
-	EVENT_DELIVERED, /* peer, key: its result is received and will be judged later (EVENT_BATCH); the worker may get
-			    another lease */
-	EVENT_LEASE_FAILED,   /* peer, key, text: the worker failed to compute it */
-	EVENT_LEASE_RETURNED, /* peer, key: returned unfinished because the worker is stopping; not a failure */
-	EVENT_SUBMIT,	      /* tag, submit */
-	EVENT_CANCEL,	      /* tag, job */
-	EVENT_PREPARED,	      /* prepared: the answer to ACTION_BOOTSTRAP_DONE */
-	EVENT_ERROR_KNOWN,    /* error_known: the answer to ACTION_EVALUATE_ERROR */
-	EVENT_IMAGE_KNOWN,    /* image_known: statistics of the final image of ACTION_PUBLISH; the job has ended */
-	EVENT_RESTORE, /* tag, restore: continues a job of an earlier run, or one that has ended. Without a tag max_jobs
-			  does not apply; only memory can run out */
-	EVENT_HOLD,    /* tag, job, hold, text: hands out no more of its leases; an empty text ends this hold */
-	EVENT_PRIORITY,	   /* tag, job, priority: from the next lease on */
-	EVENT_EXTEND,	   /* tag, job, plan: its own plan with other bounds; not fewer rounds */
+	EVENT_STORED,	 /* key, digest: a result stored by an earlier run, which may count now */
+	/* peer, key: a result has arrived and will be judged later (EVENT_BATCH); meanwhile the worker may get
+	 * another lease */
+	EVENT_DELIVERED,
+	EVENT_LEASE_FAILED, /* peer, key, text: the worker failed to compute the lease */
+	/* peer, key: the worker is stopping and returns the lease unfinished, which is no failure */
+	EVENT_LEASE_RETURNED,
+	EVENT_SUBMIT,	   /* tag, submit */
+	EVENT_CANCEL,	   /* tag, job */
+	EVENT_PREPARED,	   /* prepared: the answer to ACTION_BOOTSTRAP_DONE */
+	EVENT_ERROR_KNOWN, /* error_known: the answer to ACTION_EVALUATE_ERROR */
+	EVENT_IMAGE_KNOWN, /* image_known: statistics of the final image after ACTION_PUBLISH; the job has ended */
+	/* tag, restore: continues a job of an earlier run, or a job that has ended. With tag 0 max_jobs does not
+	 * apply, and only lack of memory can prevent it. */
+	EVENT_RESTORE,
+	/* tag, job, hold, text: hands out no more leases of the job; an empty text ends this hold. */
+	EVENT_HOLD,
+	EVENT_PRIORITY,	   /* tag, job, priority: applies from the next lease on */
+	EVENT_EXTEND,	   /* tag, job, plan: the job's own plan with other bounds; not fewer rounds */
 	EVENT_QUARANTINED, /* join (without peer, fingerprint, threads), text: a worker quarantined in an earlier run */
 	EVENT_JOB_BROKEN,  /* job, text: the job fails (a sum left the grid, the disk is full) */
 };
 
-/* Reasons to hold a job, which may apply at the same time; its leases go out when none applies. */
+/* Reasons to hold a job. Several may apply at once; leases go out when none applies. */
 enum job_hold {
 	HOLD_STORAGE, /* its results cannot be stored */
 	HOLD_FILES,   /* a file of its scene is missing or damaged */
-	HOLD_ORDERED, /* a person asked for it */
+	HOLD_ORDERED, /* a user asked for it */
 	JOB_HOLDS,
 };
 
@@ -50,73 +57,82 @@ struct batch_digest {
 	uint8_t bytes[32];
 };
 
-enum { JOIN_HOME = 40, JOIN_NAME = 128 /* bytes of the names of a home and of a worker, with the final 0 */ };
+enum { JOIN_HOME = 40, JOIN_NAME = 128 /* sizes of the names of a home and of a worker, including the final 0 */ };
 
 struct event_join {
 	uint64_t peer;		 /* chosen by the caller, not 0, never reused */
 	const char *name;	 /* not empty */
 	const char *fingerprint; /* compared for equality only */
 	uint32_t threads;
-	const char *certificate; /* the name in it; NULL: no certificate */
-	const char *home;	 /* the folder that counts its starts; NULL: none */
-	uint64_t restarts;	 /* its number of starts */
+	const char *certificate; /* name in the worker's certificate; NULL: it has none */
+	const char *home;	 /* name of the folder that counts the worker's starts; NULL: none */
+	uint64_t restarts;	 /* number of starts counted in the home */
 };
 
 struct event_submit {
 	const struct plan *plan; /* must have passed plan_check */
 	const char *name;
-	int priority;	   /* -100..100 */
-	const char *owner; /* the name in the owner's certificate; "": none, and all such jobs have the same owner */
-	bool mixed;	   /* accepts workers of any numeric fingerprint */
-	double verify; /* share of its leases computed by two workers; ignored for mixed jobs, whose results cannot be
-			  compared */
+	int priority; /* -100..100 */
+	/* Name in the owner's certificate. "": no certificate, and all these jobs have the same owner. */
+	const char *owner;
+	bool mixed; /* accepts workers of any numeric fingerprint */
+	/* Fraction of the job's leases that two workers compute; ignored for mixed jobs, whose results cannot be
+	 * compared. */
+	double verify;
 };
 
-/* The state of a job, given by which leases are merged. */
+/* The state of a job that continues, described by which leases are merged. */
 struct event_restore {
-	uint64_t job; /* its id */
+	uint64_t job; /* the job's id */
 	struct event_submit submit;
-	const char *fingerprint;	 /* "": not pinned */
-	enum lease_kind kind;		 /* of its open leases; render: b and seeds exist */
-	const uint64_t *next;		 /* [groups][parts]: the first epoch of that kind that is not merged */
-	const struct event_join *makers; /* [groups][parts]: who made the previous batch (without peer, fingerprint,
-					    threads); name NULL: not known. NULL: none is known */
-	bool black;			 /* as in EVENT_PREPARED */
-	/* Seconds after its first lease: now, at the start of the first round, at the end of the last complete
-	 * round. NAN: not yet. The time between runs is not included. */
+	const char *fingerprint; /* "": the job is not pinned */
+	enum lease_kind kind;	 /* kind of the open leases; LEASE_RENDER: b and seeds exist */
+	const uint64_t *next;	 /* [groups][parts]: first epoch of this kind that is not merged */
+	/* [groups][parts]: the worker that made the last merged batch (peer, fingerprint and threads are not set);
+	 * its name is NULL if unknown. The array is NULL if no maker is known. */
+	const struct event_join *makers;
+	bool black; /* as in EVENT_PREPARED */
+	/* Seconds after the job's first lease: now, at the start of the first round, and at the end of the last
+	 * complete round. NAN: not reached yet. The time between two runs of the coordinator is not included. */
 	double elapsed, opened, completed;
 	const struct forecast_history *looks;
-	struct job_counts counts; /* so far */
+	struct job_counts counts; /* counted so far */
 };
 
 struct event {
 	enum event_kind kind;
 	double time;
-	double unread; /* s: messages of the last so many seconds may not have been read yet, so nobody is blamed for
-			  silence in them */
+	/* In seconds. Messages that arrived during the last `unread` seconds may not have been read yet, so no worker
+	 * is blamed for silence in that time. */
+	double unread;
 	uint64_t peer;
 	uint64_t job;
-	uint64_t tag; /* returned in the answer; for events other than SUBMIT and CANCEL there is an answer only if they
-			 are refused */
+	/* Returned in the answer. For events other than SUBMIT and CANCEL there is an answer only if they are
+	 * refused. */
+	uint64_t tag;
 	const char *text;
 	union {
 		struct event_join join;
-		/* How many leases the worker wants to hold in total: its threads, plus one to hide the network's
-		 * latency, 0 when it is stopping. Kept until the next request, so the order in which requests and
-		 * leases cross on the wire does not matter. */
+		/* How many leases the worker wants to hold in total: its number of threads plus one to hide the
+		 * network's latency, or 0 when it is stopping. The core keeps the number until the next request, so
+		 * requests and leases may cross on the wire in any order. */
 		uint32_t want;
 		struct {
 			struct lease_key key;
-			bool valid; /* BATCH: it passed batch_check and the frame's checks; otherwise text says what is
-				       wrong */
-			struct batch_digest digest; /* BATCH, STORED: for leases of which farm_verifies is true */
-			bool own;	    /* LEASE_FAILED: the worker's own machine is at fault, not the job */
-			bool later;	    /* own: only for now, its memory is in use */
-			bool bad_states;    /* LEASE_FAILED: the worker refuses the chain states of the grant */
-			bool other_states;  /* ... and these are not the lease's current states, but those of an earlier
-					       grant */
-			bool can_take_back; /* ... and the batch that produced them can be taken out, and the earlier
-					       states are available */
+			/* BATCH: the result passed batch_check and the checks of the frame; otherwise text says what
+			 * is wrong. */
+			bool valid;
+			/* BATCH, STORED: set for leases for which farm_verifies returns true. */
+			struct batch_digest digest;
+			bool own;	 /* LEASE_FAILED: a fault of the worker's own machine, not of the job */
+			bool later;	 /* with own: temporary, because the worker's memory is in use */
+			bool bad_states; /* LEASE_FAILED: the worker refuses the chain states of the grant */
+			/* With bad_states: the refused states are not the lease's current states but those of an
+			 * earlier grant. */
+			bool other_states;
+			/* With bad_states: the batch that produced the states can be taken out of the films, and the
+			 * earlier states are available. */
+			bool can_take_back;
 		} lease;
 		enum job_hold hold;
 		int priority;
@@ -130,15 +146,15 @@ struct event {
 		} prepared;
 		struct {
 			uint64_t job, rounds;
-			double rel_error; /* square root of the upper end of the estimated relMSE; NAN: not known */
-			bool doubtful;	  /* its interval is not known: the job does not end by it */
-			double rel_mse, degrees; /* the estimate and its degrees of freedom; 0: not known */
-			double cpu_seconds;	 /* of all merged render leases */
-			bool black;		 /* the image: it has no error */
+			double rel_error; /* square root of the upper end of the interval of the relMSE; NAN: unknown */
+			bool doubtful;	  /* the interval is not known, so the error does not end the job */
+			double rel_mse, degrees; /* estimated relMSE and its degrees of freedom; 0: unknown */
+			double cpu_seconds;	 /* CPU time of all merged render leases */
+			bool black;		 /* the image is black and therefore has no relative error */
 		} error_known;
 		struct {
 			uint64_t job;
-			bool disagrees; /* its chains disagree: common/estimate/convergence.h */
+			bool disagrees; /* the job's chains disagree (common/estimate/convergence.h) */
 		} image_known;
 	};
 };

@@ -23,7 +23,7 @@ static void add_worker(struct failure_quorum *l, const struct identity *who)
 			return;
 		for (uint32_t k = 0; k < i && place == FAILURE_QUORUM_FATAL; k++)
 			if (l->of[k].certificate == l->of[i].certificate)
-				place = i; /* replaces one of several with the same certificate */
+				place = i; /* replaces one of several entries with the same certificate */
 	}
 	if (place == FAILURE_QUORUM_FATAL)
 		return;
@@ -32,7 +32,7 @@ static void add_worker(struct failure_quorum *l, const struct identity *who)
 	l->of[place].certificate = who->certificate_id;
 }
 
-/* How many certificates the workers that are not quarantined have, counted as far as it matters. */
+/* Counts only as far as FAILURE_QUORUM_FATAL, since more makes no difference. */
 uint32_t failure_quorum_certificates(const struct farm *f)
 {
 	struct failure_quorum known = {.count = 0};

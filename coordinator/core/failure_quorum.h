@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The workers that failed at the same thing. If three did, the thing is at fault. Each worker counts once, however
- * often it failed or reconnected, and they must have as many different certificates (up to three) as the farm knows,
- * because one certificate can be used under any number of names. Pure.
+ * The workers that failed with the same lease, or with leases of the same job. If three different workers failed, the
+ * lease or job is at fault. A worker counts once, however often it failed or reconnected. The three must have as many
+ * different certificates (up to three) as the farm knows, because one certificate can be used under any number of
+ * names. Pure.
  */
 #ifndef COORDINATOR_CORE_FAILURE_QUORUM_H
 #define COORDINATOR_CORE_FAILURE_QUORUM_H
@@ -15,10 +16,11 @@
 struct farm;
 struct identity;
 
-/* This many certificates must be among those that failed. */
+/* Returns how many different certificates the workers in a quorum must have: as many as the workers that are not
+ * quarantined have, at most FAILURE_QUORUM_FATAL. */
 uint32_t failure_quorum_certificates(const struct farm *f);
 
-/* true: the thing is at fault. */
+/* Adds a worker. Returns true if the quorum is reached: the lease or job is at fault. */
 bool failure_quorum_add(struct failure_quorum *l, const struct farm *f, const struct identity *who);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Progress and remaining time of a job, by whichever bound seems to come first. */
+/* Progress and remaining time of a job. The bound that seems to come first determines both. */
 #include "coordinator/core/forecast.h"
 
 #include "common/estimate/merge.h"
@@ -16,7 +16,7 @@ static double lease_share(uint64_t merged, double total, const struct job *j)
 	return (double)merged * total / ((double)j->plan.groups * j->plan.parts);
 }
 
-/* Samples and mutations merged. */
+/* Bootstrap samples and mutations merged so far. */
 static double work_done(const struct job *j)
 {
 	return lease_share(j->bootstrap_merged, bootstrap_total(j), j) +
@@ -28,15 +28,16 @@ static double work_of_rounds(const struct job *j, double rounds)
 	return bootstrap_total(j) + rounds * (double)plan_round_mutations(&j->plan);
 }
 
-/* If only the error is known, without its history, it is assumed to fall as 1/sqrt(rounds). */
+/* Returns the rounds that the target error needs if only the last error is known, without a history: it is assumed to
+ * fall as 1/sqrt(rounds). */
 static double rounds_by_rule(const struct job *j)
 {
 	double factor = j->rel_error / j->plan.target_error;
 	return (double)j->rel_error_rounds * factor * factor;
 }
 
-/* All samples and mutations that the job will need: by the plan, or by the error so far; more than the two open
- * rounds hold. */
+/* Returns how many samples and mutations the job will need in total, according to its plan or to the error so far. An
+ * error-based estimate is at least the two open rounds more than what is complete. */
 static struct forecast_range work_total(const struct job *j)
 {
 	struct forecast_range total = {INFINITY, INFINITY, INFINITY};
@@ -59,7 +60,8 @@ static bool has_time(const struct job *j)
 	return j->plan.seconds > 0 && !isnan(j->started);
 }
 
-/* Until its time ends it; NAN: its time is over, and nothing is known of the round that has to be completed. */
+/* Returns the seconds until the job's time bound ends it; NAN if the time is over and the rate of the round that has
+ * to be completed is unknown. */
 static double time_left(const struct job *j, double rate, double now)
 {
 	double round = (double)plan_round_mutations(&j->plan);
@@ -72,13 +74,14 @@ double job_progress(const struct job *j, double now)
 	if (j->state == JOB_DONE)
 		return 1;
 	double p = work_done(j) / work_total(j).middle;
-	if (has_time(j) && job_is_live(j)) /* never less than before, unlike what follows from a rate */
+	if (has_time(j) && job_is_live(j)) /* elapsed time never decreases, unlike an estimate from a rate */
 		p = fmax(p, fmin(0.99, job_elapsed(j, now) / j->plan.seconds));
 	return fmin(1, fmax(j->progress_floor, p));
 }
 
-/* The rate during the bootstrap does not predict the rate of rounds: the bootstrap of `path` is so short that its
- * leases mostly wait. */
+/* Returns the seconds until `total` samples and mutations are merged, or until the job's time is over; NAN: unknown.
+ * The rate of the bootstrap is not used to predict that of rounds, because the bootstrap of `path` is so short that
+ * its leases mostly wait. */
 static double seconds_left(const struct job *j, double total, bool idle, double now)
 {
 	double left = INFINITY, rate = idle || !j->leases_merged ? 0 : rate_value(&j->rate, now);
@@ -100,7 +103,8 @@ struct forecast_range job_eta(const struct job *j, bool idle, double now)
 
 void job_note_look(struct job *j, double rel_error, double rel_mse, double degrees, bool doubtful, double cpu_seconds)
 {
-	/* Work merged ahead of the prefix has been paid for but is not in the image yet. */
+	/* Some leases are merged ahead of the complete rounds; their CPU time is spent, but they are not in the image
+	 * yet. */
 	double in_prefix = (double)j->rounds * j->slot_count / (double)(j->leases_merged ? j->leases_merged : 1);
 	struct forecast_look l = {.work = (double)j->rounds * (double)plan_round_mutations(&j->plan),
 				  .cpu_seconds = cpu_seconds * in_prefix,

@@ -32,7 +32,7 @@ static struct identity **bucket_of_id(const struct identity_index *x, uint64_t i
 static struct identity **bucket_of_text(const struct identity_index *x, enum identity_key by, const char *certificate,
 					const char *text)
 {
-	/* With the final 0 of the certificate, so that its end is known. */
+	/* The final 0 is hashed, too: it separates the certificate from the text. */
 	uint64_t hash = fnv_add(fnv_add(FNV_BEGIN, certificate, strlen(certificate) + 1), text, strlen(text));
 	return &x->first[by][hash % x->buckets];
 }

@@ -3,9 +3,10 @@
  * A job of the core: its slots, the lists they are in, and the progress of rounds.
  *
  * A slot is in one list, depending on its next epoch (the first incomplete round, the one after it, or blocked behind
- * both) and its holders: ready, out with one, or waiting for a second answer; with two holders it is in none. job_place
- * moves it after each change. When all slots have merged a round, the lists of the next round take over at once; only
- * after an epoch was taken back is each slot placed individually.
+ * both) and on its holders: ready (nobody holds its lease), out (one worker does), or second (it waits for another
+ * worker's answer). With two holders it is in no list. job_place moves it after each change. When all slots have
+ * merged a round, the lists of the next round take its place as a whole; only after an epoch was taken back is each
+ * slot placed individually.
  *
  * Memory is allocated when a job is made, which may be refused with a sentence. Nothing after that can fail.
  */
@@ -189,7 +190,6 @@ static void add_duration(struct job *j, double duration)
 	j->median = sorted[n / 2];
 }
 
-/* Recomputes counts and lists from the progress of each slot. */
 void job_place_all(struct job *j)
 {
 	j->done = j->ahead = 0;

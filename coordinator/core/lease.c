@@ -21,7 +21,8 @@ struct lease *lease_of(const struct slot *s, const struct peer *p)
 	return NULL;
 }
 
-/* A free place in the worker's table, if necessary by dropping the lease that has been overdue longest. */
+/* Returns a free entry in the worker's table of leases. If there is none, drops the worker's oldest overdue lease;
+ * that there is one follows from peer_has_wish. */
 static struct lease *lease_take(struct farm *f, struct peer *p)
 {
 	struct lease *oldest = NULL;

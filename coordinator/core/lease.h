@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* One worker's hold on one open lease. Stored in its worker's table and linked to its slot. */
+/* Leases: one worker's hold on the open lease of one slot (struct lease in slot.h). */
 #ifndef COORDINATOR_CORE_LEASE_H
 #define COORDINATOR_CORE_LEASE_H
 
@@ -12,17 +12,17 @@ struct peer;
 struct slot;
 
 struct lease_key lease_key(const struct lease *l);
-struct lease *lease_of(const struct slot *s, const struct peer *p); /* NULL: holds none */
+struct lease *lease_of(const struct slot *s, const struct peer *p); /* NULL: p does not hold the slot's lease */
 
 /* Gives the slot's open lease to a worker that wants one. */
 void lease_send(struct farm *f, struct peer *p, struct job *j, struct slot *s);
-/* Removes it from all lists; the slot moves to the right list. */
+/* Ends the lease: frees its entry, and moves its slot and its worker to the right lists. */
 void lease_drop(struct farm *f, struct lease *l);
-void lease_revoke(struct farm *f, struct lease *l); /* the same, and tells the worker */
-/* The worker has delivered its result. */
+void lease_revoke(struct farm *f, struct lease *l); /* like lease_drop(), and tells the worker */
+/* Notes that the result has arrived and will be judged later: the worker may get another lease meanwhile. */
 void lease_deliver(struct farm *f, struct lease *l);
-/* It timed out: the slot is free for others, but an answer still counts. */
+/* The lease has timed out: its slot is free for other workers, but an answer still counts. */
 void lease_expire(struct farm *f, struct lease *l);
-void lease_revoke_slot(struct farm *f, struct slot *s); /* all holders */
+void lease_revoke_slot(struct farm *f, struct slot *s); /* revokes the leases of all holders */
 
 #endif

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Intrusive doubly linked lists. A head is a link that points to itself when empty; so does a link in no list. */
+/* Intrusive doubly linked lists. The head is a link, too; an empty head, and a link that is in no list, point to
+ * themselves. */
 #ifndef COORDINATOR_CORE_LIST_H
 #define COORDINATOR_CORE_LIST_H
 

@@ -30,7 +30,8 @@ static uint32_t count_gone(const struct lost_holders *l, uint32_t *certificates)
 	return n;
 }
 
-/* Its own entry, a free one, one that came back, or one of several with its certificate. */
+/* Adds the worker in the first place that fits: its own entry, a free one, that of a worker that came back, or one of
+ * several with the same certificate. */
 static void add_worker(struct lost_holders *l, const struct identity *who)
 {
 	uint32_t place = l->count;
@@ -46,7 +47,7 @@ static void add_worker(struct lost_holders *l, const struct identity *who)
 	l->of[place] = (struct lost_worker){who, who->id, who->certificate_id, who->calls};
 }
 
-/* The list's length: it is not in it. */
+/* Returns the worker's index in the list; the list's length if it is not listed. */
 static uint32_t place_of(const struct lost_holders *l, const struct identity *who)
 {
 	uint32_t i = 0;

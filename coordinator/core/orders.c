@@ -8,7 +8,7 @@
 #include <assert.h>
 #include <math.h>
 
-/* The live job that the event names; NULL: the event has been answered. */
+/* Returns the live job that the event names. Otherwise rejects the event, if it has a tag, and returns NULL. */
 static struct job *live_job_of(struct farm *f, const struct event *ev)
 {
 	struct job *j = farm_find_job(f, ev->job);
@@ -29,8 +29,8 @@ static void hold_job(struct job *j, enum job_hold which, const char *why, double
 		j->held_since = now;
 	if (!was || job_is_held(j))
 		return;
-	j->progress_floor = job_progress(j, now); /* a clock that moves completes rounds */
-	double pause = now - j->held_since;	  /* shifts its times by the time it was held; NAN stays NAN */
+	j->progress_floor = job_progress(j, now); /* must not go back when the job's clock moves on */
+	double pause = now - j->held_since;	  /* shifts the job's times by the time it was held; NAN stays NAN */
 	j->started += pause;
 	j->opened += pause;
 	j->looked_at += pause;
@@ -73,7 +73,8 @@ void orders_extend(struct farm *f, const struct event *ev)
 		job_forecast(j);
 	if (j->kind == LEASE_RENDER)
 		job_raise_limit(j);
-	/* The error was being estimated for a bound that no longer applies: continue. */
+	/* If an estimate of the error was due because of the old bounds, END_NONE here lets the job continue after
+	 * it. */
 	if (j->ending != END_NONE)
 		j->ending = rounds_bound(j, job_elapsed(j, f->now));
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What users do to existing jobs: hold, release, prioritise, extend. */
+/* Orders of users about existing jobs: hold, release, change of priority, extension. */
 #ifndef COORDINATOR_CORE_ORDERS_H
 #define COORDINATOR_CORE_ORDERS_H
 

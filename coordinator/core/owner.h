@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Owners of jobs: a name each, reference-counted by its jobs. */
+/* Owners of jobs, one per name; reference-counted by their jobs. */
 #ifndef COORDINATOR_CORE_OWNER_H
 #define COORDINATOR_CORE_OWNER_H
 
@@ -10,20 +10,21 @@
 enum { OWNER_NAME = 72 };
 
 struct owner {
-	struct link link; /* farm.owners */
+	struct link link; /* in farm.owners */
 	uint32_t uses;
-	uint32_t leases_out;  /* of all its jobs */
-	double wants;	      /* used by share.c */
-	uint32_t limits;      /* jobs of this owner that ended workers */
+	uint32_t leases_out;  /* by all jobs of this owner */
+	double wants;	      /* machines that its jobs could use; scratch of share.c */
+	uint32_t limits;      /* number of times that a job of this owner ended workers */
 	double limited_until; /* -INFINITY: not limited */
 	char name[OWNER_NAME];
 };
 
-struct owner *owner_use(struct link *owners, const char *name); /* NULL: out of memory */
-void owner_drop(struct owner *o);				/* o may be NULL */
+/* The owner of this name, made if necessary; NULL: out of memory. */
+struct owner *owner_use(struct link *owners, const char *name);
+void owner_drop(struct owner *o); /* ends a reference; o may be NULL */
 
-/* A job of this owner has ended workers: for 60 s, twice as long each time up to 64 minutes, those of the owner's
- * jobs of which nothing was computed yet get one lease at a time. Forgotten with the last job. */
+/* Limits an owner whose job has ended workers: for 60 s, doubled each time up to 64 minutes, those jobs of the owner
+ * of which nothing was computed yet get one lease at a time. The count is forgotten with the owner's last job. */
 void owner_limit(struct owner *o, double now);
 
 #endif

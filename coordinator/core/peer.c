@@ -52,7 +52,7 @@ static struct backoff *avoid_of(const struct peer *p, uint64_t job)
 	return NULL;
 }
 
-/* A free entry, one of a job that is over, or the one that ends first. */
+/* Returns a free entry, that of a job that is over, or the one whose pause ends first. */
 static struct backoff *room_to_avoid(const struct farm *f, struct identity *who)
 {
 	struct backoff *first = &who->avoid[0];
@@ -87,8 +87,8 @@ static bool holds_lease_of(const struct peer *p, uint64_t job)
 	return false;
 }
 
-/* Not a failure, so the pause does not grow with each one. Nor are other jobs tried during it: however many wait, the
- * worker is asked once in a pause. */
+/* This is not a failure, so the pause does not grow. full_until keeps other jobs away for as long: however many wait,
+ * the worker is asked once per pause. */
 void peer_has_no_room(const struct farm *f, struct peer *p, uint64_t job)
 {
 	struct backoff *a = avoid_of(p, job);
@@ -99,7 +99,8 @@ void peer_has_no_room(const struct farm *f, struct peer *p, uint64_t job)
 		return;
 	a = a ? a : begin_to_avoid(f, p, job);
 	a->own = a->later = true;
-	a->held = held && !holds_lease_of(p, job); /* if it holds some, this job itself has to make way for another */
+	/* If it holds leases of this job, the job waits for its own scene to leave the memory. */
+	a->held = held && !holds_lease_of(p, job);
 	a->until = f->now + f->config.first_pause;
 }
 
@@ -120,7 +121,8 @@ void peer_failed(const struct farm *f, struct peer *p, uint64_t job, bool own)
 	a->until = f->now + ldexp(f->config.first_pause, (int)doublings);
 }
 
-/* What a worker may hold grows with what it returns: one that takes everything and returns nothing blocks little. */
+/* The number of leases that a worker may hold grows with the results it returns, so that a worker that takes
+ * everything and returns nothing blocks little. */
 static void set_window(struct farm *f, struct peer *p, uint32_t window)
 {
 	struct peer **all = p->who->uses > 1 ? f->peers : &p; /* an old connection of the same worker may still exist */

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The answers to a lease that two workers compute, while they wait for each other (verify.h), and the choice of
- * those leases. */
+/* Which leases are verified, that is, computed by two workers (verify.h), and the answers to such a lease while no
+ * two of them agree. */
 #ifndef COORDINATOR_CORE_PROOF_H
 #define COORDINATOR_CORE_PROOF_H
 
 #include "coordinator/core/worker_registry.h"
 
-enum { VERIFY_MOST = 4 /* limit of answers that all differ: the job cannot be computed reproducibly */ };
+/* Limit on answers that all differ; when it is reached the job cannot be computed reproducibly. */
+enum { VERIFY_MOST = 4 };
 
 struct proof {
 	uint32_t count;
@@ -18,25 +19,28 @@ struct job;
 struct peer;
 struct slot;
 
+/* Whether this lease is verified: a hash of the job's seed, its id and the lease's key is below the job's fraction. */
 bool proof_chosen(const struct job *j, const struct lease_key *k);
-/* How many workers may hold the slot's open lease at once, apart from copies of slow ones: two before there is an
- * answer. */
+/* How many workers may hold the slot's open lease at once, apart from copies of slow leases: two while no answer has
+ * been noted, then one. */
 uint32_t proof_copies(const struct job *j, const struct slot *s);
-/* The worker may not get the slot's lease: it has answered already, or another connection of it holds it. */
+/* Whether the worker may not get the slot's lease: it has answered already, or holds the lease on another connection.
+ */
 bool proof_bars(const struct job *j, const struct slot *s, const struct peer *p);
-/* A worker holds or has answered the slot's lease, and another one is needed. */
+/* Whether the slot waits for another worker: one holds or has answered its lease, and another answer is needed. */
 bool proof_waits(const struct job *j, const struct slot *s);
 
 enum verify_answer {
-	VERIFY_AGREES, /* with another worker's answer: it counts */
+	VERIFY_AGREES, /* equals another worker's answer: the result counts */
 	VERIFY_NOTED,
-	VERIFY_DIFFERS,	    /* noted, but differs from earlier ones */
-	VERIFY_REPEATED,    /* the same worker sent the same before */
-	VERIFY_CONTRADICTS, /* the same worker sent something else before */
+	VERIFY_DIFFERS,	    /* noted; differs from all earlier answers */
+	VERIFY_REPEATED,    /* equals what the same worker sent before */
+	VERIFY_CONTRADICTS, /* differs from what the same worker sent before */
 	VERIFY_HOPELESS,    /* VERIFY_MOST workers gave as many different answers */
 };
+/* Compares an answer with the noted ones, and notes it if it is the worker's first and equals none of them. */
 enum verify_answer proof_take(struct job *j, struct slot *s, struct identity *who, const struct batch_digest *d);
-/* "a, b, c": the workers that answered. */
+/* Writes the names of the workers that have answered, as in "a, b, c". */
 void proof_names(const struct job *j, const struct slot *s, char *text, size_t size);
 
 struct proof *proof_of(const struct job *j, const struct slot *s);

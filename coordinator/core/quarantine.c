@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Permanently: no leases, and nothing that it sends counts. */
+/* Quarantines a worker permanently: it gets no leases, and nothing that it sends counts. */
 static void quarantine_worker(struct farm *f, struct identity *who)
 {
 	if (who->quarantined)

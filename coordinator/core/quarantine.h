@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Faults of workers, and their consequences for connections and answers. */
+/* Counts faults and wrong results of workers, and quarantines those that reach max_faults. */
 #ifndef COORDINATOR_CORE_QUARANTINE_H
 #define COORDINATOR_CORE_QUARANTINE_H
 
@@ -11,12 +11,13 @@ struct job;
 struct peer;
 struct slot;
 
-/* Counts a wrong result; the text describes it in a few words. */
+/* Counts a wrong result. what: a few words that begin its description, to which the lease is added. */
 void quarantine_wrong(struct farm *f, struct identity *who, const char *what, const struct lease_key *k);
 
-void quarantine_fault(struct farm *f, struct peer *p,
-		      const char *text); /* it sent something that no correct worker sends */
-/* The answer with this digest is right: workers that gave another one are reported, and the notes are cleared. */
+/* Counts a fault: the worker sent something that no correct worker sends. */
+void quarantine_fault(struct farm *f, struct peer *p, const char *text);
+/* The answer with the digest `right` is correct: workers that gave another one have given a wrong result. Clears the
+ * slot's noted answers. */
 void quarantine_settle(struct farm *f, struct job *j, struct slot *s, const struct batch_digest *right);
 
 #endif

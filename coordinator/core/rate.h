@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A rate per second, over the last RATE_BUCKETS x RATE_WIDTH seconds. Pure; allocates nothing. */
+/* A rate per second, averaged over the last RATE_BUCKETS x RATE_WIDTH seconds. Pure; allocates nothing. */
 #ifndef COORDINATOR_CORE_RATE_H
 #define COORDINATOR_CORE_RATE_H
 
@@ -9,7 +9,7 @@ enum { RATE_BUCKETS = 15, RATE_WIDTH = 2 };
 
 struct rate {
 	double since;
-	int64_t index[RATE_BUCKETS]; /* index of the period that the bucket counts */
+	int64_t index[RATE_BUCKETS]; /* number of the period of RATE_WIDTH s that the bucket counts */
 	double sum[RATE_BUCKETS];
 };
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Restores jobs of an earlier run, and ended ones that are extended, from which of their leases are merged. */
+/* Restores jobs of an earlier run, and jobs that have ended and are extended, from which of their leases are merged. */
 #include "coordinator/core/restore.h"
 
 #include "common/base/mem.h"
@@ -10,7 +10,8 @@
 #include <assert.h>
 #include <math.h>
 
-/* Pins the job as its first merged batch did. If memory is out, the first worker that asks pins it again. */
+/* Pins the job to the fingerprint of its merged batches. If out of memory the job stays unpinned, and the first
+ * worker that asks pins it. */
 static void pin(struct farm *f, struct job *j, const char *fingerprint)
 {
 	struct peer_class *c = *fingerprint ? peer_class_use(&f->classes, fingerprint) : NULL;
@@ -20,7 +21,7 @@ static void pin(struct farm *f, struct job *j, const char *fingerprint)
 	peer_class_drop(c);
 }
 
-/* The maker may be a worker that is no longer known. */
+/* A maker may be a worker that is no longer known, which worker_registry_recall adds. */
 static void take_makers(struct farm *f, struct job *j, const struct event_join *makers)
 {
 	for (uint32_t i = 0; makers && i < j->slot_count; i++)
@@ -49,7 +50,8 @@ static void take_looks(struct job *j, const struct forecast_history *looks)
 	job_forecast(j);
 }
 
-/* max_jobs does not apply to restored jobs: nobody could be told that they are refused. */
+/* Makes room for one more live job. max_jobs does not apply unless a client has asked, since nobody could be told
+ * that a job of an earlier run is refused. */
 static bool make_room(struct farm *f, bool asked)
 {
 	uint32_t room = asked ? f->config.max_jobs : f->live_limit;
@@ -101,8 +103,8 @@ void restore_job(struct farm *f, const struct event *ev)
 	if (j->kind != LEASE_RENDER)
 		return;
 	rounds_opened(f, j, r->black);
-	/* A bound that the last complete round met still applies; an estimate that is due is made again, with the
-	 * same result. */
+	/* A bound that the last complete round met still applies. An estimate of the error that was due is made
+	 * again, with the same result. */
 	if (job_is_live(j) && j->rounds > 0)
 		rounds_settle(f, j, isnan(r->completed) ? r->elapsed : r->completed);
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Restores a job of an earlier run. */
+/* Restores jobs of an earlier run, and jobs that have ended (EVENT_RESTORE). */
 #ifndef COORDINATOR_CORE_RESTORE_H
 #define COORDINATOR_CORE_RESTORE_H
 

@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The life of a job: submitted, bootstrap, rounds, a bound, the end.
+ * The life of a job: submission, bootstrap, rounds, a bound, the end.
  *
  * Happy path: rounds_submit puts the job on the list of live jobs, ordered by priority. The first lease starts it
  * (rounds_started). When the bootstrap is merged, the shell prepares seeds and b (ACTION_BOOTSTRAP_DONE) and
  * rounds_prepared opens the first round. After each complete round rounds_settle checks the bounds; if the error has
- * to be estimated, the shell does that (ACTION_EVALUATE_ERROR) and rounds_error_known decides. rounds_end revokes what
- * is out and publishes the image.
+ * to be estimated, the shell does that (ACTION_EVALUATE_ERROR) and rounds_error_known decides. rounds_end revokes the
+ * leases that are out and has the image published.
  *
  * Failures: a submission is rejected with a sentence (priority, too many jobs, job_new's reasons). A job fails when
  * its bootstrap cannot be prepared or when another file of the core ends it. A black bootstrap ends the job as done.
- * Answers that come late, for a job that has ended meanwhile, are ignored.
+ * The shell's answers about a job that has ended meanwhile are ignored.
  */
 #include "coordinator/core/rounds.h"
 
@@ -125,7 +125,8 @@ void rounds_started(struct farm *f, struct job *j)
 	}
 }
 
-/* Keeps `latest`, which has just ended: the update still refers to it. */
+/* Forgets the job that ended first if more than max_ended have ended, but never `latest`, which has just ended: the
+ * update still refers to it. */
 static void forget_oldest(struct farm *f, const struct job *latest)
 {
 	if (f->job_count - f->live_count <= f->config.max_ended)
@@ -266,7 +267,7 @@ void rounds_error_known(struct farm *f, const struct event *ev)
 	j->rel_error_rounds = j->rounds;
 	job_note_look(j, ev->error_known.rel_error, ev->error_known.rel_mse, ev->error_known.degrees,
 		      ev->error_known.doubtful, ev->error_known.cpu_seconds);
-	/* An estimate made because another bound was met does not count if that bound was lifted meanwhile. */
+	/* An estimate that was made because another bound was met does not count if that bound was lifted meanwhile. */
 	bool counts = j->ending != END_NONE || merge_error_due(&j->plan, j->rounds);
 	if (counts && j->rel_error <= j->plan.target_error)
 		rounds_end(f, j, END_ERROR, "");

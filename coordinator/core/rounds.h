@@ -9,14 +9,16 @@
 enum { PRIORITY_MAX = 100 };
 void rounds_submit(struct farm *f, const struct event *ev);
 void rounds_cancel(struct farm *f, const struct event *ev);
-void rounds_started(struct farm *f, struct job *j);		/* call before a lease of it is sent */
-void rounds_enlist(struct farm *f, struct job *j);		/* adds a job; its id is new */
-void rounds_forget(struct farm *f, struct job *j);		/* removes a job that has ended */
-enum job_end rounds_bound(const struct job *j, double elapsed); /* the bound that is met, apart from the error */
+void rounds_started(struct farm *f, struct job *j); /* call before a lease of the job is sent */
+void rounds_enlist(struct farm *f, struct job *j);  /* adds a job with a new id to the lists */
+void rounds_forget(struct farm *f, struct job *j);  /* removes and frees a job that has ended */
+/* The bound that is met, not counting the target error. */
+enum job_end rounds_bound(const struct job *j, double elapsed);
 void rounds_reject(struct farm *f, const struct event *ev, const char *text);
-void rounds_opened(struct farm *f, struct job *j, bool black); /* b and seeds exist */
-/* Checks the bounds when a round is complete, this many seconds after the first lease. */
+void rounds_opened(struct farm *f, struct job *j, bool black); /* b and seeds exist; a black job ends here */
+/* Checks the bounds after a complete round. elapsed: seconds from the first lease to the end of that round. */
 void rounds_settle(struct farm *f, struct job *j, double elapsed);
+/* A round, or the bootstrap, has become complete. */
 void rounds_complete(struct farm *f, struct job *j);
 void rounds_prepared(struct farm *f, const struct event *ev);
 void rounds_error_known(struct farm *f, const struct event *ev);

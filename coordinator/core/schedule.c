@@ -3,13 +3,14 @@
  * Decides which worker gets which lease, and which leases have been out for too long.
  *
  * Happy path: schedule runs after every event. While workers wait, hand_out_ready gives the next lease of the job
- * whose turn it is: the highest priority first, then the owner and the job with the fewest leases out. Once nothing is
- * ready, hand_out_copy gives second copies of overdue leases. schedule_expire looks about once a second for leases
+ * whose turn it is: the highest priority first, then the owner and the job with the fewest leases out. Once nothing
+ * is ready, hand_out_copy gives second copies of slow leases. schedule_expire looks about once a second for leases
  * past their deadline and for silent workers.
  *
- * Failures: a silent worker first loses its leases, then its connection. Workers that avoid a job, are quarantined for
- * it, or hold the same lease already are passed over. Where the usual duration is not known, give_up_copies expires
- * the older of two copies after a longer time. call_again keeps the earliest time at which any of this may change.
+ * Failures: a silent worker first loses its leases, then its connection. Workers that pause with a job, must not
+ * answer a lease (proof_bars, doubt_bars), or hold it already are passed over. While the usual duration of a job's
+ * leases is not known, give_up_copies expires the older of two copies after a fixed time. call_again keeps the
+ * earliest time at which any of this may change.
  */
 #include "coordinator/core/schedule.h"
 
@@ -30,8 +31,8 @@ static void call_again(struct farm *f, double at)
 		f->schedule_at = at;
 }
 
-/* The worker that has waited longest and does not hold the slot. If there is none and `again` is set, one whose lease
- * of the slot is overdue. */
+/* Returns the worker of the class that has waited longest and does not hold the slot's lease. If there is none and
+ * `again` is set, returns one whose lease of the slot is overdue. */
 static struct peer *waiting_in(struct farm *f, const struct peer_class *c, const struct job *j, const struct slot *s,
 			       bool again)
 {
@@ -68,7 +69,8 @@ static struct peer *waiting_for(struct farm *f, const struct job *j, const struc
 	return first;
 }
 
-/* Leases that wait for a second worker go first: their chains and their round are blocked. */
+/* Chooses a worker and a slot for the job's next lease. Slots that wait for a second worker go first, because their
+ * chains and their round are blocked. */
 static struct peer *choose_peer(struct farm *f, const struct job *j, struct slot **slot)
 {
 	for (int i = 0; i < 2; i++) {
@@ -94,7 +96,7 @@ static void hand_out(struct farm *f, struct peer *p, struct job *j, struct slot 
 	lease_send(f, p, j, s);
 }
 
-/* Whether a, the older of two jobs of the same priority, goes first. */
+/* Whether a, the older of two jobs of the same priority, goes before b. */
 static bool comes_first(const struct job *a, const struct job *b)
 {
 	if (a->owner != b->owner && a->owner->leases_out != b->owner->leases_out)
@@ -102,7 +104,7 @@ static bool comes_first(const struct job *a, const struct job *b)
 	return a->owner == b->owner ? a->leases_out <= b->leases_out : true;
 }
 
-/* If a job of its owner crashed workers, all jobs of that owner without a result so far share one lease at a time. */
+/* If a job of the owner crashed workers, all jobs of that owner without a result so far share one lease at a time. */
 static bool must_wait(struct farm *f, const struct job *j)
 {
 	bool waits = share_is_limited(f, j) && share_unproven(f, j->owner) > 0;
@@ -111,7 +113,8 @@ static bool must_wait(struct farm *f, const struct job *j)
 	return waits;
 }
 
-/* Hands out a lease of the job whose turn it is among those of the highest priority that can use a waiting worker. */
+/* Hands out a lease of the job whose turn it is, among the jobs of the highest priority that can use a waiting
+ * worker. Returns false if there is none. */
 static bool hand_out_ready(struct farm *f)
 {
 	struct job *best = NULL;
@@ -136,7 +139,7 @@ static bool hand_out_ready(struct farm *f)
 	return best;
 }
 
-/* Gives out a second copy of a lease that holds up a round. */
+/* Hands out a second copy of a lease that holds up a round. Returns false if there is none, or no worker for it. */
 static bool hand_out_copy(struct farm *f)
 {
 	for (uint32_t i = 0; i < f->live_count; i++) {
@@ -160,7 +163,8 @@ static bool hand_out_copy(struct farm *f)
 	return false;
 }
 
-/* NULL: fewer than two workers hold it, or one has delivered an answer that is not judged yet. */
+/* Returns the older of the slot's two open leases; NULL if fewer than two workers hold one, or if one has delivered
+ * an answer that is not judged yet. */
 static struct lease *older_copy(const struct slot *s)
 {
 	struct lease *older = NULL;
@@ -173,8 +177,8 @@ static struct lease *older_copy(const struct slot *s)
 	return s->holders > 1 ? older : NULL;
 }
 
-/* If the job has no median yet, two workers hold a lease for long and another is idle, the older copy is given up.
- * true: there are such leases. */
+/* For a job without a median: if two workers have held the same lease for long and another worker is idle, gives up
+ * the older copy. Returns true if some lease has two holders. */
 static bool give_up_copies(struct farm *f, struct job *j)
 {
 	bool any = false;
@@ -193,7 +197,7 @@ static bool give_up_copies(struct farm *f, struct job *j)
 	return any;
 }
 
-/* Scans all leases, a few times a minute. */
+/* Calls give_up_copies for all jobs without a median, at most once in PERIOD seconds. */
 static void look_at_copies(struct farm *f)
 {
 	enum { PERIOD = 10 };
@@ -253,6 +257,6 @@ void schedule_expire(struct farm *f, double read)
 		f->check_at = fmin(f->check_at, p->last_seen + patience);
 		expire_leases(f, p, read);
 	}
-	/* This is a scan of everything, at most once a second. */
+	/* Each call scans all workers and leases: at most one a second. */
 	f->check_at = fmax(f->check_at, f->now + 1);
 }

@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Which worker gets which lease, and timeouts. */
+/* Decides which worker gets which lease, and which leases and workers time out. */
 #ifndef COORDINATOR_CORE_SCHEDULE_H
 #define COORDINATOR_CORE_SCHEDULE_H
 
 struct farm;
 
+/* Hands out leases while workers wait. Call after every event. */
 void schedule(struct farm *f);
-void schedule_expire(struct farm *f,
-		     double read); /* silent workers and overdue leases, by what had been received then */
+/* Expires leases past their deadline and disconnects silent workers. `read`: everything that arrived before this time
+ * has been handled. */
+void schedule_expire(struct farm *f, double read);
 
 #endif

@@ -12,7 +12,7 @@ bool share_competes(const struct job *a, const struct job *b)
 	return !a->class || !b->class || a->mixed || b->mixed || a->class == b->class;
 }
 
-/* Machines that would be busy with all of the job's leases, at the number that one takes. */
+/* Returns how many machines all open leases of the job would keep busy if each machine takes `leases_each`. */
 static double machines_wanted(const struct job *j, double leases_each)
 {
 	if (job_is_held(j))
@@ -53,15 +53,16 @@ static uint32_t workers_of(const struct job *j)
 	return n;
 }
 
-/* Jobs that take part: the i-th live job, if it competes at this priority and for this owner (NULL: any). */
+/* Returns the i-th live job if it shares machines with j at the same priority, and belongs to o if o is not NULL;
+ * otherwise NULL. */
 static const struct job *competitor_at(const struct farm *f, uint32_t i, const struct job *j, const struct owner *o)
 {
 	const struct job *r = f->live[i];
 	return r->priority == j->priority && share_competes(r, j) && (!o || r->owner == o) ? r : NULL;
 }
 
-/* The level to which everybody can be filled from the available machines, given how much those below the level take
- * and how many are above. */
+/* Equal division of `there` machines among takers with different wants ("water filling"). level: what each taker gets
+ * at most; taken: total of the wants below the level; above: number of wants above it. */
 struct level {
 	double there, taken, level;
 	uint32_t above;
@@ -75,7 +76,7 @@ static void level_add(struct level *v, double want)
 		v->taken += want;
 }
 
-/* Raises the level; true: it is found. */
+/* Raises the level as far as the machines allow and starts a new count. Returns true when the level is final. */
 static bool is_level(struct level *v)
 {
 	if (v->above == 0)
@@ -112,8 +113,8 @@ static double machines_due(const struct farm *f, const struct job *j, uint32_t m
 	return fmin(machines_wanted(j, leases_each), v.above ? v.level : INFINITY);
 }
 
-/* "; j4, j7 and 2 more come first"; only: the owner whose jobs may be named, NULL: any. "; 2 jobs of other owners
- * come first" */
+/* Writes which other jobs go first (higher) or take turns with j, as in "; j4, j7 and 2 more come first". only: the
+ * owner whose jobs may be named, NULL: all may; others are counted, as in "; 2 jobs of other owners come first". */
 static void put_others(struct text *t, const struct farm *f, const struct job *j, const struct owner *only, bool higher,
 		       double leases_each)
 {

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What a priority means in machines: how many work for a job, and how many would if nothing changed. Of the machines
- * that may work for it, jobs of higher priority take what they can use (a job has at most groups x parts leases at
- * once). The rest is divided equally among the owners of its priority, and each owner's part among its jobs; what
- * somebody cannot use goes to the others. Machines are counted by the leases they ask for. A pure function except for a
- * mark in each owner.
+ * What a priority means in machines: how many compute a job, and how many would in the long run if nothing changed.
+ * Of the machines that may compute it, jobs of higher priority take what they can use (a job has at most groups x
+ * parts leases at once). The rest is divided equally among the owners of jobs of its priority, and each owner's part
+ * equally among the owner's jobs; what an owner or a job cannot use goes to the others. Machines are counted by the
+ * leases they ask for. Pure, except that it uses a scratch member of each owner.
  */
 #ifndef COORDINATOR_CORE_SHARE_H
 #define COORDINATOR_CORE_SHARE_H
@@ -17,18 +17,19 @@ struct job;
 struct owner;
 
 struct share {
-	uint32_t workers;	/* machines that hold its leases */
-	uint32_t machines;	/* machines that could */
-	double machines_due;	/* machines it would get */
-	char place[160];	/* "3 of 8 machines; j4 and j7 come first"; "" when it has ended */
-	char owners_place[160]; /* the same without ids of other owners' jobs */
+	uint32_t workers;	/* machines that hold leases of the job */
+	uint32_t machines;	/* machines that could compute it */
+	double machines_due;	/* machines that it would get */
+	char place[160];	/* "3 of 8 machines; j4 and j7 come first"; "" if the job has ended */
+	char owners_place[160]; /* like `place`, without the ids of other owners' jobs */
 };
 
 void share_of(const struct farm *f, const struct job *j, struct share *out);
-bool share_competes(const struct job *a, const struct job *b); /* for at least one worker */
+bool share_competes(const struct job *a, const struct job *b); /* whether both could use the same workers */
 
-/* The job's owner is limited (owner.h), and nothing of the job was computed yet. */
+/* Whether the job's owner is limited (owner.h) and nothing of the job was computed yet. */
 bool share_is_limited(const struct farm *f, const struct job *j);
-uint32_t share_unproven(const struct farm *f, const struct owner *o); /* leases out of such jobs of the owner */
+/* Number of leases out of the owner's jobs of which nothing was computed yet. */
+uint32_t share_unproven(const struct farm *f, const struct owner *o);
 
 #endif

@@ -5,9 +5,7 @@
 
 #include <assert.h>
 
-/* ---- jobs and workers by id ---- */
-
-/* The index of the first of `count` whose id is not below `id`; ids ascend. */
+/* Returns the index of the first of `count` entries whose id is not below `id`. The ids ascend. */
 static uint32_t place_of(const struct farm *f, uint32_t count, uint64_t (*id_at)(const struct farm *f, uint32_t i),
 			 uint64_t id)
 {
@@ -49,10 +47,8 @@ struct peer *farm_find_peer(const struct farm *f, uint64_t id)
 	return i < f->peer_count && f->peers[i]->id == id ? f->peers[i] : NULL;
 }
 
-/* ---- actions ---- */
-
-/* Bounds per step: each lease is revoked at most once and replaced at most once, a worker whose table is full of
- * overdue leases loses some more, each worker is disconnected once, and a job causes a handful of actions. */
+/* Upper bound per step: each lease is revoked at most once and replaced at most once, a worker whose table is full of
+ * overdue leases loses some more, each worker is disconnected at most once, and a job causes a handful of actions. */
 int update_reserve(struct farm *f, size_t more_leases)
 {
 	size_t leases = f->lease_limit + more_leases;

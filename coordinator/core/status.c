@@ -59,8 +59,8 @@ int job_exit_code(const struct job_status *s)
 	return missed ? 4 : 0;
 }
 
-/* The job that keeps workers of this class busy: the first of higher priority, otherwise the one with the most
- * leases. */
+/* Returns the job that keeps workers busy that j could use: the first of higher priority, otherwise the one with the
+ * most leases out. NULL: none. */
 static const struct job *busy_with(const struct farm *f, const struct job *j)
 {
 	const struct job *most = NULL;
@@ -105,7 +105,7 @@ static bool room_why(const struct farm *f, const struct job *j, char *text, size
 	return false;
 }
 
-/* The job's text is "worker: why". */
+/* j->text has the form "worker: why". */
 static void put_last_failure(const struct job *j, char *text, size_t size)
 {
 	const char *colon = strstr(j->text, ": ");
@@ -116,7 +116,7 @@ static void put_last_failure(const struct job *j, char *text, size_t size)
 		text_print(text, size, "no worker can compute it: %s", j->text);
 }
 
-/* Names the workers whose own machines are at fault, because somebody has to repair them. */
+/* Names the workers whose own machines are at fault, because somebody has to repair those machines. */
 static void put_failing(const struct farm *f, const struct job *j, char *text, size_t size)
 {
 	char names[100] = "";
@@ -158,8 +158,8 @@ static void why_held(const struct job *j, char *text, size_t size)
 		}
 }
 
-/* If all leases that are out are late and none has been answered, says who holds the oldest one. false: somebody
- * works on it. */
+/* If all leases that are out are late and none of them has been answered, writes which worker holds the oldest lease.
+ * Returns false if no lease is out or one of them is not late. */
 static bool put_late(const struct farm *f, const struct job *j, char *text, size_t size)
 {
 	const struct lease *oldest = NULL;
@@ -182,7 +182,8 @@ static bool put_late(const struct farm *f, const struct job *j, char *text, size
 	return oldest != NULL;
 }
 
-/* The job that it waits for; NULL: it does not wait, or for something else. */
+/* Writes the first reason why no worker computes the job; "" if one does. Returns the job that the text names if
+ * another job keeps the workers busy, otherwise NULL. */
 static const struct job *why_waiting(const struct farm *f, const struct job *j, char *text, size_t size)
 {
 	text[0] = 0;
@@ -231,7 +232,7 @@ static void fill_waiting(const struct farm *f, const struct job *j, struct job_s
 		put_busy(s->owners_waiting, sizeof s->owners_waiting, j, other, false);
 }
 
-/* After fill_waiting. */
+/* Needs the result of fill_waiting. */
 static void fill_eta(const struct job *j, double now, struct job_status *s)
 {
 	bool idle = *s->waiting && !j->preparing && !j->evaluating;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Questions about a farm. Pointers in the answers are valid until its next step. Nothing here changes it. */
+/* Questions about a farm. Nothing here changes it. Pointers in the answers are valid until the farm's next step. */
 #ifndef COORDINATOR_CORE_STATUS_H
 #define COORDINATOR_CORE_STATUS_H
 
@@ -9,7 +9,7 @@
 
 struct farm;
 
-/* Fields that the core computes are from the list (job_fields.h). */
+/* State of a job. The members that the macros below add are the BY_CORE fields of job_fields.h. */
 struct job_status {
 	uint64_t id;
 	const char *owner;
@@ -17,12 +17,12 @@ struct job_status {
 	enum job_state state;
 	enum job_end end;
 	const char *fingerprint;	      /* "": not pinned */
-	double submitted, started, ended;     /* started: when the first lease was sent; NAN: not yet */
+	double submitted, started, ended;     /* s; started: when the first lease was sent. NAN: not yet */
 	bool disagrees;			      /* the chains of its final image disagree */
-	double rel_error;		      /* as last estimated; NAN: none */
+	double rel_error;		      /* as last estimated; NAN: no estimate */
 	const struct forecast_history *looks; /* estimates of the error, oldest first */
-	struct forecast_range halving_cpu,
-		halving_seconds; /* the cost of halving the error; valid if there are estimates */
+	/* Cost of halving the error: CPU seconds and seconds; valid if there are estimates. */
+	struct forecast_range halving_cpu, halving_seconds;
 	uint64_t bootstrap_merged;
 	struct job_counts counts;
 #define BY_CORE(member) member;
@@ -40,50 +40,52 @@ struct job_status {
 
 struct peer_status {
 	uint64_t id;
-	uint64_t who; /* equal for all of its connections */
+	uint64_t who; /* the worker's identity: equal for all of its connections */
 	uint64_t restarts;
 	const char *name, *fingerprint;
 	uint32_t threads, want, leases;
 	enum peer_state state;
 	double joined, last_seen;
 	uint64_t merged, repeats, refused, faults, failures;
-	char text[256]; /* its last fault or failure */
+	char text[256]; /* the worker's last fault or failure */
 };
 
 struct lease_status {
 	struct lease_key key;
 	double sent;
-	bool overdue; /* handed out again; an answer still counts if it is the first */
+	bool overdue; /* handed out again; this worker's answer still counts if it is the first */
 };
 
-/* The smallest id above `after` (start with 0); 0: no more. */
+/* Returns the smallest id of a connected worker above `after` (start with 0); 0: no more. */
 uint64_t farm_next_peer(const struct farm *f, uint64_t after);
-/* Whether a result of this lease must come with its digest. */
+/* Whether a result of this lease must come with its digest, because the lease is verified. */
 bool farm_verifies(const struct farm *f, const struct lease_key *k);
-/* What is known of a worker, connected or not. */
+/* State of a worker, connected or not. */
 struct worker_status {
 	uint64_t who, restarts;
 	const char *certificate, *name, *home, *text;
 	uint32_t wrong; /* number of wrong results */
 	bool quarantined;
 };
-/* The smallest id above `after` (start with 0) of a quarantined worker; 0: no more. */
+/* Returns the smallest id of a quarantined worker above `after` (start with 0); 0: no more. */
 uint64_t farm_next_quarantined(const struct farm *f, uint64_t after);
-bool farm_worker(const struct farm *f, uint64_t who, struct worker_status *s);	    /* false: unknown */
-bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *s); /* false: unknown */
-bool farm_counts(const struct farm *f, uint64_t id, struct job_counts *c);	    /* false: unknown */
-/* s since the job's first lease, without the time it was held; NAN: none yet, or unknown */
+bool farm_worker(const struct farm *f, uint64_t who, struct worker_status *s);	    /* false: unknown id */
+bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *s); /* false: unknown id */
+bool farm_counts(const struct farm *f, uint64_t id, struct job_counts *c);	    /* false: unknown id */
+/* Seconds since the job's first lease, not counting the time it was held; NAN: no lease was sent yet, or unknown id. */
 double farm_elapsed(const struct farm *f, uint64_t id, double now);
-/* Whether results of this job may come: it has leases at workers, or only lacks room for them. Its priority, too. */
+/* Whether results of this job may arrive: it is neither held by a user nor for its files, and has leases out or is
+ * held only because results cannot be stored. Also returns its priority. */
 bool farm_expects_results(const struct farm *f, uint64_t id, int *priority);
 bool farm_peer(const struct farm *f, uint64_t id, struct peer_status *s);
-bool farm_lease(const struct farm *f, uint64_t peer, uint32_t i, struct lease_status *s); /* i-th lease of a worker */
+/* i-th lease of a worker; false: no more */
+bool farm_lease(const struct farm *f, uint64_t peer, uint32_t i, struct lease_status *s);
 
-const char *job_state_name(enum job_state s);	/* as in the status: "queued" ... */
+const char *job_state_name(enum job_state s);	/* name in the status: "queued" ... */
 const char *peer_state_name(enum peer_state s); /* "active", "silent", "quarantined" */
 const char *job_end_name(enum job_end e);	/* "mutations" ... */
-/* The exit code of a program that waited for the job, the first that applies: 3 failed or cancelled, 5 chains
- * disagree, 4 another bound before the target error, 0 done. */
+/* The exit code of a program that waited for the job; the first that applies of: 3 failed or cancelled, 5 its chains
+ * disagree, 4 another bound came before the target error, 0 done. */
 int job_exit_code(const struct job_status *s);
 
 #endif

@@ -47,7 +47,7 @@ void verify_forget_worker(struct farm *f, const struct identity *who)
 			forget_answers(f, f->live[i], who);
 }
 
-/* Whether another class has more than that many. */
+/* Whether a class other than `than` has more than this many active workers. */
 static bool more_elsewhere(const struct farm *f, const struct peer_class *than, uint32_t workers)
 {
 	for (struct link *k = f->classes.next; k != &f->classes; k = k->next) {
@@ -78,7 +78,7 @@ bool verify_may_begin(const struct farm *f, const struct job *j, const struct pe
 	return !j->proofs || c->active > 1 || !more_elsewhere(f, c, 1);
 }
 
-/* The first lease that no connected worker may have. */
+/* Returns the first slot in need of another worker whose lease no connected worker may get; NULL: none. */
 static const struct slot *find_stranded_slot(const struct farm *f, const struct job *j)
 {
 	for (int i = 0; i < 2; i++) {

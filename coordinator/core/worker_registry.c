@@ -7,22 +7,22 @@
 
 #include <string.h>
 
-/* By its home, otherwise by its name. */
 struct identity *worker_registry_find(const struct farm *f, const struct event_join *e)
 {
 	struct identity *k = *e->home ? identity_index_home(&f->index, e->certificate, e->home) : NULL;
 	return k ? k : identity_index_name(&f->index, e->certificate, e->name);
 }
 
-/* Whom to forget for a newcomer with this certificate: entries with the same certificate first, quarantined ones
- * last. */
+/* Whether a is to be forgotten before b to make room for a newcomer with this certificate: entries with the same
+ * certificate go first, quarantined ones last. */
 static bool goes_before(const struct identity *a, const struct identity *b, const char *certificate)
 {
 	bool a_own = strcmp(a->certificate, certificate) == 0, b_own = strcmp(b->certificate, certificate) == 0;
 	return a->quarantined != b->quarantined ? b->quarantined : a_own != b_own ? a_own : a->seen < b->seen;
 }
 
-/* Not in the index. NULL: all of them are needed. */
+/* Returns an entry for a newcomer that is not in the index, either new or of a worker that is forgotten for it. NULL:
+ * all entries are in use, or out of memory. */
 static struct identity *room_for_one(struct farm *f, const char *certificate)
 {
 	struct identity *oldest = NULL;
@@ -42,7 +42,7 @@ static struct identity *room_for_one(struct farm *f, const char *certificate)
 	return oldest;
 }
 
-/* The certificate's number, if another entry has it, or a new one. */
+/* Returns the number of this certificate if an entry has it, `otherwise` if not. */
 static uint64_t certificate_id(const struct farm *f, const char *certificate, uint64_t otherwise)
 {
 	for (uint32_t i = 0; i < f->known_count; i++)
@@ -51,7 +51,7 @@ static uint64_t certificate_id(const struct farm *f, const char *certificate, ui
 	return otherwise;
 }
 
-/* The existing entry, or a new one. NULL: no room. */
+/* Returns the existing entry, or a new one; NULL: no room. */
 static struct identity *find_or_add(struct farm *f, const struct event_join *e)
 {
 	struct identity *k = worker_registry_find(f, e);
@@ -73,8 +73,9 @@ static struct identity *find_or_add(struct farm *f, const struct event_join *e)
 uint64_t worker_registry_recall(struct farm *f, const struct event_join *e)
 {
 	struct identity *k = find_or_add(f, e);
+	/* Results may be of different starts of the worker; the latest start counts. */
 	if (k && !k->calls && strcmp(k->home, e->home) == 0 && k->restarts < e->restarts)
-		k->restarts = e->restarts; /* of its results, the latest tells */
+		k->restarts = e->restarts;
 	return k ? k->id : 0;
 }
 
@@ -85,7 +86,7 @@ struct identity *worker_registry_use(struct farm *f, const struct event_join *e,
 		*refused = "the coordinator has no room for another worker";
 		return NULL;
 	}
-	/* A quarantined worker stays known by the names it had. */
+	/* A quarantined worker stays known by the name and home it had. */
 	if (!k->quarantined || strcmp(k->home, e->home) == 0)
 		k->restarts = e->restarts;
 	if (!k->quarantined) {
@@ -114,8 +115,8 @@ void worker_registry_free(struct farm *f)
 	identity_index_fini(&f->index);
 }
 
-/* Names cost nothing: at most this many quarantined entries are kept per certificate, and the one that has been away
- * longest makes room. */
+/* New names cost nothing, so at most IDENTITY_QUARANTINED quarantined entries are kept per certificate; beyond that
+ * the one that has been away longest is released. */
 void worker_registry_quarantine(struct farm *f, struct identity *who)
 {
 	struct identity *oldest = NULL;
