@@ -13,20 +13,20 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* All but FIELD_TEXT are named after their typedef, so that the kind in the list gives both. */
+/* All kinds but FIELD_TEXT are named after their typedef in job_fields.h, so that the kind in the list gives both. */
 enum field_kind { FIELD_TEXT, FIELD_int, FIELD_u32, FIELD_u64, FIELD_bool, FIELD_real, FIELD_positive, FIELD_known };
 
 struct field {
 	enum field_kind kind;
 	size_t offset, size;
-	const char *key; /* NULL: not in this JSON */
+	const char *key; /* NULL: the member is not in this JSON */
 };
 
-/* Stores all fields, by their keys. -EINVAL: a text is not UTF-8; -ENOMEM */
+/* Stores all fields in o under their keys. Returns -EINVAL if a text is not UTF-8, -ENOMEM if out of memory. */
 int fields_store(const struct field *f, size_t count, const void *from, json_t *o, struct error *e);
-/* Missing fields become 0 or "", or unknown if the kind allows that. */
+/* Reads all fields from o. A missing field becomes 0, "", or unknown if its kind allows that. */
 void fields_read(const struct field *f, size_t count, void *to, const json_t *o);
-/* As fields_store, but what is unknown is null. false: an error of that. */
+/* Like fields_store(), but writes null for unknown numbers. Returns false on an error. */
 bool fields_show(const struct field *f, size_t count, const void *from, json_t *o);
 
 #endif

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A job's journal: appending, flushing, and a new file when the old one has failed.
+ * A job's journal: appending, flushing, and starting a new file when the old one has failed.
  *
  * journal_append puts a record into a queue in memory; journal_sync writes and flushes the queue, and may run in the
- * pool while others append. Room is reserved ahead, so that a full disk is noticed before a result is merged.
- * journal_open reads a file from its head, gives each record to a visitor and cuts off an incomplete one at the end.
+ * thread pool while other threads append. Disk space is reserved ahead, so that a full disk is noticed before a
+ * result is merged. journal_open reads a file from its head on, gives each record to a visitor and cuts off an
+ * incomplete record at the end.
  *
- * After a failed write or flush the file is bad and not touched again; journal_renew copies what is durable and what is
- * queued into a new file. Records damaged in the middle are counted and skipped. A full disk is -ENOSPC.
+ * After a failed write or flush the file is bad and not touched again; journal_renew copies the durable and the
+ * queued records into a new file. Records damaged in the middle are counted and skipped. A full disk is -ENOSPC.
  */
 #include "coordinator/store/journal.h"
 
@@ -23,16 +24,17 @@
 #include <unistd.h>
 
 enum { PATH_MOST = 4200 };
-/* Room is reserved for several records at once, because a file system that is writing back delays each reservation. */
+/* Space is reserved for several records at once, because a file system that is writing back delays each reservation. */
 enum { AHEAD = 8, AHEAD_MOST = 1 << 28 };
-/* The limit of queued bytes, of all journals together: beyond it appending writes, too, at the disk's speed. */
+/* Limit on the queued bytes of all journals together. Beyond it journal_append also writes, so it runs at the speed
+ * of the disk. */
 enum { UNWRITTEN_MOST = 1 << 28 };
 static _Atomic uint64_t unwritten_bytes;
 
 struct unwritten {
 	struct unwritten *next;
 	struct journal_record record;
-	struct buf a, b; /* its body */
+	struct buf a, b; /* the body of the record is a followed by b */
 };
 
 struct journal {
@@ -40,18 +42,20 @@ struct journal {
 	uint64_t job, generation, salt;
 	atomic_uint holders;
 	pthread_mutex_t writer; /* held while the file is written or truncated; taken before `list` */
-	pthread_mutex_t list;	/* held briefly: protects the next four */
+	pthread_mutex_t list;	/* held briefly; protects the queue: first, last, waiting, number */
 	struct unwritten *first, **last;
-	uint64_t waiting;		  /* their bytes; the file will have written + waiting */
-	uint64_t number;		  /* of the next record */
-	uint64_t damaged;		  /* records in the file that were damaged when it was read */
-	_Atomic uint64_t in_file, stored; /* records written; records durable */
-	_Atomic uint64_t written, synced; /* in the file */
-	_Atomic uint64_t room;		  /* reserved up to this offset */
-	_Atomic uint64_t record;	  /* size of the last reservation */
-	atomic_int bad; /* why an operation on the file failed, an errno: it is neither written nor trusted any more */
-	atomic_bool settled; /* everything in it is stored elsewhere */
-	atomic_uint flushes; /* being renewed */
+	uint64_t waiting; /* bytes in the queue; with `written`, the size of the file once the queue is empty */
+	uint64_t number;  /* number of the next record */
+	uint64_t damaged; /* records of the file that were damaged when it was read */
+	_Atomic uint64_t in_file, stored; /* in_file: records written to the file; stored: records that are durable */
+	_Atomic uint64_t written, synced; /* bytes of the file that are written, and that are flushed */
+	_Atomic uint64_t room;		  /* space is reserved up to this offset */
+	_Atomic uint64_t record;	  /* bytes of the record last reserved */
+	/* 0, or the errno of the operation on the file that failed: the file is neither written nor trusted any more.
+	 */
+	atomic_int bad;
+	atomic_bool settled; /* all its records are also stored elsewhere */
+	atomic_uint flushes; /* number of running flushes, during which the journal must not be renewed */
 	char path[PATH_MOST];
 };
 
@@ -87,8 +91,6 @@ void journal_hold(struct journal *j)
 {
 	atomic_fetch_add(&j->holders, 1);
 }
-
-/* ---- the queue ---- */
 
 static struct unwritten *first_unwritten(struct journal *j)
 {
@@ -154,7 +156,7 @@ static int write_one(const struct journal *j, int fd, uint64_t at, struct unwrit
 	return write_parts(fd, (off_t)at, parts, 3);
 }
 
-/* Frees reserved space that was not used; the writer's lock is held. */
+/* Frees reserved space that was not used. The caller holds `writer`. */
 static int cut_off(struct journal *j)
 {
 	j->room = 0;
@@ -169,8 +171,8 @@ uint64_t journal_bytes(struct journal *j)
 	return bytes;
 }
 
-/* Writes everything that was queued at the start, and no more: on a slow disk the queue would never become empty,
- * and the first record would never be acknowledged. */
+/* Writes the records that were in the queue at the start, and no more: on a slow disk the queue might never become
+ * empty, and the first record would never be acknowledged. */
 static int write_waiting(struct journal *j)
 {
 	int rc = 0;
@@ -183,8 +185,9 @@ static int write_waiting(struct journal *j)
 			pop(j);
 			continue;
 		}
-		int cut = cut_off(j); /* a torn record that could not be cut off would be cut off by the next reader,
-					 together with what follows */
+		/* A torn record that is left there would be cut off by the next reader, together with everything
+		 * behind it. */
+		int cut = cut_off(j);
 		(void)cut;
 		j->bad = -rc;
 	}
@@ -197,9 +200,10 @@ void journal_release(struct journal *j)
 	if (!j || atomic_fetch_sub(&j->holders, 1) > 1)
 		return;
 	if (j->fd >= 0 && !j->bad) {
-		int rc = j->settled ? 0 : write_waiting(j); /* it was never acknowledged */
+		/* Without a flush these records were never acknowledged, so an error is of no consequence. */
+		int rc = j->settled ? 0 : write_waiting(j);
 		if (!rc && j->room > j->written)
-			rc = cut_off(j); /* otherwise it goes with the file */
+			rc = cut_off(j); /* if this fails, the space is freed when the file is deleted */
 		(void)rc;
 	}
 	drop_all(j);
@@ -241,8 +245,6 @@ int journal_create(struct journal **out, const char *folder, uint64_t job, uint6
 	return 0;
 }
 
-/* ---- reading ---- */
-
 static int visit_piece(struct journal *j, const struct journal_piece *p, journal_visit *visit, void *user,
 		       struct error *e)
 {
@@ -255,7 +257,7 @@ static int visit_piece(struct journal *j, const struct journal_piece *p, journal
 		item.body = p->body;
 		item.size = p->record.size;
 	}
-	j->written = p->to; /* readable up to here */
+	j->written = p->to; /* journal_body can read up to here */
 	return visit(user, &item, e);
 }
 
@@ -291,7 +293,8 @@ static int read_records(struct journal *j, uint64_t end, struct journal_gaps *ga
 	return rc;
 }
 
-/* A damaged head is restored if the records identify the file. */
+/* Reads the head of the file. If the head is damaged, takes the salt from the first record instead and sets *anew, so
+ * that the head is written again. */
 static int read_file_head(struct journal *j, uint64_t end, bool *anew, struct error *e)
 {
 	unsigned char head[JOURNAL_HEAD];
@@ -368,8 +371,6 @@ int journal_body(struct journal *j, uint64_t at, unsigned char **body, size_t *s
 	return rc ? 0 : error_set(e, EBADMSG, "%s: a record has been damaged", j->path);
 }
 
-/* ---- appending ---- */
-
 static bool reserve(struct journal *j, uint64_t from, uint64_t size)
 {
 	if (disk_fallocate(j->fd, FALLOC_FL_KEEP_SIZE, (off_t)from, (off_t)size))
@@ -392,7 +393,7 @@ static int room_for(struct journal *j, uint64_t size, struct error *e)
 	pthread_mutex_lock(&j->writer);
 	int cut = cut_off(j);
 	bool kept = j->written == end ||
-		    reserve(j, j->written, end - j->written); /* queued records have reserved their room */
+		    reserve(j, j->written, end - j->written); /* queued records need the space they had reserved */
 	pthread_mutex_unlock(&j->writer);
 	(void)cut;
 	(void)kept;
@@ -405,8 +406,8 @@ int journal_reserve(struct journal *j, size_t body, struct error *e)
 	return room_for(j, j->record, e);
 }
 
-/* Called before the reserved space runs out, by whoever flushes. With the writer's lock: otherwise the space might be
- * cut off between its reservation and the note of it. */
+/* Reserves more space before the reserved space runs out; called by the thread that flushes. It holds `writer`,
+ * because otherwise the new space might be cut off between its reservation and the change of `room`. */
 static void reserve_ahead(struct journal *j)
 {
 	pthread_mutex_lock(&j->writer);
@@ -432,8 +433,9 @@ int journal_append(struct journal *j, enum journal_kind kind, const struct lease
 	size_t b_size = b ? b->size : 0;
 	if (a_size > UINT32_MAX || b_size > UINT32_MAX - a_size)
 		return error_set(e, EFBIG, "%s: a record of %zu bytes", j->path, a_size + b_size);
-	if (kind != JOURNAL_BATCH && kind != JOURNAL_AGAIN && kind != JOURNAL_PINNED &&
-	    !j->bad) { /* it is optional, and must not make the journal bad */
+	/* Records other than results and fingerprints are optional: without disk space they are refused here, since a
+	 * failed write would make the journal bad. */
+	if (kind != JOURNAL_BATCH && kind != JOURNAL_AGAIN && kind != JOURNAL_PINNED && !j->bad) {
 		int rc = room_for(j, JOURNAL_RECORD + a_size + b_size, e);
 		if (rc)
 			return rc;
@@ -458,7 +460,7 @@ int journal_append(struct journal *j, enum journal_kind kind, const struct lease
 	j->waiting += size;
 	pthread_mutex_unlock(&j->list);
 	if (bytes > UNWRITTEN_MOST && !j->bad)
-		write_waiting(j); /* reports a journal that has become bad */
+		write_waiting(j); /* an error makes the journal bad, and is reported by the next operation */
 	return 0;
 }
 
@@ -502,8 +504,8 @@ static int copy_bytes(struct journal *j, int to, uint64_t from, uint64_t end, st
 	return 0;
 }
 
-/* Copies all records of the file, each checked again, to their offsets in another file, and those that are queued.
- * Damaged ones stay damaged: it is known what is missing. */
+/* Copies all records of the file to the same offsets in another file, checking each one again, and appends the queued
+ * records. Damaged records are copied as they are, so that it stays known what is missing. */
 static int copy_records(struct journal *j, int to, struct error *e)
 {
 	struct journal_scan s;
@@ -548,7 +550,7 @@ int journal_renew(struct journal *j, struct error *e)
 		rc = fault(j, errno, e);
 	if (!rc)
 		rc = disk_sync_folder(folder, e);
-	if (rc) { /* with or without its name it contains everything acknowledged */
+	if (rc) { /* even if the rename cannot be undone, the new file contains everything acknowledged */
 		if (fd >= 0)
 			disk_close(fd);
 		disk_unlink(path);
@@ -579,7 +581,8 @@ int journal_sync(struct journal *j, struct error *e)
 {
 	if (j->settled)
 		return 0;
-	atomic_fetch_add(&j->flushes, 1); /* set before the check for bad: a bad journal may be renewed at any time */
+	/* Counted before `bad` is checked: a bad journal may be renewed at any time. */
+	atomic_fetch_add(&j->flushes, 1);
 	int rc = j->bad ? -j->bad : write_waiting(j);
 	uint64_t written = j->written, in_file = j->in_file;
 	if (!rc && j->bad) {

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The bytes of a journal: its head, its records, and how they are found again among damaged bytes.
+ * The bytes of a journal: its head, its records, and how records are found again among damaged bytes.
  *
  * journal_scan_next returns one piece after the other: a whole record, a record of which only the head is valid, or a
- * stretch without either. A record is recognised by its mark, the salt of its file and a checksum; after a stretch of
- * invalid bytes the file is searched for the next mark. The number in each head says how many records a gap contained.
+ * stretch in which not even heads are valid. A record is recognised by its mark, the salt of its file and a checksum;
+ * after a stretch of invalid bytes the file is searched for the next mark. The number in each head tells how many
+ * records are missing before it.
  *
- * Damage is a piece, not an error. An error of the disk is -errno and says nothing about the file; -ENOMEM if there is
- * no memory for a body.
+ * Damage is reported as a piece, not as an error. An I/O error is -errno and says nothing about the contents of the
+ * file; -ENOMEM: no memory for a body.
  */
 #include "coordinator/store/journal_file.h"
 
@@ -25,8 +26,8 @@
 enum { PATH_MOST = 4200 };
 enum { WINDOW = 1 << 20 /* bytes searched for a mark at a time */ };
 
-/* The digits change with every change of a record's format, including bodies (those of journal_kind, and batches as
- * packed by common/wire). */
+/* The digits are the version. They change with every change of a record's format, including the formats of bodies
+ * (enum journal_kind, and batches as packed by common/wire). */
 static const char magic[8] = "hsltJ002";
 static const char mark[4] = {'\xf1', 'h', 'j', '\x0d'};
 
@@ -69,7 +70,7 @@ void journal_record_pack(struct journal_record *r, unsigned char bytes[JOURNAL_R
 	put32(bytes + 76, crc32c(0, bytes, 76));
 }
 
-/* Whether the head is valid. */
+/* Returns whether the head of the record is valid. */
 static bool unpack_record(const unsigned char bytes[JOURNAL_RECORD], struct journal_record *r)
 {
 	*r = (struct journal_record){.size = get32(bytes + 4),
@@ -102,9 +103,7 @@ int journal_read_at(int fd, void *bytes, size_t size, uint64_t at)
 	return 0;
 }
 
-/* ---- one record ---- */
-
-/* 1: its head is valid; 0: it is not. */
+/* Reads the head of a record. Returns 1 if it is valid and fits, 0 if not, or -errno. */
 static int read_head(const struct journal_scan *s, uint64_t at, struct journal_record *r)
 {
 	unsigned char bytes[JOURNAL_RECORD];
@@ -117,7 +116,7 @@ static int read_head(const struct journal_scan *s, uint64_t at, struct journal_r
 	       r->size <= s->end - at - sizeof bytes;
 }
 
-/* 1: it is valid, and mem_alloc'd; 0: it is not. */
+/* Reads the body of a record. Returns 1 if it is valid (*body is mem_alloc'd), 0 if not, or -errno. */
 static int read_body(const struct journal_scan *s, uint64_t at, const struct journal_record *r, unsigned char **body)
 {
 	*body = mem_alloc(r->size, 1);
@@ -131,7 +130,7 @@ static int read_body(const struct journal_scan *s, uint64_t at, const struct jou
 	return rc == -ENODATA ? 0 : rc;
 }
 
-/* The first offset from *at on that has a mark; 0: none has. */
+/* Moves *at to the first mark at or after it. Returns 1, 0 if there is none, or -errno. */
 static int find_mark(const struct journal_scan *s, uint64_t *at)
 {
 	unsigned char *window = mem_alloc(WINDOW, 1);
@@ -144,14 +143,13 @@ static int find_mark(const struct journal_scan *s, uint64_t *at)
 			*at += (uint64_t)(found - window);
 			rc = 1;
 		} else if (!rc) {
-			*at += size < WINDOW ? size : size - (sizeof mark - 1); /* a mark may lie across the edge */
+			/* A mark may lie across the edge of the window. */
+			*at += size < WINDOW ? size : size - (sizeof mark - 1);
 		}
 	}
 	mem_free(window);
 	return rc == -ENODATA ? 0 : rc;
 }
-
-/* ---- the scan ---- */
 
 void journal_scan_begin(struct journal_scan *s, int fd, uint64_t end, uint64_t salt)
 {
@@ -164,7 +162,8 @@ void journal_scan_end(struct journal_scan *s)
 	*s = (struct journal_scan){.fd = -1};
 }
 
-/* 1: the first valid record from s->at on is known. */
+/* Finds the first valid record at or after s->at and stores it in s->found. Returns 1, 0 if there is none, or -errno.
+ */
 static int look_ahead(struct journal_scan *s)
 {
 	struct journal_piece *p = &s->found;
@@ -190,7 +189,8 @@ static int look_ahead(struct journal_scan *s)
 	}
 }
 
-/* What lies before that record: a damaged one whose head is valid, or bytes that say nothing. */
+/* Returns the first piece before the record found: a damaged record whose head is valid, or a stretch without valid
+ * heads. */
 static int damage(struct journal_scan *s, struct journal_piece *p)
 {
 	uint64_t to = s->found.from, number = s->found.record.number;
@@ -257,8 +257,6 @@ int journal_read_record(int fd, uint64_t end, uint64_t salt, uint64_t at, struct
 	return rc > 0 ? read_body(&s, at, r, body) : rc;
 }
 
-/* ---- damaged records ---- */
-
 int journal_gaps_add(struct journal_gaps *g, uint64_t number, uint64_t count, struct error *e)
 {
 	struct journal_gap *first = list_room(g->first, g->count, sizeof *first);
@@ -280,9 +278,7 @@ void journal_gaps_count(const struct journal_gaps *g, uint64_t stored, uint64_t 
 	}
 }
 
-/* ---- names ---- */
-
-/* The generation; also of a file that was going to be a journal. */
+/* Whether this is the name of a journal, or of one that was being renewed (journal.G.new). Returns the generation. */
 static bool is_journal(const char *name, uint64_t *generation)
 {
 	unsigned long long n;
@@ -294,7 +290,8 @@ static bool is_journal(const char *name, uint64_t *generation)
 	return strncmp(again, name, (size_t)length) == 0 && (!name[length] || strcmp(name + length, ".new") == 0);
 }
 
-/* What is left costs room, and is tried again by whoever clears next. A folder that is gone has none. */
+/* A file that cannot be deleted takes up space until the next call. If the folder does not exist, there is nothing to
+ * delete. */
 void journal_clear(const char *folder, uint64_t keep)
 {
 	char path[PATH_MOST];

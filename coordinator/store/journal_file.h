@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A journal as bytes of a file (journal.h): a head, then records, each with a head and a body. A record's head has a
- * mark, a checksum and a random number chosen by the journal (salt), which no peer knows: so the next record is found
- * after damaged bytes, and no result that a worker makes up can pass for a record. Bodies have their own checksum, so a
- * damaged one is still identified by its head. Heads have a fixed size, so that room for a record can be reserved
- * before it is written and damage can be searched. Any thread, one at a time per scan.
+ * A journal as the bytes of a file (journal.h): a head, then records, each with a head and a body. A record's head
+ * contains a mark, a checksum and a random number chosen by the journal (salt), which no peer knows. So the next
+ * record can be found after damaged bytes, and no result that a worker makes up can pass for a record. Bodies have a
+ * checksum of their own, so a record with a damaged body is still identified by its head. Heads have a fixed size, so
+ * that space for a record can be reserved before it is written and damage can be searched for records. Any thread,
+ * one at a time per scan.
  *
  * Numbers are little endian. The head of the file:
  *
@@ -16,7 +17,7 @@
  * 32      4      CRC-32C of bytes 0 to 31
  * 36      4      zero
  *
- * Of a record, before its body:
+ * The head of a record:
  *
  * 0       4      mark: f1 68 6a 0d
  * 4       4      size of the body
@@ -43,63 +44,68 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { JOURNAL_HEAD = 40, JOURNAL_RECORD = 80 }; /* bytes of each in a file */
+enum { JOURNAL_HEAD = 40, JOURNAL_RECORD = 80 }; /* sizes of both heads in bytes */
 
 struct journal_head {
 	uint64_t job, generation, salt;
 };
 
-struct journal_record { /* before its body */
+struct journal_record { /* head of a record */
 	uint32_t size, body_check;
-	uint32_t kind;	 /* of enum journal_kind (journal.h) */
-	uint64_t number; /* in its file, from 0 */
-	uint64_t stored; /* this many records of the file were durable when this one was written */
+	uint32_t kind;	 /* enum journal_kind (journal.h) */
+	uint64_t number; /* number of the record in its file, from 0 */
+	uint64_t stored; /* number of records of the file that were durable when this one was written */
 	double elapsed;
-	struct lease_key lease; /* .kind 0: it belongs to no lease; .job is the file's job */
+	/* Its kind is 0 if the record belongs to no lease; its job is not stored in the record. */
+	struct lease_key lease;
 	uint64_t salt;
 };
 
+/* Packs the head of a file. */
 void journal_head_pack(const struct journal_head *h, unsigned char bytes[JOURNAL_HEAD]);
-/* -EPROTO: another version; -EBADMSG: not a head, or damaged. */
+/* Unpacks the head of a file. Returns -EPROTO if it is of another version, -EBADMSG if it is damaged or no head. */
 int journal_head_unpack(const unsigned char bytes[JOURNAL_HEAD], struct journal_head *h, const char *path,
 			struct error *e);
-/* The body is a followed by b; computes the checksums. */
+/* Packs the head of a record whose body is a followed by b, and computes the checksums. */
 void journal_record_pack(struct journal_record *r, unsigned char bytes[JOURNAL_RECORD], const struct buf *a,
 			 const struct buf *b);
 
-/* The next piece of a file. */
+/* A stretch of a file, as found by a scan. */
 struct journal_piece {
 	enum {
 		JOURNAL_WHOLE,
-		JOURNAL_DAMAGED /* only its head is valid */,
-		JOURNAL_UNKNOWN /* not even heads are valid */
+		JOURNAL_DAMAGED /* only the head is valid */,
+		JOURNAL_UNKNOWN /* no head is valid */
 	} what;
-	uint64_t from, to;	      /* number of bytes; UNKNOWN: perhaps none */
-	uint64_t count;		      /* number of records, by the numbers in heads */
-	struct journal_record record; /* except for UNKNOWN */
-	unsigned char *body;	      /* WHOLE: mem_alloc'd */
+	/* Offsets of its first byte and of the byte after it; equal if UNKNOWN and records are only missing. */
+	uint64_t from, to;
+	uint64_t count;		      /* number of records, according to the numbers in heads */
+	struct journal_record record; /* not set for UNKNOWN */
+	unsigned char *body;	      /* WHOLE: the body, mem_alloc'd */
 };
 
 struct journal_scan {
 	int fd;
-	uint64_t at, end, salt, number; /* number of the record that is expected there */
-	uint64_t stored;		/* from the last valid record */
-	bool ahead;			/* the next valid record is known: */
+	uint64_t at, end, salt, number; /* number: that of the record expected at `at` */
+	uint64_t stored;		/* records that were durable, according to the last valid head */
+	bool ahead;			/* `found` holds the next valid record */
 	struct journal_piece found;
 };
 
-/* Scans a file of this size from its first record on. */
+/* Starts a scan of a file of `end` bytes at its first record. */
 void journal_scan_begin(struct journal_scan *s, int fd, uint64_t end, uint64_t salt);
-/* 1; 0: no valid record from s->at on; -errno, -ENOMEM: nothing is said about the file. */
+/* Finds the next piece. Returns 1; 0 if there is no valid record at or after s->at; -errno or -ENOMEM, which say
+ * nothing about the contents of the file. */
 int journal_scan_next(struct journal_scan *s, struct journal_piece *p);
 void journal_scan_end(struct journal_scan *s);
-/* The record at this offset. 1: it is valid, its body is mem_alloc'd; 0: it is not. */
+/* Reads the record at this offset. Returns 1 if it is valid (*body is mem_alloc'd), 0 if not, or -errno. */
 int journal_read_record(int fd, uint64_t end, uint64_t salt, uint64_t at, struct journal_record *r,
 			unsigned char **body);
-/* The salt of a file whose head is damaged, from its first record. -EBADMSG */
+/* Finds the salt of a file whose head is damaged, from its first record. Returns -EBADMSG if that is damaged, too. */
 int journal_scan_salt(int fd, uint64_t end, uint64_t *salt);
 
-/* Damaged records, until it is known whether they were durable. {NULL, 0} is empty; free with mem_free(first). */
+/* Gaps in the numbers of records, collected until it is known whether the missing records were durable. {NULL, 0} is
+ * empty; free with mem_free(first). */
 struct journal_gaps {
 	struct journal_gap {
 		uint64_t number, count;
@@ -107,16 +113,18 @@ struct journal_gaps {
 	size_t count;
 };
 int journal_gaps_add(struct journal_gaps *g, uint64_t number, uint64_t count, struct error *e);
-/* stored: this many records of the file were durable. */
+/* Counts the records missing in all gaps, and how many of them were durable. stored: number of records of the file
+ * that were durable. */
 void journal_gaps_count(const struct journal_gaps *g, uint64_t stored, uint64_t *damaged, uint64_t *lost);
 
-/* Reads all of it; -ENODATA: the file ends before that. Other errors are those of the disk. */
+/* Reads exactly `size` bytes. Returns -ENODATA if the file ends before that; other errors are I/O errors. */
 int journal_read_at(int fd, void *bytes, size_t size, uint64_t at);
 
-/* Deletes the journal.G's of the folder, except for that of `keep`; UINT64_MAX: all. If the folder cannot be listed to
- * its end, some may be left, and that is logged. */
+/* Deletes the journals in the folder except that of generation `keep`; UINT64_MAX: all. If the folder cannot be
+ * listed to its end, some may be left, and that is logged. */
 void journal_clear(const char *folder, uint64_t keep);
-/* Renames all of them to journal.G.damaged. -errno: the folder could not be listed to its end. */
+/* Renames all journals in the folder to journal.G.damaged. Returns -errno if the folder could not be listed to its
+ * end. */
 int journal_keep_damaged(const char *folder, struct error *e);
 
 #endif

@@ -1,15 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * jobs.db and jobs-copy.db, the latter attached to the connection of the former as schema `copy`.
+ * The database of jobs, in two files: jobs.db, and jobs-copy.db, which is attached to the connection of jobs.db as
+ * schema `copy`.
  *
- * ledger_open prepares each file alone (ledger_file.h), then compares their rows: of two undamaged ones the one with
- * the higher revision counts, and replaces the other. A change reads the row of jobs.db first, so that a damaged one is
- * noticed instead of getting a new checksum, writes it there with the next revision, and then writes the copy. Once
- * both are open, no transaction writes both files, because SQLite does not commit two WALs at once.
+ * ledger_open prepares each file alone (ledger_file.h), then compares their rows: of two undamaged rows the one with
+ * the higher revision counts, and replaces the other. A change reads the row of jobs.db first, so that a damaged row
+ * is noticed instead of getting a new checksum; it writes the row there with the next revision, and then writes the
+ * copy. Once both files are open, no transaction writes both, because SQLite does not commit two WALs at once.
  *
- * A row that is damaged in both files is -EBADMSG, with its number still known. A full disk is -ENOSPC, a file that is
- * no database -EBADMSG, any other fault of SQLite -EIO or -ENOMEM. If the copy cannot be written, the call succeeds,
- * `behind` is set, and nothing is written to it before ledger_mend has compared the files again.
+ * A row that is damaged in both files is -EBADMSG, with its number still known. A full disk is -ENOSPC, a file that
+ * is no database -EBADMSG, any other fault of SQLite -EIO or -ENOMEM. If the copy cannot be written, the call
+ * succeeds, `behind` is set, and nothing is written to the copy before ledger_mend has compared the files again.
  */
 #include "coordinator/store/ledger.h"
 
@@ -34,15 +35,15 @@ static const char next_job[] = "next-job";
 struct ledger {
 	sqlite3 *db;
 	struct ledger_side jobs, copy;
-	uint64_t next; /* id */
+	uint64_t next; /* id of the next job */
 	bool is_new;
-	bool behind;  /* the copy lacks changes */
-	bool counted; /* ended_count is right */
+	bool behind;  /* changes are missing in the copy */
+	bool counted; /* ended_count is valid */
 	uint64_t ended_count;
-	double last_end; /* of all rows; 0: not read yet */
+	double last_end; /* latest end in all rows; 0: not read yet */
 };
 
-/* Ends a transaction: what it did counts if rc is 0. */
+/* Commits the transaction if rc is 0, otherwise rolls it back. Returns rc or the error of the commit. */
 static int end_transaction(struct ledger *l, int rc, struct error *e)
 {
 	if (!rc)
@@ -51,8 +52,6 @@ static int end_transaction(struct ledger *l, int rc, struct error *e)
 		ledger_file_run(l->db, "ROLLBACK", NULL);
 	return rc;
 }
-
-/* ---- the copy ---- */
 
 static void fall_behind(struct ledger *l, const struct error *e)
 {
@@ -71,7 +70,8 @@ static int write_row(struct ledger_side *s, const struct ledger_job *j, struct e
 	return rc ? rc : ledger_side_put(s, e);
 }
 
-/* a, b: the row in jobs.db and in the copy; at most one of them is NULL. */
+/* Makes both files contain the better of two versions of a row. a: the row in jobs.db, b: in the copy; at most one of
+ * them is NULL. */
 static int merge_row(struct ledger *l, const struct ledger_job *a, const struct ledger_job *b, struct error *e)
 {
 	bool use_a = a && !a->damaged, use_b = b && !b->damaged;
@@ -106,7 +106,8 @@ static int merge_rows(struct ledger *l, struct error *e)
 	return rc;
 }
 
-/* Drops the notes of a file that the other one has with a checksum that holds, and it has not. */
+/* Deletes the notes in one file that have a worse checksum than in the other file (note_rank), so that merge_notes
+ * restores them. */
 static int drop_damaged(struct ledger *l, int side, struct error *e)
 {
 	char sql[SQL_MOST];
@@ -131,7 +132,8 @@ static int merge_notes(struct ledger *l, const char *from, const char *to, struc
 	return ledger_file_run(l->db, sql, e);
 }
 
-/* Runs in one transaction. At the start both files may be written, later only the copy, if it is behind. */
+/* Brings the files to the same contents in one transaction. At the start it may write both, later, when the copy is
+ * behind, only the copy. */
 static int merge(struct ledger *l, struct error *e)
 {
 	ledger_side_release(&l->jobs);
@@ -157,9 +159,7 @@ int ledger_mend(struct ledger *l, struct error *e)
 	return rc;
 }
 
-/* ---- opening ---- */
-
-/* A file that is damaged is made anew; its contents come from the other one. */
+/* Prepares a file. A damaged one is renamed and created anew; its contents then come from the other file. */
 static int prepare_file(const char *path, int side, struct error *e)
 {
 	int rc = ledger_file_prepare(path, e);
@@ -190,7 +190,7 @@ static int open_both(struct ledger *l, const char *folder, struct error *e)
 	return rc ? rc : ledger_side_open(&l->copy, l->db, schemas[1], e);
 }
 
-/* false: it was skipped already. */
+/* Makes sure that the next id is above this one. Returns false if it was already. */
 static bool skip(struct ledger *l, uint64_t id)
 {
 	if (id < l->next || id >= UINT64_MAX / 2)
@@ -199,7 +199,7 @@ static bool skip(struct ledger *l, uint64_t id)
 	return true;
 }
 
-/* The next id, from the note and the rows. */
+/* Finds the next id, from its note and from the rows. */
 static int find_next(struct ledger *l, struct error *e)
 {
 	char *text;
@@ -258,14 +258,12 @@ bool ledger_is_new(const struct ledger *l)
 	return l->is_new;
 }
 
-/* ---- rows ---- */
-
 static int put_both(struct ledger *l, const struct ledger_job *j, struct error *e)
 {
 	struct error fault;
 	int rc = ledger_side_bind(&l->jobs, j, e);
 	int behind = l->behind ? 0 : ledger_side_bind(&l->copy, j, &fault);
-	ledger_side_release(&l->jobs); /* j may be from there */
+	ledger_side_release(&l->jobs); /* j's texts may have come from there */
 	if (!rc)
 		rc = ledger_side_put(&l->jobs, e);
 	if (!rc && !l->behind && !behind)
@@ -289,7 +287,7 @@ static int get_whole(struct ledger *l, uint64_t id, struct ledger_job *j, struct
 				    : rc;
 }
 
-/* As get_whole, but there has to be one. */
+/* Like get_whole(), but returns 0, or -ENOENT if there is no such row. */
 static int get_existing(struct ledger *l, uint64_t id, struct ledger_job *j, struct error *e)
 {
 	int rc = get_whole(l, id, j, e);
@@ -324,14 +322,12 @@ static int remove_all(struct ledger *l, struct ledger_side *s, const uint64_t *i
 	return end_transaction(l, rc, e);
 }
 
-/* First from the copy: after a fault in between the rows still exist, and are dropped again. */
+/* Deletes from the copy first: after a fault in between the rows still exist in jobs.db and are dropped later. */
 static int remove_both(struct ledger *l, const uint64_t *ids, size_t count, struct error *e)
 {
 	int rc = remove_all(l, &l->copy, ids, count, e);
 	return rc ? rc : remove_all(l, &l->jobs, ids, count, e);
 }
-
-/* ---- jobs ---- */
 
 uint64_t ledger_next_id(const struct ledger *l)
 {
@@ -347,7 +343,7 @@ int ledger_skip_ids(struct ledger *l, uint64_t id, struct error *e)
 	return ledger_set(l, next_job, text, e);
 }
 
-/* The row, and the number after it, in one transaction. */
+/* Writes the row and the id after it in one transaction. */
 static int add_to(struct ledger *l, struct ledger_side *s, const struct ledger_job *j, struct error *e)
 {
 	char next[32];
@@ -410,7 +406,7 @@ int ledger_drop(struct ledger *l, uint64_t *ids, size_t count, struct error *e)
 	return rc;
 }
 
-/* Ends are in order, also where a wrong clock was set back. */
+/* Returns the time of the end of a job: now, but later than all earlier ends, even if a wrong clock was set back. */
 static double time_of_end(struct ledger *l)
 {
 	static const char sql[] = "SELECT max(ended) FROM main.jobs";
@@ -584,8 +580,6 @@ int ledger_read_end(struct ledger *l, uint64_t id, struct job_record *r, double 
 		rc = error_set(e, EBADMSG, "the record of another job");
 	return rc ? error_prefix(e, rc, "the record of j%llu", (unsigned long long)id) : 0;
 }
-
-/* ---- notes ---- */
 
 int ledger_set(struct ledger *l, const char *name, const char *text, struct error *e)
 {

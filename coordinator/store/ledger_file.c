@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Each file is opened alone first, so that an error says which of the two it is. */
+/* Each file is opened alone first, so that an error can be attributed to one of the two. */
 #include "coordinator/store/ledger_file.h"
 
 #include "common/base/disk.h"
@@ -9,8 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The n-th upgrades a file of version n to n + 1; never changed, only added to. Rows of versions before 4 have no
- * checksum, and are trusted (-1). */
+/* The n-th statement upgrades a file of version n to n + 1; statements are never changed, only added. Rows of
+ * versions before 4 have no checksum; theirs is -1, and they are trusted. */
 static const char *const migrations[] = {
 	"CREATE TABLE jobs (id INTEGER PRIMARY KEY, owner TEXT NOT NULL, name TEXT NOT NULL, version TEXT NOT NULL,"
 	" priority INTEGER NOT NULL, mixed INTEGER NOT NULL, state TEXT NOT NULL, submitted REAL NOT NULL, ended REAL,"
@@ -53,7 +53,8 @@ int ledger_file_open(const char *path, sqlite3 **db, struct error *e)
 	int flags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX;
 	if (sqlite3_open_v2(path, db, flags, NULL) != SQLITE_OK)
 		return *db ? ledger_file_error(*db, e) : error_set(e, ENOMEM, "no memory for the database of jobs");
-	/* The spool's lock excludes others; without shared memory it works on any file system. */
+	/* The lock of the spool excludes other processes; exclusive locking needs no shared memory, so it works on
+	 * any file system. */
 	int rc = ledger_file_run(*db, "PRAGMA locking_mode = EXCLUSIVE; PRAGMA trusted_schema = OFF", e);
 	return rc ? rc : set_up(*db, "main", e);
 }
@@ -66,7 +67,7 @@ int ledger_file_attach(sqlite3 *db, const char *path, const char *schema, struct
 	return rc ? rc : set_up(db, schema, e);
 }
 
-/* The first column of the first row, as text. */
+/* Returns the first column of the first row as text. */
 static int query_text(sqlite3 *db, const char *sql, char *text, size_t size, struct error *e)
 {
 	sqlite3_stmt *s = NULL;

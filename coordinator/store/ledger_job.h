@@ -9,20 +9,20 @@
 
 struct ledger_job {
 	uint64_t id;
-	const char *owner, *name, *version; /* version of the program that accepted it */
-	const char *held;		    /* by whom; "": it is not held. Ignored by ledger_add */
+	const char *owner, *name, *version; /* version: that of the program that accepted the job */
+	const char *held;		    /* the user who holds it; "": not held. Ignored by ledger_add */
 	const char *record;		    /* JSON (record.h); "": none */
-	uint64_t extended;		    /* number of extensions after its end; as `held` */
+	uint64_t extended;		    /* number of extensions after its end. Ignored by ledger_add */
 	int priority;
 	bool mixed;
 	double submitted;			/* seconds since 1970 */
-	const unsigned char *submission, *plan; /* frames, as common/wire packs them; of an ended job perhaps none */
+	const unsigned char *submission, *plan; /* frames, as common/wire packs them; an ended job may have none */
 	size_t submission_size, plan_size;
-	/* Ignored by ledger_add and ledger_extend. */
+	/* The following are ignored by ledger_add and ledger_extend. */
 	const char *state;
-	double ended;	   /* s since 1970, later than all earlier ends; 0: it has not ended */
+	double ended;	   /* s since 1970, later than all earlier ends; 0: not ended */
 	uint64_t revision; /* incremented with every change of the row */
-	bool damaged;	   /* when read: the checksum does not match, and nothing of it can be trusted */
+	bool damaged;	   /* set by reading: the checksum does not match, so only id can be relied on */
 };
 
 #endif

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * One file of the ledger: a row per job and notes by name, each with a checksum over all of its columns.
+ * The statements of one file of the ledger: a row per job and notes by name, each with a checksum over all of its
+ * columns.
  *
- * Statements are prepared once. A row is read in place and stays valid until the next call; a write is bound first and
- * stepped later, so that a row that was just read can be written to the other file.
+ * Statements are prepared once. A row is read in place and stays valid until the next call. A row is written in two
+ * steps, binding and stepping, so that a row that was just read can be written to the other file.
  *
- * A row whose checksum differs comes back with `damaged` set, a note is -EBADMSG; the caller decides what to do
- * without it. Errors of SQLite come back with its own words.
+ * A row whose checksum does not match is returned with `damaged` set, a note with -EBADMSG; the caller decides how to
+ * go on without it. Errors of SQLite are returned with SQLite's own message.
  */
 #include "coordinator/store/ledger_side.h"
 
@@ -22,9 +23,9 @@
 #define COLUMNS \
 	"id, owner, name, version, priority, mixed, submitted, submission, plan, held, extended, state, ended, revision, checksum, record"
 
-enum { UNCHECKED = -1 }; /* the checksum of a row of a version that had none (ledger_file.c) */
+enum { UNCHECKED = -1 }; /* checksum of a row written by a version without checksums (ledger_file.c) */
 
-/* Each is beginning, schema, end. */
+/* Text before and after the name of the schema. */
 static const char *const sql[LEDGER_STATEMENTS][2] = {
 	[LEDGER_PUT] = {"INSERT OR REPLACE INTO ",
 			".jobs (" COLUMNS ") VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"},
@@ -54,7 +55,6 @@ void ledger_side_close(struct ledger_side *s)
 		sqlite3_finalize(s->statements[i]);
 }
 
-/* Runs a statement that returns no rows. */
 static int finish(struct ledger_side *s, enum ledger_statement which, struct error *e)
 {
 	int rc = sqlite3_step(s->statements[which]) == SQLITE_DONE ? 0 : ledger_file_error(s->db, e);
@@ -68,7 +68,7 @@ static uint32_t check_text(uint32_t crc, const char *text)
 	return crc32c(crc, text, strlen(text) + 1);
 }
 
-/* The checksum of everything in a row. */
+/* Returns the checksum of all columns of a row. */
 static uint32_t check(const struct ledger_job *j)
 {
 	unsigned char numbers[64];
@@ -89,7 +89,8 @@ static uint32_t check(const struct ledger_job *j)
 	crc = check_text(crc, j->state);
 	crc = crc32c(crc, j->submission, j->submission_size);
 	crc = crc32c(crc, j->plan, j->plan_size);
-	return *j->record ? check_text(crc, j->record) : crc; /* version 4 had none */
+	/* Rows of version 4 have no record, and their checksum does not include one. */
+	return *j->record ? check_text(crc, j->record) : crc;
 }
 
 static const char *text_at(sqlite3_stmt *s, int column)
@@ -102,7 +103,7 @@ static int read_row(struct ledger_side *side, enum ledger_statement which, uint6
 		    struct error *e)
 {
 	sqlite3_stmt *s = side->statements[which];
-	sqlite3_reset(s); /* here, so that the previous answer was valid until now */
+	sqlite3_reset(s); /* not earlier, so that the previous row was valid until now */
 	sqlite3_bind_int64(s, 1, (sqlite3_int64)id);
 	int rc = sqlite3_step(s);
 	if (rc != SQLITE_ROW) {
@@ -140,7 +141,7 @@ int ledger_side_get(struct ledger_side *s, uint64_t id, struct ledger_job *j, st
 int ledger_side_after(struct ledger_side *s, uint64_t id, struct ledger_job *j, struct error *e)
 {
 	int rc = read_row(s, LEDGER_AFTER, id, j, e);
-	/* Otherwise a caller that asks for the next one would never stop. */
+	/* A caller that walks through all rows would never stop. */
 	return rc > 0 && j->id <= id
 		       ? error_set(e, EBADMSG, "the database of jobs is damaged: its jobs are not in order")
 		       : rc;
@@ -175,7 +176,7 @@ int ledger_side_bind(struct ledger_side *side, const struct ledger_job *j, struc
 		sqlite3_bind_double(s, 13, j->ended);
 	sqlite3_bind_int64(s, 14, (sqlite3_int64)j->revision);
 	sqlite3_bind_int64(s, 15, check(j));
-	/* Those that are copied, which takes memory: what is missing would be NULL in the row. */
+	/* These values are copied, which takes memory; a value that is not bound would become NULL in the row. */
 	if (bind_text(s, 2, j->owner) && bind_text(s, 3, j->name) && bind_text(s, 4, j->version) &&
 	    bind_bytes(s, 8, j->submission, j->submission_size) && bind_bytes(s, 9, j->plan, j->plan_size) &&
 	    bind_text(s, 10, j->held) && bind_text(s, 12, j->state) && bind_text(s, 16, j->record))

@@ -5,7 +5,7 @@
 
 #include <stdbool.h>
 
-/* Distinguishes lack of memory from a damaged message. */
+/* Notes in *out that memory ran out, to distinguish this from a damaged message. */
 static void *alloc(void *out, size_t size)
 {
 	void *p = mem_alloc(size, 1);

@@ -7,11 +7,12 @@
 
 #include "proto/stored.pb-c.h"
 
-/* For message_free. NULL, and rc is -ENOMEM, or -EPROTO: the bytes are not such a message. */
+/* Unpacks a message; free it with message_free. Returns NULL and sets *rc to -ENOMEM, or to -EPROTO if the bytes are
+ * not a message of this type. */
 ProtobufCMessage *message_unpack(const ProtobufCMessageDescriptor *d, const unsigned char *bytes, size_t size, int *rc,
 				 struct error *e);
 void message_free(ProtobufCMessage *m); /* m may be NULL */
-/* -EPROTO: it has an unknown field. Checks its own fields, not those of nested messages. */
+/* Returns -EPROTO if the message has an unknown field. Checks the message itself, not nested ones. */
 int message_check_known(const ProtobufCMessage *m, struct error *e);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A note of the ledger as it is stored: its text, and since version 0.2 a line with the checksum of name and text.
- * Pure, but for the registration with SQLite; any thread. */
+/* A note of the ledger as it is stored: its text and, since version 0.2, a line with the checksum of name and text.
+ * Pure, except for the registration with SQLite; any thread. */
 #ifndef COORDINATOR_STORE_NOTE_H
 #define COORDINATOR_STORE_NOTE_H
 
@@ -11,11 +11,12 @@
 
 enum note_rank { NOTE_DAMAGED, NOTE_UNCHECKED, NOTE_WHOLE };
 
-/* What is stored; mem_alloc'd, NULL: out of memory. */
+/* Returns the text to be stored; mem_alloc'd. NULL: out of memory. */
 char *note_seal(const char *name, const char *text);
-/* size: of the text, without that line. */
+/* Judges a stored note by its checksum; UNCHECKED: it has none. *size: length of the text without the line of the
+ * checksum. */
 enum note_rank note_rank(const char *name, const char *stored, size_t *size);
-/* The SQL function note_rank(name, stored). */
+/* Registers the SQL function note_rank(name, stored). */
 int note_register(sqlite3 *db, struct error *e);
 
 #endif

@@ -9,7 +9,7 @@
 
 #include <string.h>
 
-enum { PIECES = 6, OLD_HEAD = 8 * (5 + PIECES) /* after the magic number */ };
+enum { PIECES = 6, OLD_HEAD = 8 * (5 + PIECES) /* bytes of the numbers after the magic number */ };
 static const uint64_t piece_most = 1 << 26;
 static const char magic[8] = "hsltO003", old_magic[8] = "hsltO002";
 
@@ -41,7 +41,7 @@ int old_spool_text(const char *path, size_t most, char **text, size_t *size, str
 	return rc;
 }
 
-/* Reads the rest of the file into f->memory. */
+/* Reads the rest of the file into f->memory, and returns its size. */
 static int read_rest(struct checked_file *in, struct old_row *f, size_t *size, struct error *e)
 {
 	if (in->left > PIECES * piece_most)
@@ -77,7 +77,7 @@ static int take_row(struct old_row *f, size_t size, const char *path, struct err
 	return 0;
 }
 
-/* A row of version 002. */
+/* Reads a row of version 002. */
 static int take_old_row(struct old_row *f, size_t size, const char *path, struct error *e)
 {
 	const unsigned char *p = f->memory, *piece[PIECES];

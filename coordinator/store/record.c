@@ -2,13 +2,13 @@
 /*
  * A job's record as JSON, with a checksum.
  *
- * record_to_json writes everything that is kept of a job, record_from_json reads it back; a missing key, because an
- * older version wrote the file, is zero, unknown or "". Plain fields and counters are generated from the list in
- * coordinator/core/job_fields.h. The checksum is over the content with sorted keys, so
- * that formatting does not matter.
+ * record_to_json writes everything that is kept of a job, record_from_json reads it back; a key that is missing,
+ * because an older version wrote the record, becomes zero, unknown or "". Plain fields and counters are generated
+ * from the list in coordinator/core/job_fields.h. The checksum is over the content with sorted keys, so that
+ * formatting does not matter.
  *
- * A text that is not UTF-8 is -EINVAL, and the record is not written. A damaged file is -EBADMSG, one of another schema
- * -EPROTO. A record without a checksum is of an earlier version and trusted.
+ * If a text is not UTF-8, writing fails with -EINVAL. A damaged record is -EBADMSG, one of another schema -EPROTO. A
+ * record without a checksum is of an earlier version and trusted.
  */
 #include "coordinator/store/record.h"
 
@@ -33,7 +33,7 @@ static const struct field fields[] = {JOB_FIELDS(TEXT, NUMBER, JOB_NO_FIELD, JOB
 #undef TEXT
 #undef NUMBER
 
-/* Members of the object "counts". */
+/* The members of the object "counts". */
 #define COUNT(member, by, key, shown, wire) {FIELD_u64, offsetof(struct job_record, member), 0, key},
 #define COUNTER(member, key, wire) {FIELD_u64, offsetof(struct job_record, counts.member), 0, key},
 static const struct field counts[] = {JOB_FIELDS(JOB_NO_FIELD, JOB_NO_FIELD, COUNT, COUNTER)};
@@ -115,7 +115,7 @@ json_t *record_strategies(const struct job_record *r)
 	return strategy_to_json(r->mixture, &n);
 }
 
-/* A record must not name more strategies than there are counters for. */
+/* Clears a mixture that names more strategies than there are counters for. */
 static void take_strategies(const json_t *o, struct job_record *r)
 {
 	struct canvas_counts n;
@@ -140,7 +140,8 @@ static int add_to_checksum(const char *piece, size_t size, void *sum)
 	return 0;
 }
 
-/* Checksum of the content, whatever its formatting; piece by piece, without a copy. -ENOMEM */
+/* Computes the checksum of the content, independent of formatting, piece by piece without a copy of the text. Returns
+ * -ENOMEM. */
 static int checksum(const json_t *o, json_int_t *sum, struct error *e)
 {
 	uint32_t crc = 0;
@@ -150,7 +151,7 @@ static int checksum(const json_t *o, json_int_t *sum, struct error *e)
 	return 0;
 }
 
-/* A record without a checksum is of an earlier version. */
+/* A record without a checksum is of an earlier version and passes. */
 static int check(json_t *o, struct error *e)
 {
 	const json_t *said = json_object_get(o, "crc32c");
@@ -181,7 +182,7 @@ int record_to_json(const struct job_record *r, char **out, struct error *e)
 		json_decref(o);
 		return error_set(e, ENOMEM, "no memory for a record");
 	}
-	/* Not json_dumps: it loses parts of the text if memory runs out. */
+	/* json_dumps would silently lose parts of the text if memory runs out. */
 	size_t size = json_dumpb(o, NULL, 0, JSON_INDENT(2));
 	char *text = size ? mem_alloc(size + 1, 1) : NULL;
 	bool whole = text && json_dumpb(o, text, size, JSON_INDENT(2)) == size;
@@ -198,7 +199,7 @@ int record_from_json(const char *text, size_t size, struct job_record *r, struct
 {
 	json_error_t fault;
 	json_t *o = json_loadb(text, size, JSON_REJECT_DUPLICATES, &fault);
-	const json_t *schema = json_object_get(o, "schema"); /* NULL unless it is an object */
+	const json_t *schema = json_object_get(o, "schema"); /* NULL unless o is an object */
 	memset(r, 0, sizeof *r);
 	if (json_integer_value(schema) != SCHEMA) {
 		int rc =

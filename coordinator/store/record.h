@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What the ledger keeps of a job as JSON: enough to list it and to fetch its result after a
+ * The record of a job, which the ledger keeps as JSON: enough to list the job and to fetch its result after a
  * restart. Pure except for memory.
  */
 #ifndef COORDINATOR_STORE_RECORD_H
@@ -36,28 +36,30 @@ struct job_record {
 #undef COUNT
 	struct job_counts counts;
 	struct forecast_history looks;
-	char effects[RECORD_EFFECTS]; /* a JSON array: the effects that the scene needs, and why; "": not known, or too
-					 long */
-	uint64_t strategy[BATCH_STRATEGIES][STRATEGY_COUNTERS]; /* of the mixture */
+	/* A JSON array of the effects that the scene needs, with reasons; "": not known, or too long. */
+	char effects[RECORD_EFFECTS];
+	uint64_t strategy[BATCH_STRATEGIES][STRATEGY_COUNTERS]; /* counters of the strategies in `mixture` */
 	struct convergence convergence;				/* statistics of the last image */
 	struct path_class_energy classes[PATH_CLASSES];
 };
 
-/* What the merged batches counted, and notes about it. */
+/* Takes the counters of the merged batches, and notes about them. */
 void record_take_counted(struct job_record *r, const struct plan *p, const struct canvas_counts *n, bool black,
 			 double beyond_share);
-void record_add_note(struct job_record *r, const char *text); /* "": nothing to note */
-void record_add_doubt(struct job_record *r);		      /* why the interval of the error is not known, if so */
+void record_add_note(struct job_record *r, const char *text); /* appends to `note`; "": nothing to add */
+void record_add_doubt(struct job_record *r); /* notes why the interval of the error is unknown, if it is */
 void record_take_convergence(struct job_record *r, const struct canvas_image *img, const struct convergence *a);
-void record_begin(struct job_record *r, uint64_t id, const char *name, const char *owner); /* nothing else is known */
-void record_take_error(struct job_record *r, const struct canvas_image *img); /* of an image with an estimate */
-void record_take_effects(struct job_record *r, json_t *list);		      /* takes the reference; NULL: none */
-json_t *record_effects(const struct job_record *r);			      /* an array */
-json_t *record_counts(const struct job_record *r);			      /* an object of its counts */
-json_t *record_strategies(const struct job_record *r);			      /* an array: strategy_to_json */
+/* Clears the record except for these three. */
+void record_begin(struct job_record *r, uint64_t id, const char *name, const char *owner);
+/* Img must contain an estimate of the error. */
+void record_take_error(struct job_record *r, const struct canvas_image *img);
+void record_take_effects(struct job_record *r, json_t *list); /* takes over the reference; NULL: not known */
+json_t *record_effects(const struct job_record *r);	      /* a new array */
+json_t *record_counts(const struct job_record *r);	      /* a new object "counts" */
+json_t *record_strategies(const struct job_record *r);	      /* a new array, see strategy_to_json */
 int record_to_json(const struct job_record *r, char **text,
-		   struct error *e); /* mem_alloc'd; -ENOMEM, -EINVAL: a text is not UTF-8 */
-/* -EBADMSG: not a record; -EPROTO: another version. */
+		   struct error *e); /* *text is mem_alloc'd; -ENOMEM, -EINVAL: a text is not UTF-8 */
+/* Returns -EBADMSG if the text is damaged or no record, -EPROTO if it is of another version. */
 int record_from_json(const char *text, size_t size, struct job_record *r, struct error *e);
 bool record_is_ended(const struct job_record *r);
 

@@ -2,9 +2,9 @@
 /*
  * The coordinator's folder: its lock, the jobs' folders, and files that are written atomically.
  *
- * spool_open takes the lock and creates missing folders. Files are written under a temporary name, flushed, renamed,
- * and the folder flushed. A second coordinator on the same folder is -EBUSY. A failed write leaves the old file
- * unchanged.
+ * spool_open takes the lock and creates missing folders. A file is written under a temporary name, flushed and
+ * renamed; then the folder is flushed. A second coordinator on the same folder gets -EBUSY. A failed write leaves the
+ * old file unchanged.
  */
 #include "coordinator/store/spool.h"
 
@@ -50,8 +50,6 @@ static int take_lock(struct spool *s, struct error *e)
 	mem_free(path);
 	return rc;
 }
-
-/* ---- ids ---- */
 
 static bool is_job_folder(const char *name, uint64_t *id)
 {
@@ -99,8 +97,6 @@ int spool_jobs(const struct spool *s, uint64_t **ids, size_t *count, struct erro
 		qsort(*ids, *count, sizeof **ids, by_id);
 	return rc;
 }
-
-/* ---- start and end ---- */
 
 int spool_open(struct spool **out, const char *folder, struct error *e)
 {
@@ -246,7 +242,7 @@ int spool_film_bytes(const struct spool *s, uint64_t id, unsigned checkpoints, u
 		spool_job_path(s, id, name, path);
 		if (disk_stat(path, &st) == 0)
 			*bytes += (uint64_t)st.st_size * (checkpoint ? checkpoints : 1);
-		else if (errno != ENOENT) /* which was deleted meanwhile */
+		else if (errno != ENOENT) /* ENOENT: deleted meanwhile */
 			rc = error_file(e, errno, path);
 	}
 	rc = disk_list_end(&l, rc, e);
