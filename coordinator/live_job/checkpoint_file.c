@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Writing and reading go through the parts of the file in the order of checkpoint_file.h. A change of what follows the
- * head needs a new version number. Files of version 004, whose head is numbers at fixed offsets, are read, too.
+ * Writes and reads a job's checkpoint, part by part in the order of checkpoint_file.h.
+ *
+ * A change of anything behind the head needs a new version number. Files of version 004, whose head is numbers at
+ * fixed offsets, can still be read.
  *
  * A damaged file is -EBADMSG, one of another version -EPROTO. Sizes are checked before anything is allocated.
  */
@@ -119,11 +121,11 @@ static void take_head(struct live_job *job, const struct checkpoint_head *h)
 	snprintf(job->fingerprint, sizeof job->fingerprint, "%s", h->fingerprint);
 }
 
-/* The head of version 004. */
+/* Reads the head of a file of version 004. */
 static int read_old_head(struct checkpoint_head *h, struct checked_file *in, struct error *e)
 {
 	unsigned char bytes[STORED_OLD_HEAD];
-	uint32_t sizes[2]; /* of the head; worker_count */
+	uint32_t sizes[2]; /* size of the head; worker_count */
 	int rc = checked_file_read_numbers(in, sizes, sizeof *sizes, 2, e);
 	if (!rc && sizes[0] != sizeof magic + sizeof sizes + sizeof bytes)
 		rc = error_set(e, EPROTO, "%s: its head has %u bytes: a coordinator for another machine wrote it",
@@ -188,7 +190,7 @@ int checkpoint_load(const struct spool *spool, struct live_job *job, uint64_t *g
 	char name[SPOOL_PATH_MAX];
 	struct checked_file in;
 	spool_job_path(spool, job->id, "checkpoint.tmp", name);
-	disk_unlink(name); /* left by a run that ended while writing it */
+	disk_unlink(name); /* left behind by a run that ended while writing it */
 	spool_job_path(spool, job->id, "checkpoint", name);
 	int rc = checked_file_open_watched(&in, name, progress, user, e);
 	if (rc)

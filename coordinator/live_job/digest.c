@@ -6,7 +6,8 @@
 
 #include <string.h>
 
-/* A digest of digests: one for the numbers, and one each for tiles, states, weights, moments. */
+/* Digests of the parts of a result, which are hashed together at the end: one each for the groups of numbers, for the
+ * place and the values of each tile, for each state, for weights and for moments. */
 struct parts {
 	struct blob_hash *hashes;
 	size_t count;
@@ -17,7 +18,7 @@ static int add_part(struct parts *p, const void *bytes, size_t size, struct erro
 	return blob_hash_bytes(size ? bytes : "", size, &p->hashes[p->count++], e);
 }
 
-/* Field by field, because padding is undefined. */
+/* Hashes the numbers field by field, because padding is undefined. */
 static int add_numbers(struct parts *p, const struct batch *b, struct error *e)
 {
 	const uint64_t counts[] = {b->key.job,	    (uint64_t)b->key.kind, b->key.group,   b->key.part,

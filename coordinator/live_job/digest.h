@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * SHA-256 of everything in a worker's result that affects bits: of the values, not the message's bytes, which another
- * compressor may pack differently. The time it took is not included. Any thread; allocates one list only.
+ * SHA-256 of everything in a worker's result that affects bits: of the values, not of the message's bytes, which
+ * another compressor may pack differently. The time that the result took is not included. Any thread; allocates only
+ * one list.
  */
 #ifndef COORDINATOR_LIVE_JOB_DIGEST_H
 #define COORDINATOR_LIVE_JOB_DIGEST_H

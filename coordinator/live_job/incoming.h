@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What an event brings beyond what the core needs: an argument of jobs_step_with that is passed on to whatever carries
- * out the core's answer. Fields that do not belong to the event's kind are NULL. The caller keeps everything until
- * jobs_step_with returns.
+ * Data that accompanies an event for the core but that the core does not need: an argument of jobs_step_with that is
+ * passed on to the functions that carry out the core's actions. Fields that do not belong to the event's kind are
+ * NULL. The caller keeps everything until jobs_step_with returns.
  */
 #ifndef COORDINATOR_LIVE_JOB_INCOMING_H
 #define COORDINATOR_LIVE_JOB_INCOMING_H
@@ -15,27 +15,28 @@
 
 struct rollback;
 
-/* A submitted job, and the number that it gets. */
+/* A job being submitted. */
 struct submission {
 	struct envelope *submit; /* taken over by the job if accepted */
 	const struct plan *plan;
-	const char *rule;	     /* what its epochs' length was derived from; "": it was requested */
+	const char *rule;	     /* what the length of its epochs was derived from; "": it was requested */
 	const char *owner, *address; /* of the submitter; owner "": no certificate */
-	uint64_t job;		     /* the job's number; 0: refused by the core */
+	uint64_t job;		     /* the new job's id; 0: refused by the core */
 };
 
 struct incoming {
-	struct error *refusal;	       /* set by jobs_ask; NULL: nobody asks */
+	struct error *refusal;	       /* set by jobs_ask: where the reason of a refusal goes; NULL: not needed */
 	struct submission *submission; /* EVENT_SUBMIT */
-	struct rollback *back;	       /* EVENT_LEASE_FAILED: what can be taken back; NULL: nothing */
-	/* EVENT_BATCH, EVENT_STORED */
-	struct batch *batch; /* if merged, its states are taken over by the job */
+	struct rollback *back;	       /* EVENT_LEASE_FAILED: the batch that can be taken back; NULL: none */
+	/* EVENT_BATCH, EVENT_STORED: */
+	struct batch *batch; /* the job takes over its states if it is merged */
 	const Farm__LeaseResult *result;
 	struct buf *payload;
-	/* EVENT_BATCH: the result for the journal, without the payload; made by durable_reserve, mem_alloc'd */
+	/* EVENT_BATCH: the result without its payload, as a frame for the journal; made by durable_reserve,
+	 * mem_alloc'd */
 	unsigned char *frame;
 	size_t frame_size;
-	/* EVENT_STORED: its place in the journal */
+	/* EVENT_STORED: the offset of the result in the journal */
 	bool stored;
 	uint64_t stored_at;
 };

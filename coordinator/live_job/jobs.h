@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * All jobs: running ones, those being read after a restart, and the last that ended; where they are stored; and what
- * the folders that work on them share. Connections are reached only through a table of functions (peer_calls.h). The
+ * All jobs: live ones, those being read after a restart, and the last that ended; where they are stored; and what the
+ * folders that work on them share. Connections are reached only through a table of functions (peer_calls.h). The
  * loop's thread, except for what a job's own header gives to the thread pool.
  */
 #ifndef COORDINATOR_LIVE_JOB_JOBS_H
@@ -41,68 +41,71 @@ enum { TICK_MS = 200, ENDED_MAX = 200 /* ended jobs in the lists; older ones can
 /* A job of the last run that is being read (coordinator/jobs/recovery.c). */
 struct recovering_job {
 	struct recovering_job *next;
-	struct live_job *job;	  /* while it is read, everything but its id belongs to the pool */
-	struct job_record record; /* how it is displayed meanwhile */
+	struct live_job *job;	  /* while it is being read, all of it but its id belongs to the pool */
+	struct job_record record; /* what is shown of it meanwhile */
 	uint64_t bytes;
 	struct replay_progress progress;
-	bool anew; /* its merged results are damaged, and it starts over */
+	bool anew; /* its merged results are damaged, so it starts over */
 };
 
 struct jobs {
 	struct server_config config;
 	struct peer_calls peers;
 	const struct follow_up *follow_up; /* coordinator/jobs/step.h */
-	void (*stop)(void *user);	   /* the loop is to end, for the reason `fault` */
+	void (*stop)(void *user);	   /* ends the loop, for the reason in `fault` */
 	void *stop_user;
 	uv_loop_t *loop;
 	uv_timer_t wake;
-	uv_idle_t drain; /* while results are left that waited for a canvas */
-	uv_idle_t trim;	 /* while more files of scenes are stored than may be */
-	double read;	 /* s: all messages that arrived before have been read from all sockets */
+	uv_idle_t drain; /* runs while results are left that had to wait for a canvas */
+	uv_idle_t trim;	 /* runs while the spool has more scene files than allowed */
+	double read;	 /* s: every message that arrived before this time has been read from its socket */
 	struct farm *farm;
 	struct spool *spool;
 	struct blob_store *blobs;
 	struct ledger *ledger;
-	STAILQ_HEAD(, file_check) checks; /* files that are being read (coordinator/jobs/files.c) */
-	struct live_job *live;		  /* running jobs */
-	struct job_record *ended;	  /* at most ENDED_MAX, oldest first */
+	STAILQ_HEAD(, file_check) checks; /* files being read (coordinator/jobs/files.c) */
+	struct live_job *live;		  /* live jobs */
+	struct job_record *ended;	  /* the jobs that ended last, at most ENDED_MAX, in the order of their ends */
 	size_t ended_count;
 	STAILQ_HEAD(, deferred) deferred;
 	struct recovering_job *found; /* sorted by id */
-	struct recovery *recovery;    /* jobs of an earlier run that are being read; NULL: none left */
-	int fault;		      /* why it stops by itself; 0: it does not */
+	struct recovery *recovery;    /* state of reading the jobs of an earlier run; NULL: all have been read */
+	int fault;		      /* why the coordinator stops by itself; 0: it does not */
 	struct error fault_error;
 	uint64_t *restored; /* ids of the jobs that continued when this run started */
 	size_t restored_count;
-	STAILQ_HEAD(ack_list, durable_ack) acks; /* waiting for a flush */
-	struct ack_list parked;			 /* ... for a new journal to replace one that failed */
-	struct ending *endings;			 /* jobs that ended and whose records could not be written yet */
-	double endings_again, ledger_again;	 /* next attempts */
-	struct age_clock seen;			 /* when this run started */
-	double folders_next;			 /* next check of jobs' folders */
-	double clear_next;			 /* next check of finished jobs */
-	struct clearing *clearing;		 /* that check is running */
+	STAILQ_HEAD(ack_list, durable_ack) acks; /* acknowledgements that wait for a flush */
+	struct ack_list parked;		    /* acknowledgements that wait for a new journal in place of a failed one */
+	struct ending *endings;		    /* jobs that have ended and whose records could not be written yet */
+	double endings_again, ledger_again; /* next attempts to write records, and the copy of the ledger */
+	struct age_clock seen;		    /* observed time when this run started */
+	double folders_next;		    /* next check of the jobs' folders */
+	double clear_next;		    /* next round of clearing finished jobs */
+	struct clearing *clearing;	    /* the running round; NULL: none */
 	bool flushing;
 	bool stepping, stopping;
-	bool feeding;			     /* results stored ahead of their predecessors */
-	bool checkpointing;		     /* some job is being written by the pool */
-	struct extension_request *extending; /* waiting requests, in order of arrival */
-	const struct live_job
-		*reading;     /* of an ended job: the pool reads its films, and owns all of it but id and plan */
-	uint64_t reading_for; /* the peer that requested it; 0: none is being read */
-	uint64_t changes;     /* incremented whenever the status changes */
+	bool feeding;			     /* late_feed is running */
+	bool checkpointing;		     /* a job's checkpoint is being written by the pool */
+	struct extension_request *extending; /* requests that wait, in order of arrival */
+	/* An ended job that is being extended: the pool reads its films, and owns all of it but id and plan. NULL:
+	 * none. */
+	const struct live_job *reading;
+	uint64_t reading_for; /* peer that requested the extension; 0: no job is being read */
+	uint64_t changes;     /* incremented whenever the status may have changed */
 };
 
-/* A thread of the pool calls `work`, then the loop's thread `done`; each finds its data in ->data. Cannot fail: libuv
- * refuses only work without a function. */
+/* Calls `work` in a thread of the pool, then `done` in the loop's thread; both find `data` in w->data. Cannot fail:
+ * libuv refuses only work without a function. */
 void jobs_in_pool(struct jobs *jobs, uv_work_t *w, void *data, uv_work_cb work, uv_after_work_cb done);
 double jobs_now(const struct jobs *jobs);			  /* s of the loop's clock */
-struct live_job *jobs_find(const struct jobs *jobs, uint64_t id); /* NULL: it is not running */
-/* Where the films of a job with this plan go. NULL: into memory, which never waits for the disk. */
+struct live_job *jobs_find(const struct jobs *jobs, uint64_t id); /* NULL: no such live job */
+/* Returns the folder for the films of a new job with this plan; NULL: they go into memory, which never waits for the
+ * disk. */
 const char *jobs_film_folder(const struct jobs *jobs, const struct plan *p);
-/* Whether it is being read from the spool. */
+/* Whether the job is being read from the spool, after a restart or for an extension. */
 bool jobs_is_read(const struct jobs *jobs, uint64_t id);
-/* -EDQUOT: the owner's quota is used up. id: 0, or that of an existing job; uploading: bytes of scenes in transit. */
+/* Returns -EDQUOT if the job would exceed its owner's quota. id: 0 for a new job, or the id of an existing one;
+ * uploading: bytes of scene files that the owner is sending. */
 int jobs_within_quota(const struct jobs *jobs, const char *owner, uint64_t id, uint64_t uploading,
 		      const struct plan *plan, const Farm__Submit *m, struct error *e);
 

@@ -2,12 +2,13 @@
 /*
  * One running job: its films, seeds, chain states and log.
  *
- * live_job_new takes the submission and starts the record. Bootstrap results are collected until live_job_prepare makes
- * b, seeds and canvas from them. Then live_job_merge adds each result to the films and keeps its chain states for the
- * next lease of its group and part. Results that arrive while a thread reads the films wait in a list.
+ * live_job_new takes over the submission and starts the record. Bootstrap results are collected until
+ * live_job_prepare makes b, seeds and canvas from them. Then live_job_merge adds each result to the films and keeps
+ * its chain states for the next lease of its group and part. Results that arrive while a thread reads the films wait
+ * in a list.
  *
- * live_job_merge fails with -ENOMEM half way, after which the films must not be used, or with -ERANGE if a sum leaves
- * the grid. Errors of the log are ignored: no job fails because of it.
+ * live_job_merge may fail half way: with -ENOMEM, after which the films must not be used, or with -ERANGE if a sum
+ * leaves the grid. Errors of the log are ignored: no job fails because of them.
  */
 #include "coordinator/live_job/live_job.h"
 
@@ -143,11 +144,9 @@ void live_job_log(struct live_job *job, enum log_event event, const char *fields
 	if (job->log_bytes >= log_most)
 		size = (size_t)snprintf(line, sizeof line,
 					"the log of this job is full: the rest is in the coordinator's log\n");
-	int rc = disk_write_all(job->log, line, size); /* the common log has the line, too */
+	int rc = disk_write_all(job->log, line, size); /* if this fails, the coordinator's log still has the line */
 	(void)rc;
 }
-
-/* ---- merging ---- */
 
 static struct chain_state **states_at(const struct live_job *job, const struct lease_key *k)
 {
@@ -191,7 +190,7 @@ void live_job_note_times(struct live_job *job, double elapsed, uint64_t rounds)
 		return;
 	job->times.elapsed = elapsed;
 	if (!job->canvas)
-		job->times.opened = elapsed; /* the last batch of the bootstrap is kept */
+		job->times.opened = elapsed; /* remains the time of the last bootstrap batch */
 	if (live_job_rounds(job) > rounds)
 		job->times.completed = elapsed;
 }
@@ -244,8 +243,6 @@ void live_job_count_worker(struct live_job *job, uint64_t peer)
 			return;
 	job->last_workers[job->worker_count++ % KNOWN] = peer;
 }
-
-/* ---- waiting results ---- */
 
 static size_t waiting_size(const struct waiting_batch *w)
 {
@@ -320,8 +317,6 @@ void waiting_batch_free(struct waiting_batch *w)
 	buf_fini(&w->payload);
 	mem_free(w);
 }
-
-/* ---- scene files ---- */
 
 void live_job_release_blobs(const Farm__Submit *m, struct blob_store *s)
 {

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A running job with its data, beside the few numbers that the core (coordinator/core) keeps of it: scene files,
- * bootstrap, canvas, seeds, the chain states of each (group, part)'s last merged epoch, its log. The loop's thread;
- * while `busy`, a thread of the pool reads the canvas and nobody adds to it.
+ * A running job with its data, apart from the few numbers that the core (coordinator/core) keeps of it: scene files,
+ * bootstrap, canvas, seeds, the chain states after the last merged epoch of each (group, part), its log. The loop's
+ * thread; while `busy`, a thread of the pool reads the canvas and nobody adds to it.
  */
 #ifndef COORDINATOR_LIVE_JOB_LIVE_JOB_H
 #define COORDINATOR_LIVE_JOB_LIVE_JOB_H
@@ -23,14 +23,14 @@
 struct jobs;
 struct live_job;
 
-/* Work on whole films (coordinator/jobs/publish.h). */
+/* Tasks that read whole films (coordinator/jobs/publish.h). */
 enum publish_what {
-	PUBLISH_ERROR_ONLY, /* answered by EVENT_ERROR_KNOWN */
-	PUBLISH_PREVIEW,    /* preview.exr */
-	PUBLISH_RESULT,	    /* result.exr */
+	PUBLISH_ERROR_ONLY, /* estimates the error; answered by EVENT_ERROR_KNOWN */
+	PUBLISH_PREVIEW,    /* writes preview.exr */
+	PUBLISH_RESULT,	    /* writes result.exr */
 };
 
-struct publishing { /* at most one at a time per live job */
+struct publishing { /* a task; at most one at a time per live job */
 	uv_work_t work;
 	struct jobs *jobs;
 	struct live_job *job;
@@ -44,42 +44,42 @@ struct publishing { /* at most one at a time per live job */
 	struct error error;
 };
 
-/* A result that arrived while the canvas was busy, or a failure while the job's files are read. */
+/* A result that arrived while the canvas was busy, or a failure that arrived while the job's files were being read. */
 struct waiting_batch {
 	STAILQ_ENTRY(waiting_batch) next;
 	uint64_t peer;
 	struct lease_key key;
 	struct envelope envelope;
 	struct buf payload;
-	bool checked; /* a failure: the job's files have been read since it came */
+	bool checked; /* of a failure: the job's files have been read since it arrived */
 };
 
 /* Seconds after the job's first lease, including earlier runs: at the last merged batch, at the start of the first
- * round, at the end of the last complete round. NAN: not yet. */
+ * round, and at the end of the last complete round. NAN: not reached yet. */
 struct live_job_times {
 	double elapsed, opened, completed;
 };
 
-/* Results of a worker that count without having been verified. */
+/* How many results of a worker were merged without having been verified. */
 struct live_job_credit {
-	uint64_t who; /* the core's number of the worker */
+	uint64_t who; /* the core's id of the worker */
 	uint64_t leases;
 };
 
-/* A stored result that cannot count yet (late.h). */
+/* A stored result that cannot be merged yet (late.h). */
 struct late_result {
 	struct lease_key key;
 	uint64_t at;
-	uint64_t peer; /* the worker that the core has given the lease to; 0: none */
+	uint64_t peer; /* worker to which the core has given the lease; 0: none */
 };
 
-/* Where a merged batch is in the journal (rollback.h). */
+/* Where in the journal the batch of an epoch is (rollback.h). */
 struct merged_record {
 	uint32_t slot;
 	uint64_t epoch, at;
 };
 
-/* Who made the last batch; name "": not known. */
+/* The worker that made a batch; name "": not known. */
 struct live_job_maker {
 	char name[128], certificate[72], home[40];
 	uint64_t restarts;
@@ -90,100 +90,111 @@ struct live_job {
 	uint64_t id;
 	struct envelope submit; /* owned */
 	struct plan plan;
-	struct job_record record;    /* its counters as last written; the core has the current ones */
-	struct job_record *earlier;  /* of its end before it was extended, whose image exists; NULL: none */
-	struct bootstrap *bootstrap; /* until the canvas exists */
-	struct canvas *canvas;	     /* from then on */
-	const char *film_folder;     /* folder for the films when it is read from the spool; NULL: memory */
+	struct job_record record; /* its counters are those last written; the core has the current ones */
+	/* Record of the end before the job was extended, whose image still exists; NULL: none. */
+	struct job_record *earlier;
+	struct bootstrap *bootstrap; /* NULL once the canvas exists */
+	struct canvas *canvas;	     /* NULL before the bootstrap is complete */
+	/* Folder for the films while the job is being read from the spool; NULL: they are in memory. */
+	const char *film_folder;
 	struct bootstrap_result lit;
-	uint64_t *seeds;	       /* [groups][chains / groups]; NULL for samples */
-	struct chain_state **states;   /* [groups x parts]; NULL entries: no epoch merged yet */
-	uint64_t state_bytes;	       /* memory of those */
-	struct live_job_maker *makers; /* [groups x parts]: of those */
+	uint64_t *seeds;	       /* [groups][chains / groups]; NULL if the plan has no chains */
+	struct chain_state **states;   /* [groups x parts]; NULL entries: no epoch is merged yet */
+	uint64_t state_bytes;	       /* memory that `states` takes */
+	struct live_job_maker *makers; /* [groups x parts]: workers that made `states` */
 	bool *again;		       /* [groups x parts]: the next batch replaces one that was taken back */
-	struct merged_record *merged;  /* in order of merging */
+	struct merged_record *merged;  /* journal records of batches that can be taken back, in order of merging */
 	size_t merged_count;
-	uint64_t kept_bytes; /* of the journal; earlier batches are in its checkpoint */
+	/* Bytes of JOURNAL_KEPT records in the journal; their batches are also in the checkpoint. */
+	uint64_t kept_bytes;
 	uint32_t chains_per_lease;
 	int log; /* file descriptor of the log */
 	uint64_t log_bytes;
 	struct journal *journal;
-	bool pinned; /* the journal has the record of its fingerprint */
+	bool pinned; /* the journal has a record of the fingerprint */
 	struct live_job_times times;
-	char fingerprint[256];	   /* an image of an earlier run */
-	uint64_t checkpoint_bytes; /* of the last attempt */
-	double checkpoint_after;   /* s of the loop's clock: next attempt */
+	char fingerprint[256];	   /* numeric fingerprint that the job was pinned to when it was read from the spool */
+	uint64_t checkpoint_bytes; /* size of the last checkpoint; 0: none */
+	double checkpoint_after;   /* s of the loop's clock: no checkpoint before this time */
 	double look_written;	   /* work of the last estimate stored in the journal */
-	bool lacks_file;	   /* files of its scene, for which it is held */
-	bool unread;		   /* one of them could not be read, or was wrong, when they were last read */
-	bool held;		   /* its results cannot be stored */
-	size_t held_bytes;	   /* of the result that there was no room for */
-	uint64_t held_states;	   /* its chain states had none; bytes that they would have; 0: they had */
-	double try_again;	   /* s of the loop's clock: what the disk refused */
-	bool unsure; /* whether the last checkpoint was renamed is unknown: nothing is stored before the next one */
-	uint64_t generation_least; /* of that one */
-	bool unprepared;	   /* the disk has no room for its films yet */
+	bool lacks_file;	   /* files of its scene are missing or damaged, so it is held */
+	bool unread;		   /* a file could not be read, or was wrong, when the files were last read */
+	bool held;		   /* held because its results cannot be stored */
+	size_t held_bytes;	   /* size of the result for which there was no space */
+	/* Bytes of chain states for which there was no room when the job was held; 0: states were not the reason. */
+	uint64_t held_states;
+	double try_again; /* s of the loop's clock: when to try again what the disk refused */
+	/* It is unknown whether the rename of the last checkpoint is durable, so nothing is stored before the next
+	 * checkpoint. */
+	bool unsure;
+	uint64_t generation_least; /* the next checkpoint has at least this generation */
+	bool unprepared;	   /* its bootstrap is complete, but the disk has no room for its films yet */
 	bool unpublished;	   /* it has ended, but its image could not be written yet */
 	uint64_t unpublished_rounds;
-	bool unrecorded; /* ... but its record could not be written */
-	bool overflowed; /* a sum of its batches left the films' range: the films are kept as they are */
+	bool unrecorded; /* it has ended, but its record could not be written yet */
+	bool overflowed; /* a sum left the range of the films, which are kept as they are */
 	bool busy, ended;
 	struct publishing publishing; /* valid while busy */
-	bool black;		      /* as the published image, or the bootstrap */
-	double preview_made;	      /* s of the loop's clock; 0: never */
-	uint32_t worker_count;	      /* workers that had leases of it */
+	bool black;		      /* whether the published image or, without one, the bootstrap is black */
+	double preview_made;	      /* when preview.exr was last made, s of the loop's clock; 0: never */
+	uint32_t worker_count;	      /* number of workers that had leases of the job */
 	uint64_t last_workers[64];
 	struct live_job_credit *credits;
 	size_t credit_count;
-	char doubts[512]; /* about results of workers that are quarantined now; "": none */
+	char doubts[512]; /* notes on results of workers that have been quarantined since; "": none */
 	struct late_result *late;
 	size_t late_count;
 	STAILQ_HEAD(waiting_list, waiting_batch) waiting;
 	size_t waiting_bytes;
 };
 
-/* Takes the submission; writes a record if it is new. The job's folder exists; owner as in the record; submitted: s
- * since 1970 for a job of an earlier run; 0: now. */
+/* Makes a live job and takes over the submission. The job's folder must exist. owner: name in the certificate, or "".
+ * submitted: s since 1970 for a job of an earlier run; 0: now. After an error the submission still belongs to the
+ * caller. */
 int live_job_new(struct live_job **job, uint64_t id, struct envelope *submit, const struct plan *plan,
 		 const char *owner, double submitted, struct spool *s, struct error *e);
-/* Frees memory; blobs and files stay. Not while busy. */
+/* Frees the memory of a job that is not busy; scene files and the job's folder stay. */
 void live_job_free(struct live_job *job);
 
 const Farm__Submit *live_job_submit(const struct live_job *job);
 __attribute__((format(printf, 3, 4))) void live_job_log(struct live_job *job, enum log_event event, const char *fields,
 							...);
 
-/* Merges a batch that the core accepted. Takes its states. */
+/* Merges a batch that the core has accepted, and takes over its states. Returns -ENOMEM or -ERANGE half way, see
+ * live_job.c. */
 int live_job_merge(struct live_job *job, struct batch *b, struct error *e);
-/* Takes the chain states of a group and part. */
+/* Takes over the chain states of a group and part. */
 void live_job_set_states(struct live_job *job, uint32_t slot, struct chain_state *states);
-/* Call after a batch was merged, this many seconds after the first lease. rounds: complete before. */
+/* Call after a batch was merged. elapsed: seconds after the first lease; rounds: complete rounds before the merge. */
 void live_job_note_times(struct live_job *job, double elapsed, uint64_t rounds);
-uint64_t live_job_rounds(const struct live_job *job); /* complete */
-/* The bootstrap is complete: makes b, seeds and canvas. */
+uint64_t live_job_rounds(const struct live_job *job); /* complete rounds */
+/* Computes b, seeds and canvas when the bootstrap is complete. */
 int live_job_prepare(struct live_job *job, const char *canvas_folder, struct error *e);
-/* Whether a lease starts from chain states, those of the epoch before, with this digest. */
+/* Whether a lease starts from chain states (those after the previous epoch) and they have this digest. */
 bool live_job_gives_states(const struct live_job *job, const struct lease_key *k, const struct blob_hash *digest);
-/* A lease as a frame for a worker. anew: with seeds, whatever its epoch. */
+/* Packs a lease as a frame for a worker. anew: with seeds instead of states, whatever its epoch. */
 int live_job_pack_lease(const struct live_job *job, const struct lease_key *k, bool anew, unsigned char **frame,
 			size_t *size, struct error *e);
+/* Counts the worker in worker_count, unless it is among the last 64 different ones. */
 void live_job_count_worker(struct live_job *job, uint64_t peer);
 
-/* Takes both. checked: as in struct waiting_batch. false: out of memory. */
+/* Keeps a message until the canvas is free or the files have been read; takes over envelope and payload. checked: as
+ * in struct waiting_batch. Returns false if out of memory. */
 bool live_job_put_off(struct live_job *job, uint64_t peer, const struct lease_key *k, struct envelope *env,
 		      struct buf *payload, bool checked);
-const struct waiting_batch *
-live_job_waits_for(const struct live_job *job,
-		   const struct lease_key *k);			   /* NULL: no result of that lease is waiting */
-struct waiting_batch *live_job_take_waiting(struct live_job *job); /* NULL: none */
-/* The first waiting failure of a worker that is no refusal of chain states; NULL: none. */
+/* Returns a waiting message about this lease; NULL: none. */
+const struct waiting_batch *live_job_waits_for(const struct live_job *job, const struct lease_key *k);
+/* The first one, which then belongs to the caller; NULL: none. */
+struct waiting_batch *live_job_take_waiting(struct live_job *job);
+/* Removes and returns the first waiting failure of this worker, not counting refusals of chain states; NULL: none. */
 struct waiting_batch *live_job_take_failure(struct live_job *job, uint64_t peer);
-/* Drops the waiting results of a worker that is gone. */
+/* Drops all waiting messages of a worker that is gone. */
 void live_jobs_drop_waiting(struct live_job *first, uint64_t peer);
 void waiting_batch_free(struct waiting_batch *w);
 
-/* Releases the blobs of its scene files. */
+/* Releases the blobs of the submission's scene files. */
 void live_job_release_blobs(const Farm__Submit *m, struct blob_store *s);
-uint64_t live_job_asset_bytes(const Farm__Submit *m); /* total size of its files, as submitted */
+/* Total size of its scene files as submitted; UINT64_MAX: too large to count. */
+uint64_t live_job_asset_bytes(const Farm__Submit *m);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Limits on what one owner may use. The owner is the name in a client's certificate or, without TLS, all clients
- * together; operators are exempt. Checked when a job is submitted, before its files are sent; pure.
+ * Limits on what one owner may use. The owner is the name in a client's certificate; without TLS all clients together
+ * are one owner. Operators are exempt. Checked when a job is submitted, before its files are sent; pure.
  */
 #ifndef COORDINATOR_LIVE_JOB_QUOTA_H
 #define COORDINATOR_LIVE_JOB_QUOTA_H
@@ -11,19 +11,20 @@
 
 #include <stdint.h>
 
-struct quota {		      /* 0: no limit */
-	uint64_t jobs;	      /* live jobs of one owner */
-	uint64_t asset_bytes; /* of their files, counted once per job, and of those in transit */
-	uint64_t film_bytes;  /* of one job's films, as canvas_bytes */
-	uint64_t mutations;   /* or samples of one job; if set, every job must have such a bound */
+struct quota {	       /* 0: no limit */
+	uint64_t jobs; /* live jobs of one owner */
+	/* Scene files of the owner's live jobs, counted once per job, including those being uploaded. */
+	uint64_t asset_bytes;
+	uint64_t film_bytes; /* films of one job, as computed by canvas_bytes */
+	uint64_t mutations;  /* mutations or samples of one job; if set, every job must have such a bound */
 };
 
-/* What the owner uses already. */
+/* What the owner already uses. */
 struct quota_use {
 	uint64_t jobs, asset_bytes;
 };
 
-/* -EDQUOT with a sentence for the client. */
+/* Returns -EDQUOT with a sentence for the client if the new job would exceed a limit. */
 int quota_check(const struct quota *q, const struct quota_use *has, const struct plan *p, uint64_t asset_bytes,
 		struct error *e);
 

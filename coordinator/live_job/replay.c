@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Reads what was merged of a job from the disk into its films.
+ * Reads a job's merged results from the disk into its films.
  *
  * replay_films reads the checkpoint, if there is one, and then the journal that follows it. Each result goes through
- * the same code as live ones. One whose predecessor is missing is noted (late.h) and tried again at the end. Other
- * records restore fingerprint, times, estimates of the error and counters.
+ * the same code as results of workers. A result whose predecessor is missing is noted (late.h) and tried again at the
+ * end. Other records restore fingerprint, times, estimates of the error and counters.
  *
  * A damaged record is skipped, counted and logged in the job's log: its lease is computed again. A damaged checkpoint
- * is -EBADMSG; an undamaged record that makes no sense was written by another version: -EPROTO. The job must then be
- * dropped. A stop requested by another thread is -ECANCELED.
+ * is -EBADMSG. An undamaged record that makes no sense was written by another version: -EPROTO. After either of these
+ * the job must be dropped. A stop requested by another thread is -ECANCELED.
  */
 #include "coordinator/live_job/replay.h"
 
@@ -22,18 +22,16 @@
 
 #include <string.h>
 
-enum { DAMAGED_MOST = 16 /* leases named in the log */ };
+enum { DAMAGED_MOST = 16 /* damaged leases that are named in the log */ };
 
 struct replay {
 	struct live_job *job;
-	struct replay_progress *progress; /* NULL: nobody watches */
+	struct replay_progress *progress; /* NULL: nobody watches the progress */
 	double elapsed;
 	uint64_t batches;
-	struct lease_key damaged[DAMAGED_MOST]; /* of records that are to be computed again */
+	struct lease_key damaged[DAMAGED_MOST]; /* leases of damaged records, to be computed again */
 	size_t damaged_count;
 };
-
-/* ---- the journal */
 
 enum replay_place replay_place(const struct live_job *job, const struct lease_key *k)
 {
@@ -56,7 +54,7 @@ static int merge(struct replay *r, struct batch *b, struct error *e)
 	struct live_job *job = r->job;
 	uint64_t rounds = live_job_rounds(job);
 	int rc = live_job_merge(job, b, e);
-	if (rc == -EEXIST || rc == -EAGAIN) /* an error of the films, not of the machine */
+	if (rc == -EEXIST || rc == -EAGAIN) /* the file is at fault, not the machine */
 		rc = error_prefix(e, -EBADMSG, "a batch out of order");
 	live_job_note_times(job, r->elapsed, rounds);
 	if (!rc && job->bootstrap && bootstrap_missing(job->bootstrap) == 0)
@@ -65,7 +63,7 @@ static int merge(struct replay *r, struct batch *b, struct error *e)
 	return rc;
 }
 
-/* An undamaged record that another version wrote: it must not be thrown away. */
+/* Returns -EPROTO for an undamaged record that another version wrote, so that the journal is not thrown away. */
 static int foreign_record_error(const struct replay *r, const char *what, size_t size, struct error *e)
 {
 	return error_set(
@@ -74,7 +72,7 @@ static int foreign_record_error(const struct replay *r, const char *what, size_t
 		(unsigned long long)r->job->id, what, size);
 }
 
-/* The same for estimates and counters; e says what is wrong. */
+/* Like foreign_record_error(), for estimates and counters, where e already says what is wrong. */
 static int strange_note(const struct replay *r, int rc, struct error *e)
 {
 	return rc == -EPROTO ? error_prefix(e, rc, "the journal of j%llu: another coordinator wrote it",
@@ -175,7 +173,7 @@ static int take_record(void *user, const struct journal_item *item, struct error
 	}
 }
 
-/* Merges the batches that waited for later records in the file. */
+/* Merges the batches that had to wait for records further on in the file; the others stay in job->late. */
 static int take_late(struct replay *r, struct error *e)
 {
 	struct live_job *job = r->job;
@@ -199,7 +197,7 @@ static int take_late(struct replay *r, struct error *e)
 	return rc;
 }
 
-/* Which of the damaged results are to be computed again; those computed since are merged. */
+/* Logs which damaged results are to be computed again; those computed since are merged and not named. */
 static void say_damage(const struct replay *r, const struct journal_found *found)
 {
 	struct live_job *job = r->job;
@@ -230,7 +228,7 @@ int replay_films(const struct spool *spool, struct live_job *job, struct replay_
 	if (rc && rc != -ENOENT)
 		return rc;
 	rc = journal_open(&job->journal, folder, job->id, generation, take_record, &r, &found, e);
-	if (rc == -ENOENT) { /* its batches can be computed again */
+	if (rc == -ENOENT) { /* the batches in it can be computed again */
 		live_job_log(job, LOG_SPOOL_FAULT, "text=\"%s/journal.%llu is gone: what it held is computed again\"",
 			     folder, (unsigned long long)generation);
 		rc = journal_create(&job->journal, folder, job->id, generation, e);

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Reads what was merged of a job from its checkpoint and journal into a live job, with the code for live batches, so
- * the bits are the same. A result counts if its predecessor in its chains is present and its round is open. A damaged
- * result is skipped, and those that depend on it wait in the journal until it has been computed again (late.h): the
- * image is the same.
+ * Reads a job's merged results from its checkpoint and journal into a live job, with the code that merges results of
+ * workers, so the bits are the same. A result is merged if the previous epoch of its chains is merged and its round
+ * is open. A damaged result is skipped, and later results that depend on it wait in the journal until it has been
+ * computed again (late.h); the image is the same.
  */
 #ifndef COORDINATOR_LIVE_JOB_REPLAY_H
 #define COORDINATOR_LIVE_JOB_REPLAY_H
@@ -12,18 +12,19 @@
 
 #include <stdatomic.h>
 
-/* A replay that another thread watches. */
+/* Progress of a replay, for another thread to watch. */
 struct replay_progress {
-	_Atomic uint64_t read; /* bytes read: journals once, the checkpoint twice */
-	atomic_bool stop;      /* stop soon, with -ECANCELED */
+	_Atomic uint64_t read; /* bytes read so far; journals are read once, the checkpoint twice */
+	atomic_bool stop;      /* set by the watching thread: stop soon, with -ECANCELED */
 };
 
-/* Takes a second or more. Any thread that owns the live job. On failure (-EBADMSG: something is damaged or missing;
- * -EPROTO: another version) the live job can only be dropped. p: NULL: nobody watches. */
+/* Takes a second or more. p: NULL: nobody watches. Any thread that owns the live job. After a failure (-EBADMSG:
+ * something is damaged or missing; -EPROTO: another version; -ECANCELED) the live job can only be dropped. */
 int replay_films(const struct spool *spool, struct live_job *job, struct replay_progress *p, struct error *e);
 
-/* Whether a result can be merged now. */
-enum replay_place { REPLAY_FITS, REPLAY_MERGED /* yes */, REPLAY_LATE /* an earlier result is missing */ };
+/* Says whether a result can be merged now. */
+/* It is merged already. */
+enum replay_place { REPLAY_FITS, REPLAY_MERGED, REPLAY_LATE /* not yet: an earlier result is missing */ };
 enum replay_place replay_place(const struct live_job *job, const struct lease_key *k);
 
 #endif

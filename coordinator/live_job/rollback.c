@@ -43,7 +43,7 @@ void rollback_note(struct live_job *job, const struct lease_key *k, uint64_t at,
 	take_maker(&job->makers[slot_of(job, k)], maker);
 }
 
-/* SIZE_MAX: not found. */
+/* Returns SIZE_MAX if not found. */
 static size_t find(const struct live_job *job, uint32_t slot, uint64_t epoch)
 {
 	for (size_t i = job->merged_count; i-- > 0;)
@@ -138,7 +138,7 @@ int rollback_replay(struct live_job *job, struct journal *j, const struct lease_
 			next.epoch++;
 		while (canvas_has(job->canvas, &next));
 		rc = rollback_read(job, j, &next, &b, e);
-		if (rc) /* an undamaged journal has all of them */
+		if (rc) /* an undamaged journal contains all batches */
 			return rc == -ENOENT ? error_set(e, EBADMSG, "a batch that was replaced is not in the journal")
 					     : rc;
 		rollback_take(job, &b);
@@ -173,7 +173,7 @@ void rollback_copy(const struct live_job *job, struct journal *to, uint64_t most
 	struct error e;
 	*list = NULL;
 	*count = 0;
-	if (journal_write(job->journal, &e)) /* the waiting records cannot be read */
+	if (journal_write(job->journal, &e)) /* records that are still queued cannot be read */
 		return;
 	for (uint32_t s = 0; s < slots; s++) {
 		uint64_t next = 0;

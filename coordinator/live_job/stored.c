@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Packs what is stored of a job into messages of proto/stored.proto and unpacks it again: counters, error estimates
- * ("looks") and the head of a checkpoint. The counters come from the list of a job's fields, so a new one appears here
- * by itself.
+ * Packs the stored data of a job into messages of proto/stored.proto and unpacks it again: counters, error estimates
+ * ("looks") and the head of a checkpoint. The counters come from the list of a job's fields, so a new one appears
+ * here without further changes.
  *
- * Failures: bytes that are not such a message, a field that this version does not know, or more groups or looks than
- * fit are -EPROTO with a sentence; -ENOMEM. Packing cannot fail: the sizes are bounded by STORED_NOTE_MOST and
- * STORED_HEAD_MOST, which assertions check.
+ * Unpacking fails with -EPROTO and a sentence for bytes that are no such message, a field that this version does not
+ * know, or more groups or looks than fit; or with -ENOMEM. Packing cannot fail: the sizes are bounded by
+ * STORED_NOTE_MOST and STORED_HEAD_MOST, which assertions check.
  *
- * The last part reads what version 004 wrote.
+ * The last part reads data written by version 004.
  */
 #include "coordinator/live_job/stored.h"
 
@@ -32,8 +32,6 @@ _Static_assert(sizeof(struct job_counts) / sizeof(uint64_t) * 12 <= STORED_NOTE_
 		message_free(m);                                                                                \
 		return rc;                                                                                      \
 	} while (0)
-
-/* ---- counters ---- */
 
 static void fill_counts(const struct job_counts *c, Stored__Counts *m)
 {
@@ -63,8 +61,6 @@ int stored_unpack_counts(const unsigned char *bytes, size_t size, struct job_cou
 	UNPACK(counts, Stored__Counts, counts, c);
 }
 
-/* ---- looks ---- */
-
 static void fill_look(const struct forecast_look *l, Stored__Look *m)
 {
 	stored__look__init(m);
@@ -90,8 +86,6 @@ int stored_unpack_look(const unsigned char *bytes, size_t size, struct forecast_
 {
 	UNPACK(look, Stored__Look, look, l);
 }
-
-/* ---- heads of checkpoints ---- */
 
 /* X(member of struct checkpoint_head, member of the message) */
 #define HEAD_NUMBERS(X)                                 \
@@ -158,8 +152,6 @@ int stored_unpack_head(const unsigned char *bytes, size_t size, struct checkpoin
 {
 	UNPACK(head, Stored__CheckpointHead, checkpoint_head, h);
 }
-
-/* ---- what earlier versions stored: numbers at the offsets of stored.h ---- */
 
 enum { OLD_GROUPS = 64, OLD_LOOKS = 64, OLD_LOOK = 56, OLD_COUNTS = 64, OLD_FINGERPRINT = 256 };
 enum { AT_LOOKS = 608, AT_COUNTS = AT_LOOKS + OLD_LOOKS * OLD_LOOK, AT_FINGERPRINT = AT_COUNTS + OLD_COUNTS };

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Stored data of a job other than results, as messages of proto/stored.proto, and as earlier versions stored it. Any
- * thread.
+ * The data stored of a job besides its results, packed as messages of proto/stored.proto, and unpacked also from the
+ * formats of earlier versions. Any thread.
  */
 #ifndef COORDINATOR_LIVE_JOB_STORED_H
 #define COORDINATOR_LIVE_JOB_STORED_H
@@ -11,7 +11,7 @@
 #include "coordinator/core/job_fields.h"
 #include "coordinator/live_job/live_job.h"
 
-/* What a checkpoint contains besides seeds, chain states and films. */
+/* The contents of a checkpoint besides seeds, chain states and films. */
 struct checkpoint_head {
 	uint64_t job, generation;
 	uint32_t worker_count;
@@ -24,27 +24,27 @@ struct checkpoint_head {
 };
 
 enum {
-	STORED_NOTE_MOST = 1024,    /* bytes of an estimate of the error ("look"), of counters */
-	STORED_HEAD_MOST = 1 << 16, /* bytes of a checkpoint's head */
-	STORED_OLD_HEAD = 4512,	    /* of version 004, after magic number, size of the head and worker_count */
+	STORED_NOTE_MOST = 1024,    /* limit on the bytes of one estimate of the error ("look"), or of the counters */
+	STORED_HEAD_MOST = 1 << 16, /* limit on the bytes of a checkpoint's head */
+	/* Bytes of a head of version 004, after magic number, size of the head and worker_count. */
+	STORED_OLD_HEAD = 4512,
 };
 
-/* Returns the size. */
+/* Each returns the number of bytes packed. */
 size_t stored_pack_look(const struct forecast_look *l, unsigned char bytes[STORED_NOTE_MOST]);
 size_t stored_pack_counts(const struct job_counts *c, unsigned char bytes[STORED_NOTE_MOST]);
 size_t stored_pack_head(const struct checkpoint_head *h, unsigned char bytes[STORED_HEAD_MOST]);
 
-/* -EPROTO: not such a message, or another version; -ENOMEM. */
+/* Each returns -EPROTO if the bytes are not such a message or of another version, -ENOMEM if out of memory. */
 int stored_unpack_look(const unsigned char *bytes, size_t size, struct forecast_look *l, struct error *e);
 int stored_unpack_counts(const unsigned char *bytes, size_t size, struct job_counts *c, struct error *e);
 int stored_unpack_head(const unsigned char *bytes, size_t size, struct checkpoint_head *h, struct error *e);
 
 /*
- * The same for earlier versions, little endian. -EPROTO: the wrong size.
+ * Like the functions above, for data of earlier versions, little endian. Return -EPROTO if the size is wrong.
  *
- * A look: six doubles in the order of struct forecast_look, and the last member in 8 bytes.
- * Counters, 8 bytes each: repeats, refused, faults, failures, timeouts, duplicates, verified, mismatched.
- * A head:
+ * A look: six doubles in the order of struct forecast_look, and the last member in 8 bytes. Counters, 8 bytes each:
+ * repeats, refused, faults, failures, timeouts, duplicates, verified, mismatched. A head:
  *
  * offset  bytes  contents
  * 0       16     job, generation

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A job as it is displayed: a record, plus what only a running job has, as a message or JSON.
+ * A job as it is displayed: a record, plus values that only a live job has, as a message or JSON.
  *
- * view_of_record starts it, view_add_status adds what the core knows. Users who may only see their own jobs get texts
- * without the numbers of others' (view_hide_others). Unknown numbers are null in JSON and negative in messages.
- * Messages borrow the view's texts and must be sent while it exists. JSON is NULL if memory is out.
+ * view_of_record starts a view, view_add_status adds the core's values. Users who may see only their own jobs get
+ * texts without the ids of other owners' jobs (view_hide_others). Unknown numbers are null in JSON and negative in
+ * messages. Messages borrow the view's texts and must be sent while the view exists. JSON is NULL if memory runs out.
  */
 #include "coordinator/live_job/view.h"
 
@@ -15,7 +15,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Where a field is in struct job_view. */
+/* The part of struct job_view that a field is in. */
 #define IN_RECORD record.
 #define IN_VIEW
 
@@ -27,7 +27,7 @@ void view_of_record(struct job_view *v, const struct job_record *r)
 	v->share = v->reading = -1;
 }
 
-/* A number of the core as the record states it: one that is not known is 0, or negative where 0 has a meaning. */
+/* Converts a number of the core to that of the record: unknown becomes 0, or negative where 0 has a meaning. */
 static double from_core_real(double x)
 {
 	return isfinite(x) ? x : 0;
@@ -125,7 +125,7 @@ static json_t *number_or_null(double x, bool known)
 	return known ? forecast_real(x) : json_null();
 }
 
-/* What is known of the error, and the cost of reducing it. */
+/* Adds the estimated error and the cost of halving it. */
 static void add_forecast(json_t *o, const struct job_view *v)
 {
 	const struct job_record *r = &v->record;
@@ -189,21 +189,24 @@ json_t *view_to_json(const struct job_view *v, bool details)
 
 json_t *view_peer_to_json(const struct peer_status *p, double now)
 {
-	return json_pack("{s:I s:s s:s s:s s:i s:i s:i s:f s:f s:I s:I s:I s:I s:I s:I s:s}",		      /* */
-			 "id", (json_int_t)p->id, "name", p->name, "state", peer_state_name(p->state),	      /* */
-			 "fingerprint", p->fingerprint, "threads", (int)p->threads, "want", (int)p->want,     /* */
-			 "leases", (int)p->leases, "connected", now - p->joined, "heard", now - p->last_seen, /* */
-			 "merged", (json_int_t)p->merged, "repeats", (json_int_t)p->repeats,		      /* */
-			 "refused", (json_int_t)p->refused, "failures", (json_int_t)p->failures, "faults",
-			 (json_int_t)p->faults, /* */
-			 "restarts", (json_int_t)p->restarts, "text", p->text);
+	/* clang-format off */
+	return json_pack("{s:I s:s s:s s:s s:i s:i s:i s:f s:f s:I s:I s:I s:I s:I s:I s:s}",
+			 "id", (json_int_t)p->id, "name", p->name, "state", peer_state_name(p->state),
+			 "fingerprint", p->fingerprint, "threads", (int)p->threads, "want", (int)p->want,
+			 "leases", (int)p->leases, "connected", now - p->joined, "heard", now - p->last_seen,
+			 "merged", (json_int_t)p->merged, "repeats", (json_int_t)p->repeats,
+			 "refused", (json_int_t)p->refused, "failures", (json_int_t)p->failures,
+			 "faults", (json_int_t)p->faults, "restarts", (json_int_t)p->restarts, "text", p->text);
+	/* clang-format on */
 }
 
 json_t *view_quarantined_to_json(const struct worker_status *w)
 {
-	return json_pack("{s:s s:s s:s s:I s:I s:s}", "name", w->name, "certificate", w->certificate, "home",
-			 w->home, /* */
+	/* clang-format off */
+	return json_pack("{s:s s:s s:s s:I s:I s:s}",
+			 "name", w->name, "certificate", w->certificate, "home", w->home,
 			 "restarts", (json_int_t)w->restarts, "wrong", (json_int_t)w->wrong, "why", w->text);
+	/* clang-format on */
 }
 
 json_t *view_lease_to_json(const struct lease_status *l, const char *worker, double now)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A job as it is displayed: on the wire (JobStatus), on the status socket (JSON), in the spool (its record). Pure
- * except for memory; the loop's thread.
+ * A job as it is displayed on the wire (JobStatus) and on the status socket (JSON). Pure except for memory; the
+ * loop's thread.
  */
 #ifndef COORDINATOR_LIVE_JOB_VIEW_H
 #define COORDINATOR_LIVE_JOB_VIEW_H
@@ -26,19 +26,21 @@ struct job_view {
 	struct forecast_range halving_cpu, halving_seconds; /* valid if there are estimates */
 };
 
+/* Starts a view with a job's record. */
 void view_of_record(struct job_view *v, const struct job_record *r);
-/* Adds the core's view of a live job to v, whose record has the job's names and times already. */
+/* Adds the core's values of a live job to a view whose record has the job's names and times already. */
 void view_add_status(struct job_view *v, const struct job_status *s);
 
-/* For its owner, who must not learn about other owners' jobs. */
+/* Replaces the texts by those for the owner, who must not learn about other owners' jobs. */
 void view_hide_others(struct job_view *v);
 
 void view_to_wire(const struct job_view *v, Farm__JobStatus *out); /* borrows v's texts */
 struct view_looks {
 	Farm__Look look[FORECAST_LOOKS], *at[FORECAST_LOOKS];
 };
-void view_looks_to_wire(const struct job_view *v, struct view_looks *looks, Farm__JobStatus *out); /* borrows both */
-/* details: also what is long: effects, counters of strategies, classes of paths, estimates. */
+/* Borrows v's texts and `looks`. */
+void view_looks_to_wire(const struct job_view *v, struct view_looks *looks, Farm__JobStatus *out);
+/* details: include the long parts: effects, counters of strategies, classes of paths, estimates. */
 json_t *view_to_json(const struct job_view *v, bool details);
 json_t *view_peer_to_json(const struct peer_status *p, double now);
 json_t *view_quarantined_to_json(const struct worker_status *w);
