@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Chooses which finished jobs are cleared of what. By age: films and results, then records. By space: the films of the
- * job that ended first, before any result; then results in the same order. Pure; any thread.
+ * Chooses what to delete of finished jobs. By age: films and results first, records later. By space: films before any
+ * result, and results only after that; of both, those of the jobs that ended first. Pure; any thread.
  */
 #ifndef COORDINATOR_RETENTION_AGE_H
 #define COORDINATOR_RETENTION_AGE_H
@@ -12,20 +12,23 @@
 
 struct age_job {
 	uint64_t id;
-	double order;			     /* later for each that ended later, whatever became of the observed time */
-	double ended;			     /* s of observed time at that moment (age_clock.h) */
-	uint64_t films, result;		     /* bytes: of what only serves extensions; of result, preview and log */
-	bool busy;			     /* somebody fetches its result: it is kept this time */
-	bool no_films, no_result, no_record; /* the output */
+	double order; /* order of the ends; unlike `ended`, it is right even if observed time has started again */
+	double ended; /* observed time of the end in s (age_clock.h) */
+	/* Bytes of the films, which only serve extensions, and of result, preview and log together. */
+	uint64_t films, result;
+	bool busy;			     /* a client is fetching the result, so it is kept this time */
+	bool no_films, no_result, no_record; /* chosen by age_choose: to be deleted */
 };
 
 struct age_limits {
-	double seconds; /* time after a job's end; 0: forever. Its record is kept AGE_RECORD times as long. */
-	uint64_t bytes; /* limit for all finished jobs; 0: none */
+	/* Time after a job's end until films and result are deleted; 0: never. The record is kept AGE_RECORD times as
+	 * long. */
+	double seconds;
+	uint64_t bytes; /* limit on the files of all finished jobs together; 0: none */
 };
 enum { AGE_RECORD = 10 };
 
-/* Sorts the jobs by their order, the oldest first. now: observed time in s. */
+/* Sorts the jobs by their order, the one that ended first in front, and chooses. now: observed time in s. */
 void age_choose(struct age_job *jobs, size_t count, const struct age_limits *l, double now);
 
 #endif

@@ -8,7 +8,7 @@
 #include <fcntl.h>
 #include <string.h>
 
-static const char note[] = "clock"; /* in the ledger */
+static const char note[] = "clock"; /* name of the note in the ledger */
 
 static struct age_clock read_clocks(void)
 {

@@ -2,14 +2,14 @@
 /*
  * Clears finished jobs, by age and by space.
  *
- * A round starts every hour, and soon after a job has ended and its result was fetched: it reads the records of all
- * ended jobs, lets age.h choose, and clears those one by one. The work is divided into steps of one job; clear_tick
- * does as many as fit into 5 ms. A job is cleared in the order record, files, row, so that a client that asks for its
- * result meanwhile is told when it was deleted.
+ * A round starts every hour, and soon after a job has ended and its result was fetched. It reads the records of all
+ * ended jobs, lets age.h choose, and clears the chosen jobs one by one. The work is divided into steps of one job;
+ * clear_tick does as many as fit into 5 ms. A job is cleared in the order record, files, row, so that a client that
+ * asks for its result meanwhile is told when it was deleted.
  *
- * A job that runs again, or whose result a client fetches, is skipped. If a record cannot be written, the job waits for
- * the next round, and so does one that there is no memory for; where the ledger cannot be read, the round ends with the
- * jobs that it knows, which are the older ones.
+ * A job that runs again, or whose result a client fetches, is skipped. If a record cannot be written, or memory for a
+ * job runs out, the job waits for the next round. If the ledger cannot be read any further, the round goes on with
+ * the jobs read so far, which are the older ones.
  */
 #include "coordinator/retention/clear.h"
 
@@ -29,20 +29,21 @@ enum { RESULTS = sizeof results / sizeof *results };
 
 enum { PIECE = 64 /* rows read or dropped at once */ };
 
-/* The phases: look at all, choose among them, clear the chosen ones. */
+/* A round in progress: it looks at all jobs, chooses among them, and clears the chosen ones. */
 struct clearing {
-	uint64_t ids[PIECE]; /* the next to be looked at; later of records that are to be dropped */
+	/* Ids of the jobs to look at next; in the last phase ids of the records to be dropped. */
+	uint64_t ids[PIECE];
 	size_t id_count, looked;
-	uint64_t last;	  /* id that was looked at */
-	struct list jobs; /* struct age_job: those that have ended */
+	uint64_t last;	  /* id of the job looked at last */
+	struct list jobs; /* struct age_job: the ended jobs looked at */
 	size_t cleared, records;
-	double now;		  /* s since 1970, when it was chosen; 0: not yet */
-	bool whole;		  /* all have been looked at */
-	bool again;		  /* a job that has just ended is being fetched: soon once more */
-	struct job_record record; /* of the current one */
+	double now; /* s since 1970, when the choice was made; 0: not yet */
+	bool whole; /* all jobs have been looked at */
+	bool again; /* the result of a job that ended just now is being fetched: start another round soon */
+	struct job_record record; /* record of the current job */
 };
 
-/* Runs, or is about to run again: its films are being read for an extension. */
+/* Whether the job is live, or about to be: its films are being read for an extension. */
 static bool is_needed(const struct jobs *jobs, uint64_t job)
 {
 	return jobs_find(jobs, job) || jobs_is_read(jobs, job);
@@ -67,7 +68,7 @@ static void clear_if_unneeded(const struct jobs *jobs, struct clearing *c, uint6
 	    !record_is_ended(&c->record))
 		return;
 	double now = ages_now(jobs);
-	if (c->record.ended_seen < 0 || c->record.ended_seen > now) { /* its age is unknown: it counts from now */
+	if (c->record.ended_seen < 0 || c->record.ended_seen > now) { /* its age is unknown and counts from now on */
 		c->record.ended_seen = now;
 		if (ledger_write_record(jobs->ledger, &c->record, NULL))
 			return;
@@ -76,7 +77,7 @@ static void clear_if_unneeded(const struct jobs *jobs, struct clearing *c, uint6
 	c->again |= busy && now - c->record.ended_seen < fresh_seconds;
 	uint64_t films;
 	struct age_job *j = keep_bytes(jobs, id, &films) ? list_push(&c->jobs) : NULL;
-	if (!j) /* the next round may have memory for it, or be able to read it */
+	if (!j) /* no memory, or its folder could not be read: the next round tries again */
 		return;
 	*j = (struct age_job){.id = id,
 			      .order = order,
@@ -86,7 +87,7 @@ static void clear_if_unneeded(const struct jobs *jobs, struct clearing *c, uint6
 			      .busy = busy};
 }
 
-/* Large tables are read piece by piece, as needed: reading all at once takes seconds. */
+/* Looks at the next job. Ids are read piece by piece, because reading a large table at once takes seconds. */
 static void look_at_next(const struct jobs *jobs, struct clearing *c)
 {
 	struct error e;
@@ -94,7 +95,7 @@ static void look_at_next(const struct jobs *jobs, struct clearing *c)
 		c->looked = 0;
 		if (ledger_ended(jobs->ledger, LEDGER_ABOVE, c->last, c->ids, PIECE, &c->id_count, &e)) {
 			log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
-			c->id_count = 0; /* what is known so far is older than what is missing */
+			c->id_count = 0; /* the jobs read so far are older than the missing ones */
 		}
 	}
 	if (c->id_count == 0) {
@@ -105,7 +106,7 @@ static void look_at_next(const struct jobs *jobs, struct clearing *c)
 	clear_if_unneeded(jobs, c, c->last);
 }
 
-/* Many at once, because each change of the database is flushed. */
+/* Drops many rows at once, because each change of the database is flushed. */
 static void drop_rows(struct jobs *jobs, struct clearing *c)
 {
 	struct error e;
@@ -122,7 +123,7 @@ static void drop_result(struct jobs *jobs, const struct age_job *j, struct job_r
 		r->has_result = false;
 		r->cleared = now;
 		if (ledger_write_record(jobs->ledger, r,
-					&e)) { /* the result is kept until its record can say that it is deleted */
+					&e)) { /* keep the result until its record can say that it is deleted */
 			log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)j->id,
 				  log_quote(e.text).text);
 			return;
@@ -139,8 +140,9 @@ static void drop_result(struct jobs *jobs, const struct age_job *j, struct job_r
 		  (unsigned long long)j->result, r->ended);
 }
 
-/* false: some of its folder is left. Without its row that would be taken for the rest of a job that was lost, and the
- * next start would be refused (reconcile.c), so the record stays until the folder is gone. */
+/* Deletes the folder of a job whose record is to be dropped. Returns false if some of the folder is left. Without its
+ * row the rest would look like a job that was lost, and the next start would be refused (reconcile.c), so the record
+ * stays until the folder is gone. */
 static bool drop_record(struct jobs *jobs, const struct age_job *j)
 {
 	struct error e;
@@ -184,7 +186,7 @@ static void choose_jobs(const struct jobs *jobs, struct clearing *c)
 	age_choose(c->jobs.items, c->jobs.count, &limits, ages_now(jobs));
 }
 
-/* false: there are no more. */
+/* Does one step of the round. Returns false if there is nothing left to do. */
 static bool step(struct jobs *jobs, struct clearing *c)
 {
 	if (!c->whole)

@@ -4,8 +4,8 @@
 #include <math.h>
 #include <string.h>
 
-/* Samples or mutations requested, as plan_make counts them; those that are done if there was no such bound, or if it
- * came from a cancelled extension. */
+/* Returns the number of samples or mutations requested for the job so far, counted as by plan_make; or the number
+ * done, if there was no bound on them or it came from a cancelled extension. */
 static uint64_t total_of(const struct plan *p, const struct plan_request *asked, const struct extension_from *from)
 {
 	uint64_t pixels = (uint64_t)p->crop_width * p->crop_height, total = 0, rounds = from->rounds;
@@ -30,7 +30,7 @@ static int more_rounds(const struct plan *p, const struct extension *x, const st
 	return 0;
 }
 
-/* Counts chosen when the plan was made are kept. */
+/* Keeps the counts that were chosen when the plan was made. */
 static void keep_cut(const struct plan *p, struct plan_request *asked)
 {
 #define X(name) asked->name = p->name;
@@ -74,7 +74,7 @@ int extend_plan(const struct plan *p, const struct extension *x, const struct ex
 	if (rc)
 		return rc;
 	if (!samples && from->ended && bounded && from->rounds >= p->rounds)
-		asked->mutations = 0; /* already met */
+		asked->mutations = 0; /* this bound is met, and lifted */
 	asked->seconds = p->seconds;
 	if (time)
 		asked->seconds = (p->seconds > 0 && !from->cut ? p->seconds : from->seconds) + x->seconds;

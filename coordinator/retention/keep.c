@@ -7,8 +7,6 @@
 
 #include <string.h>
 
-/* ---- films ---- */
-
 bool keep_films(const struct jobs *jobs, const struct live_job *job, const struct job_record *r)
 {
 	return jobs->config.keep_bytes && job->canvas && strcmp(r->reason, job_end_name(END_BLACK)) != 0 &&
@@ -40,7 +38,7 @@ void keep_drop(const struct jobs *jobs, uint64_t job)
 		log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)job, log_quote(e.text).text);
 }
 
-/* Films that are being read for an extension stay, as do those whose deletion fails; neither makes room. */
+/* Films that are being read for an extension stay, as do those whose deletion fails; neither counts as deleted. */
 bool keep_drop_all(const struct jobs *jobs)
 {
 	bool any = false;
@@ -57,7 +55,7 @@ bool keep_drop_all(const struct jobs *jobs)
 void keep_trim(const struct jobs *jobs)
 {
 	uint64_t left = jobs->config.keep_bytes;
-	for (size_t i = jobs->ended_count; i-- > 0;) { /* starting with the most recent */
+	for (size_t i = jobs->ended_count; i-- > 0;) { /* starting with the job that ended last */
 		uint64_t bytes;
 		if (!keep_bytes(jobs, jobs->ended[i].id, &bytes))
 			continue;
@@ -68,12 +66,10 @@ void keep_trim(const struct jobs *jobs)
 	}
 }
 
-/* ---- records ---- */
-
 void ended_jobs_add(struct jobs *jobs, const struct job_record *r)
 {
 	if (jobs->ended_count == ENDED_MAX) {
-		keep_drop(jobs, jobs->ended[0].id); /* it leaves the list by which films are counted */
+		keep_drop(jobs, jobs->ended[0].id); /* films are counted by this list, which the job leaves */
 		memmove(jobs->ended, jobs->ended + 1, --jobs->ended_count * sizeof *jobs->ended);
 	}
 	jobs->ended[jobs->ended_count++] = *r;
@@ -96,7 +92,7 @@ void ended_jobs_remove(struct jobs *jobs, uint64_t job)
 
 int ended_jobs_open(struct jobs *jobs, struct error *e)
 {
-	uint64_t ids[ENDED_MAX]; /* the latest first */
+	uint64_t ids[ENDED_MAX]; /* the job that ended last comes first */
 	size_t count;
 	int rc = ledger_ended(jobs->ledger, LEDGER_LAST, UINT64_MAX, ids, ENDED_MAX, &count, e);
 	if (rc)

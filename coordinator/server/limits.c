@@ -9,9 +9,9 @@
 
 enum {
 	OF_JOB = 3,  /* descriptors per job: log, journal, the next journal during a checkpoint */
-	SPARE = 128, /* spool and database, incoming files, readers of the status */
+	SPARE = 128, /* for the spool and database, incoming files, readers of the status */
 	OTHERS = FARM_JOBS * OF_JOB + FETCHES_MOST + SPARE,
-	FEWEST = 16, /* a coordinator needs at least so many connections */
+	FEWEST = 16, /* the fewest connections with which a coordinator is of use */
 };
 
 int limits_connections(unsigned asked, unsigned *connections, struct error *e)

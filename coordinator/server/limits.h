@@ -5,10 +5,12 @@
 
 #include "common/base/error.h"
 
-enum { CONNECTIONS_DEFAULT = 10000, CONNECTIONS_MOST = 1000000, FETCHES_MOST = 128 /* outgoing files */ };
+/* concurrent fetches: files being sent to clients. */
+enum { CONNECTIONS_DEFAULT = 10000, CONNECTIONS_MOST = 1000000, FETCHES_MOST = 128 };
 
-/* Raises the process's limit of file descriptors as far as the system allows. asked 0: the default, or as many as
- * there are descriptors for. -EINVAL: more are requested than that. */
+/* Raises the process's limit on file descriptors as far as needed and possible, and returns the number of connections
+ * in *connections. asked: the number requested; 0: the default, or fewer if there are not enough descriptors. Returns
+ * -EINVAL if the descriptors do not suffice for the requested number. */
 int limits_connections(unsigned asked, unsigned *connections, struct error *e);
 
 #endif

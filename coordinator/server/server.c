@@ -4,12 +4,12 @@
  *
  * server_open opens the jobs, which starts to read those of the last run (recovery.h), and listens. From then on
  * sockets, timers and the thread pool drive everything: messages of peers become events for the core (step.h). Five
- * times a second a timer drives everything else: status, retries, checkpoints, retention, the service manager's
+ * times a second a timer drives all periodic work: status, retries, checkpoints, retention, the service manager's
  * watchdog.
  *
- * SIGTERM and SIGINT stop the loop when the work in the thread pool has ended; nothing needs to be written then,
- * because everything acknowledged is on disk. Errors of one job hold or end that job. A fault that makes the spool
- * unreadable stops the coordinator with a message (server_run returns it).
+ * SIGTERM and SIGINT stop the loop as soon as the work in the thread pool has ended; nothing needs to be written
+ * then, because everything acknowledged is on disk. Errors of one job hold or end that job. A fault that makes the
+ * spool unusable stops the coordinator with a message (server_run returns it).
  */
 #include "coordinator/server/server.h"
 
@@ -28,8 +28,6 @@
 
 enum { BACKLOG = 4096 };
 
-/* ---- start ---- */
-
 static void on_connection(uv_stream_t *listener, int status)
 {
 	struct server *s = listener->data;
@@ -44,7 +42,8 @@ static int write_port(const char *path, unsigned port, struct error *e)
 	return disk_replace(path, text, (size_t)n, 0644, e);
 }
 
-/* Port 0: bound to a free one, which `a` has afterwards. Not 0: a code of libuv. */
+/* Listens at one address. With port 0 it binds to a free port, which `a` contains afterwards. Returns 0 or an error
+ * code of libuv. */
 static int listen_at(struct server *s, struct net_addr *a)
 {
 	uv_tcp_t *l = &s->peers.listeners[s->peers.listener_count++].tcp;
@@ -64,8 +63,8 @@ static int listen_at(struct server *s, struct net_addr *a)
 	return 0;
 }
 
-/* At all addresses of the name, with one port. Those that this machine does not have (::1 without IPv6) are left out if
- * it has others. */
+/* Listens at all addresses of the name, with the same port. Addresses that this machine does not have (::1 without
+ * IPv6) are left out, provided that it has another one. */
 static int start_listening(struct server *s, struct error *e)
 {
 	const char *where = s->jobs.config.listen;
@@ -106,7 +105,7 @@ static int open_tls(struct server *s, struct error *e)
 			 s->jobs.config.tls, self->name, tls_role_name(self->role));
 }
 
-/* A new revocation list or certificate is used within a second. */
+/* Looks for a changed certificate or revocation list once a second, and logs warnings about their expiry. */
 static void refresh_tls(struct server *s)
 {
 	struct error e;
@@ -123,7 +122,8 @@ static void refresh_tls(struct server *s)
 		log_event(LOG_TLS_EXPIRY, "text=%s", log_quote(text).text);
 }
 
-/* Everything that arrived before the loop polled its sockets has been read after this. */
+/* Called before the loop polls its sockets. After on_read, which is called behind the poll, everything that had
+ * arrived by then has been read. */
 static void on_look(uv_prepare_t *h)
 {
 	struct server *s = h->data;
@@ -150,7 +150,7 @@ static void on_tick(uv_timer_t *t)
 	}
 }
 
-/* Nothing new is started; the loop ends when running work has ended. */
+/* Stops accepting work. The loop ends when the running work has ended. */
 static void stop(void *server)
 {
 	struct server *s = server;

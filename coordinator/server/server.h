@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The coordinator: jobs, connections and status on one loop and one thread; heavy work on films runs in the pool.
- * server_run returns when a signal has stopped it.
+ * The coordinator: jobs, connections and status on one loop in one thread; heavy work on films runs in the thread
+ * pool. server_run returns when a signal has stopped it.
  */
 #ifndef COORDINATOR_SERVER_SERVER_H
 #define COORDINATOR_SERVER_SERVER_H
@@ -9,9 +9,10 @@
 #include "coordinator/live_job/jobs.h"
 #include "coordinator/peers/peers.h"
 
+/* Runs the coordinator until SIGTERM, SIGINT or a fault. Returns 0 or the error. */
 int server_run(const struct server_config *c, struct error *e);
 
-/* ---- for callers that run its loop themselves ---- */
+/* The rest is for callers that run the loop themselves. */
 
 struct status_socket;
 
@@ -25,14 +26,15 @@ struct server {
 	struct jobs jobs;
 	struct peers peers;
 	struct status_socket *status;
-	double tls_next; /* next check of its files */
+	double tls_next; /* next check of the TLS files */
 	double watchdog,
-		watchdog_next; /* the service manager's watchdog interval (0: none), and when to notify it next */
+		/* Interval in s of the service manager's watchdog (0: none), and when to notify it next. */
+		watchdog_next;
 };
 
-/* Starts to listen; the loop reads the jobs of an earlier run (recovery.h). */
+/* Starts to listen, and to read the jobs of an earlier run, which the loop continues (recovery.h). */
 int server_open(struct server **s, const struct server_config *c, struct error *e);
-int server_await_jobs(struct server *s, struct error *e); /* runs the loop until they have been read */
-void server_close(struct server *s);			  /* stops it, unless a signal has */
+int server_await_jobs(struct server *s, struct error *e); /* runs the loop until those jobs have been read */
+void server_close(struct server *s); /* stops the coordinator, unless a signal has done so, and frees it */
 
 #endif

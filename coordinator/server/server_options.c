@@ -92,7 +92,7 @@ const struct program server_program = {
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 };
 
-/* A quarter of the memory that this process may use. */
+/* Returns a quarter of the memory that this process may use. */
 static uint64_t quarter_of_memory(void)
 {
 	uint64_t all = uv_get_total_memory(), ours = uv_get_constrained_memory();

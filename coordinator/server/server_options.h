@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* hslt-coordinator's options: rows that fill in a struct server_config. */
+/* hslt-coordinator's options, which fill in a struct server_config. */
 #ifndef COORDINATOR_SERVER_SERVER_OPTIONS_H
 #define COORDINATOR_SERVER_SERVER_OPTIONS_H
 
@@ -8,7 +8,7 @@
 
 extern const struct program server_program;
 
-/* Sets the defaults of all options, and fields without option. */
+/* Sets all options to their defaults, and the fields that have no option. */
 void server_config_init(struct server_config *c);
 
 #endif
