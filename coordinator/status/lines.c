@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Snapshots go to every reader on every change, so an ended job is in them without its details, and only if it is among
- * the last that ended. The details are sent for the one job that a reader asks for, and the jobs that ended earlier by
- * the page.
+ * Lines of the status socket about jobs.
+ *
+ * Every reader gets a snapshot at every change, so snapshots contain ended jobs without their details, and only those
+ * that ended last. Details are sent for the one job that a reader asks for; jobs that ended earlier are sent in
+ * pages.
  */
 #include "coordinator/status/lines.h"
 
@@ -24,7 +26,7 @@ json_t *line_error(const char *text)
 	return o;
 }
 
-/* "j12"; 0: not the name of a job */
+/* Returns the id in a name such as "j12"; 0: not the name of a job. */
 static uint64_t id_of(const char *name)
 {
 	char *end;
@@ -51,10 +53,10 @@ json_t *line_job(struct jobs *jobs, const char *name)
 
 json_t *line_ended(struct jobs *jobs, const char *before)
 {
-	enum { ONE_MORE = LINES_ENDED + 1 }; /* which says that there is another page */
+	enum { ONE_MORE = LINES_ENDED + 1 }; /* one more than a page, to know whether there is another page */
 	struct error e;
 	struct job_view v;
-	uint64_t ids[ONE_MORE]; /* the latest first */
+	uint64_t ids[ONE_MORE]; /* in descending order */
 	size_t count;
 	if (ledger_ended(jobs->ledger, LEDGER_BELOW, before ? id_of(before) : UINT64_MAX, ids, ONE_MORE, &count, &e))
 		return line_error(e.text);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Lines of the status socket about jobs, as JSON; NULL if memory is out. The loop's thread. */
+/* Lines of the status socket about jobs, as JSON; NULL if memory runs out. The loop's thread. */
 #ifndef COORDINATOR_STATUS_LINES_H
 #define COORDINATOR_STATUS_LINES_H
 
@@ -7,12 +7,13 @@
 
 #include <jansson.h>
 
-enum { LINES_ENDED = 50 /* ended jobs in a snapshot, or on a page of them */ };
+enum { LINES_ENDED = 50 /* ended jobs in a snapshot, or on one page */ };
 
-json_t *line_object(const char *type); /* with schema, type and time */
+json_t *line_object(const char *type); /* an object with schema, type and time */
 json_t *line_error(const char *text);
 json_t *line_job(struct jobs *jobs, const char *name); /* one job with its details, or an error; name: "j12" */
-/* A page: the last LINES_ENDED ended jobs whose ids are below that of the name, without details; NULL: of all. */
+/* A page: the LINES_ENDED ended jobs with the highest ids below that of `before`, without details; before NULL: the
+ * first page. */
 json_t *line_ended(struct jobs *jobs, const char *before);
 
 #endif

@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
+ * Snapshots of the farm for the status socket.
+ *
  * snapshot_take copies numbers and texts: jobs as views, workers and their leases as the core and their sessions have
- * them. What is rare or short (TLS, quarantined workers) is JSON from the beginning. What no memory was found for is
- * missing as a whole.
+ * them. What is rare or short (TLS, quarantined workers) is made into JSON at once. If memory runs out for the
+ * workers there is no snapshot; if it runs out for jobs or JSON, these are missing.
  */
 #include "coordinator/status/snapshot.h"
 
@@ -15,29 +17,30 @@
 #include "coordinator/status/lines.h"
 
 struct shown_worker {
-	struct peer_status peer; /* its texts are these: */
+	struct peer_status peer; /* its name and fingerprint are in the arrays that follow */
 	char name[128], fingerprint[256];
-	char certificate[sizeof((struct tls_peer *)0)->name]; /* "": none */
+	char certificate[sizeof((struct tls_peer *)0)->name]; /* name in the certificate; "": none */
 	int64_t until;
-	char warning[192]; /* about its certificate; "": none */
+	char warning[192]; /* about the certificate; "": none */
 	uint32_t leases;
 };
 
 struct snapshot {
-	double wall, now; /* s of the wall clock, and of the jobs' */
+	double wall, now; /* s of the wall clock, and of jobs_now */
 	struct job_view *jobs;
 	size_t job_count;
 	uint64_t ended_others;
 	struct list workers; /* struct shown_worker */
-	struct list leases;  /* struct lease_status: the first worker's, then the second one's, ... */
+	/* struct lease_status: those of the first worker, then those of the second one, and so on. */
+	struct list leases;
 	json_t *quarantined, *tls;
 	uint64_t garbled;
-	double reading; /* -1: the jobs have been read */
+	double reading; /* fraction read of the jobs of an earlier run; -1: all have been read */
 };
 
-/* ---- on the loop's thread ---- */
+/* The following functions run in the loop's thread. */
 
-/* The state of a worker's certificate, and whether it must be renewed. */
+/* Copies the state of a worker's certificate, and a warning if it must be renewed. */
 static void take_certificate(const struct peers *s, struct shown_worker *w)
 {
 	const struct session *p = s->tls ? peers_find(s, w->peer.id) : NULL;
@@ -80,7 +83,7 @@ static void take_jobs(struct snapshot *n, struct jobs *jobs)
 	n->ended_others = ended > shown ? ended - shown : 0;
 }
 
-/* Connected or not. */
+/* Lists quarantined workers, connected or not. */
 static json_t *quarantined_json(const struct peers *s)
 {
 	json_t *list = json_array();
@@ -135,7 +138,7 @@ void snapshot_free(struct snapshot *n)
 	mem_free(n);
 }
 
-/* ---- on any ---- */
+/* The following functions may run in any thread. */
 
 static json_t *worker_json(const struct shown_worker *w, double now)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What a snapshot of the farm says: copied on the loop's thread, which takes a few milliseconds for a thousand workers,
+ * A snapshot of the farm. It is copied on the loop's thread, which takes a few milliseconds for a thousand workers,
  * and made into JSON by any thread, which takes ten times as long.
  */
 #ifndef COORDINATOR_STATUS_SNAPSHOT_H
@@ -12,9 +12,9 @@
 
 struct snapshot;
 
-struct snapshot *snapshot_take(const struct peers *s); /* NULL: no memory */
+struct snapshot *snapshot_take(const struct peers *s); /* NULL: out of memory */
 void snapshot_free(struct snapshot *n);
-/* The loop's thread or another one; one at a time. NULL: no memory. */
+/* Any thread, one at a time. NULL: out of memory. */
 json_t *snapshot_to_json(const struct snapshot *n);
 json_t *snapshot_workers_to_json(const struct snapshot *n); /* a line of type "workers" */
 

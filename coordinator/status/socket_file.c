@@ -11,7 +11,8 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-/* A socket on which nobody listens is left over from an earlier run; anything else is in use. */
+/* Removes a socket left over from an earlier run, on which nobody listens. Anything else at the path is in use, and
+ * an error. */
 static int remove_stale(const char *path, const struct sockaddr_un *a, struct error *e)
 {
 	struct stat st;
@@ -28,12 +29,13 @@ static int remove_stale(const char *path, const struct sockaddr_un *a, struct er
 		return 0;
 	if (fault == EACCES || fault == EPROTOTYPE)
 		return error_set(e, fault, "%s: the socket of another user: %s", path, strerror(fault));
-	if (fault != ECONNREFUSED) /* EAGAIN: its backlog is full */
+	if (fault != ECONNREFUSED) /* includes EAGAIN: its backlog is full */
 		return error_set(e, EADDRINUSE, "%s: another program answers there", path);
 	return unlink(path) ? error_file(e, errno, path) : 0;
 }
 
-/* Through a descriptor of the file that we created: the name may refer to another one by now. */
+/* Gives the socket to the group, through a descriptor of the file that we created, because the name may refer to
+ * another file by now. */
 static int give_to_group(const char *path, gid_t group, struct error *e)
 {
 	char itself[64];
@@ -62,8 +64,9 @@ static int find_group(const char *name, gid_t *group, struct error *e)
 	return 0;
 }
 
-/* libuv would remove the file when it closes, and by then it may be another's; and the umask is the whole process's,
- * whose other threads make files: a socket's file gets its descriptor's mode. */
+/* The socket is bound here and not by libuv, which would remove the file when it closes, when it may already be
+ * another's. The file gets its mode from the descriptor and not from the umask, which belongs to the whole process,
+ * whose other threads create files. */
 int socket_file_open(struct socket_file *f, struct error *e)
 {
 	struct sockaddr_un a = {.sun_family = AF_UNIX};

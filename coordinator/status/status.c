@@ -2,17 +2,19 @@
 /*
  * The status socket: lines of JSON for every reader.
  *
- * A reader gets a snapshot first, and then what it subscribes to: jobs, workers, or the snapshot. status_tick compares
+ * A reader gets a snapshot first, and then what it subscribes to: jobs, workers, or snapshots. status_tick compares
  * each job with what was last sent about it and sends only changes; nothing is done while nobody is subscribed. A
- * thread makes the text of snapshots, one at a time, and until it is sent nothing else is. A socket's file that is
- * removed is made anew within a second. At the end it is removed if it is still the same.
+ * thread makes the text of snapshots, one at a time, and nothing else is sent until that text has been. If the
+ * socket's file is removed, it is made anew within a second. When the coordinator stops, the file is removed if it is
+ * still the same.
  *
- * A reader that has not read all lines when something changes gets no more of them, but one snapshot at the first tick
- * after it has read: the newest. So at most the lines of one moment wait for it. What waits for all readers counts with
- * what waits for all connections (common/net/send_pool.h): beyond the limit those are dropped that do not read. A line
- * that is neither a subscription nor a question is answered by an error. A reader is dropped if its line is too long,
- * or if it asks and does not read the answers. A path where somebody answers is -EADDRINUSE; a file that is not a
- * socket is never removed.
+ * If a reader has not read all lines when something changes, it gets no more of them, but one snapshot, the newest,
+ * at the first tick after it has read everything. So at most the lines of one moment wait for it. The bytes that wait
+ * for readers count together with those that wait for all connections (common/net/send_pool.h): beyond the limit,
+ * readers and peers that do not read are disconnected. A line that is neither a subscription nor a question is
+ * answered by an error. A reader is disconnected if its line is too long, or if it asks and does not read the
+ * answers. If somebody answers at the path already, opening fails with -EADDRINUSE; a file that is not a socket is
+ * never removed.
  */
 #include "coordinator/status/status.h"
 
@@ -41,56 +43,59 @@ struct reader {
 	uv_pipe_t pipe;
 	unsigned topics;
 	bool closing;
-	bool heard;    /* it has got its first snapshot, and what it says is read */
-	bool behind;   /* something changed while lines were waiting for it: it gets a snapshot once it has read them */
-	size_t unread; /* bytes of answers that wait for it */
+	bool heard; /* it has been sent its first snapshot; only then are its lines read */
+	/* Something changed while lines were waiting for this reader: it gets a snapshot once it has read them. */
+	bool behind;
+	size_t unread; /* bytes of answers that wait for this reader */
 	struct send_share share;
 	size_t line_size;
 	char line[LINE_BYTES];
 };
 
-/* A snapshot that another thread makes, and the workers' line. Not one of the pool's: those may all wait for a disk,
- * and the status has to say so. */
+/* A snapshot that a thread makes into text, together with the workers' line. The thread is not one of the pool's: all
+ * of those may be waiting for a disk, and the status has to be able to say so. */
 struct snapshot_task {
 	uv_thread_t thread;
 	uv_async_t done;
 	bool threaded;
-	struct status_socket *socket; /* NULL: it has been closed */
+	struct status_socket *socket; /* NULL: the socket has been closed */
 	struct snapshot *snapshot;
-	unsigned changed;		/* topics */
-	bool for_some;			/* somebody gets a snapshot */
-	struct shared *whole, *workers; /* NULL: not made */
+	unsigned changed;		/* topics of which there is news */
+	bool for_some;			/* some reader needs the snapshot */
+	struct shared *whole, *workers; /* their texts; NULL: not needed, or out of memory */
 };
 
 struct status_socket {
 	struct peers *peers;
 	struct jobs *jobs;
-	uv_pipe_t *listener;	     /* NULL: there is none for now; its data is the socket, NULL once that is closed */
-	LIST_HEAD(, reader) readers; /* with those that are being closed */
-	unsigned reader_count;	     /* without */
+	/* NULL: none at the moment. Its data is the status socket, or NULL once the listener is being closed. */
+	uv_pipe_t *listener;
+	LIST_HEAD(, reader) readers; /* including those that are being closed */
+	unsigned reader_count;	     /* readers not being closed */
 	bool caller_waits;
-	struct snapshot_task *making; /* NULL: none; meanwhile nothing else is published */
-	bool tick_waits;	      /* a tick found one: it is the next one's turn, before those who have just come */
-	struct job_view *shown;	      /* the jobs as last sent to subscribers */
+	/* NULL: none. Nothing else is published while it is being made. */
+	struct snapshot_task *making;
+	/* A tick found a snapshot being made: the next one is made by a tick, before the first snapshots of new
+	 * readers. */
+	bool tick_waits;
+	struct job_view *shown; /* jobs as last sent to subscribers */
 	size_t shown_count;
-	uint64_t shown_changes; /* state of the jobs at the last tick */
-	char *path;		/* NULL: inherited */
-	char *group;		/* that may connect; NULL: none */
+	uint64_t shown_changes; /* jobs.changes at the last tick that published */
+	char *path;		/* NULL: the socket was inherited */
+	char *group;		/* group that may connect; NULL: none */
 	struct socket_file file;
-	double looked; /* jobs' s: when the file was last looked for */
-	bool reported; /* that it cannot be made anew, or that another one is there */
+	double looked; /* s of jobs_now: when the file was last checked */
+	bool reported; /* a fault of the file has been logged: it cannot be made anew, or another file is at its path */
 };
 
-/* ---- writing ---- */
-
-/* A line for several readers: its text is made once. */
+/* A line for several readers, whose text is made once; reference-counted. */
 struct shared {
 	unsigned holders;
 	size_t size;
 	char *text; /* allocated by jansson */
 };
 
-/* Takes the object. NULL: no memory. */
+/* Takes over the reference to o. Returns NULL if out of memory. */
 static struct shared *share_text(json_t *o)
 {
 	char *text = json_dumps(o, JSON_COMPACT);
@@ -113,8 +118,8 @@ static void release(struct shared *l)
 
 struct sending {
 	uv_write_t request;
-	struct shared *line; /* held */
-	bool answer;	     /* to a line of the reader's */
+	struct shared *line; /* a reference */
+	bool answer;	     /* an answer to a line of the reader's */
 };
 
 static void on_reader_closed(uv_handle_t *h)
@@ -167,7 +172,8 @@ static void on_written(uv_write_t *w, int status)
 		drop_reader(r);
 }
 
-/* At most one tick's lines about changes wait for a reader (status_tick); answers are bounded here. */
+/* Sends a line. At most one tick's lines about changes wait for a reader (see status_tick); the size of waiting
+ * answers is bounded here. */
 static void send_line(struct reader *r, struct shared *l, bool answer)
 {
 	struct sending *s = l ? mem_alloc(1, sizeof *s) : NULL;
@@ -193,7 +199,7 @@ static void send_line(struct reader *r, struct shared *l, bool answer)
 	send_pool_look(&r->share, loop_ms(r));
 }
 
-/* Takes the object. */
+/* Takes over the reference to o. */
 static void send_object(struct reader *r, json_t *o, bool answer)
 {
 	struct shared *l = share_text(o);
@@ -205,8 +211,6 @@ static void send_answer(struct reader *r, json_t *o)
 {
 	send_object(r, o, true);
 }
-
-/* ---- reading ---- */
 
 static void set_subscription(struct reader *r, const json_t *list)
 {
@@ -283,7 +287,7 @@ static void on_connection(uv_stream_t *listener, int status)
 	if (!t)
 		return;
 	struct reader *r = status ? NULL : mem_alloc(1, sizeof *r);
-	t->caller_waits = !r && !status; /* and blocks all other readers until it is accepted */
+	t->caller_waits = !r && !status; /* until it is accepted, it blocks all other readers */
 	if (!r)
 		return;
 	uv_pipe_init(listener->loop, &r->pipe, 0);
@@ -296,9 +300,11 @@ static void on_connection(uv_stream_t *listener, int status)
 		drop_reader(r);
 		return;
 	}
-	int room = KERNEL_BYTES; /* some systems would hold hundreds of snapshots that are old when they are read */
+	/* Some systems would otherwise buffer hundreds of snapshots, which are old when they are read. */
+	int room = KERNEL_BYTES;
 	uv_send_buffer_size((uv_handle_t *)&r->pipe, &room);
-	if (t->reader_count > READERS_MAX) { /* the kernel takes the line at once */
+	/* The line fits into the kernel's buffer, so it is sent before the reader is dropped. */
+	if (t->reader_count > READERS_MAX) {
 		send_answer(r, line_error("the status has too many readers: 64 others are connected to its socket"));
 		drop_reader(r);
 		return;
@@ -307,8 +313,6 @@ static void on_connection(uv_stream_t *listener, int status)
 	if (!t->tick_waits)
 		begin_making(t, 0);
 }
-
-/* ---- changes ---- */
 
 static const struct job_view *shown_before(const struct status_socket *t, uint64_t id)
 {
@@ -372,9 +376,9 @@ static void making_done(uv_async_t *done)
 	uv_close((uv_handle_t *)done, on_making_closed);
 }
 
-/* A snapshot goes to those who subscribed to it, if something changed, and those who were behind and have read: one for
- * all, because it takes tens of milliseconds to make where there are a thousand workers. changed: the topics of which
- * there is news. */
+/* Begins to make a snapshot if a reader needs one: those subscribed to snapshots if something changed, and those that
+ * were behind and have read everything. One snapshot serves all, because making it takes tens of milliseconds with a
+ * thousand workers. changed: topics of which there is news. */
 static void begin_making(struct status_socket *t, unsigned changed)
 {
 	bool some = false, workers = false;
@@ -386,7 +390,7 @@ static void begin_making(struct status_socket *t, unsigned changed)
 		return;
 	struct snapshot_task *m = mem_alloc(1, sizeof *m);
 	struct snapshot *n = m ? snapshot_take(t->peers) : NULL;
-	if (!n) { /* those that are behind stay so, and the others become so */
+	if (!n) { /* every reader that should have been sent something is behind now */
 		for (struct reader *r = LIST_FIRST(&t->readers); r; r = LIST_NEXT(r, next))
 			r->behind = r->behind || changed & r->topics;
 		mem_free(m);
@@ -401,7 +405,7 @@ static void begin_making(struct status_socket *t, unsigned changed)
 		run_making(m);
 }
 
-/* Jobs that have changed. */
+/* Sends the jobs that have changed to their subscribers. */
 static void publish_changes(struct status_socket *t)
 {
 	struct job_view *views;
@@ -420,8 +424,6 @@ static void publish_changes(struct status_socket *t)
 	t->shown_count = count;
 }
 
-/* ---- start and end ---- */
-
 static void on_listener_closed(uv_handle_t *h)
 {
 	mem_free(h);
@@ -436,7 +438,7 @@ static void close_listener(struct status_socket *t)
 	t->listener = NULL;
 }
 
-/* fd: a socket that is bound, which is taken. */
+/* Listens on fd, a bound socket, which belongs to the listener or is closed afterwards. */
 static int listen_on(struct status_socket *t, int fd, struct error *e)
 {
 	const char *what = t->path ? t->path : "inherited status socket";
@@ -465,7 +467,7 @@ static void report(const struct status_socket *t, const char *text)
 	log_event(LOG_STATUS_SOCKET, "path=%s text=%s", log_quote(t->path).text, log_quote(text).text);
 }
 
-/* A fault that lasts is found again at every look. */
+/* Logs a fault once, although every check finds it again. */
 static void report_once(struct status_socket *t, const char *text)
 {
 	if (!t->reported)
@@ -473,9 +475,9 @@ static void report_once(struct status_socket *t, const char *text)
 	t->reported = true;
 }
 
-/* The socket's file may be removed while the coordinator runs: by whoever clears old files away, or by hand. Nobody
- * could connect then until a restart, so it is made anew; those that are connected stay so. What somebody else has put
- * there is theirs. */
+/* Checks the socket's file. It may be removed while the coordinator runs, by a program that clears old files away or
+ * by hand. Nobody could connect then until a restart, so it is made anew; existing connections stay. A file that
+ * somebody else has put there is left alone. */
 static void look_for_file(struct status_socket *t)
 {
 	struct error e;
@@ -491,7 +493,7 @@ static void look_for_file(struct status_socket *t)
 		return;
 	int fd = socket_file_open(&t->file, &e), rc = fd < 0 ? fd : listen_on(t, fd, &e);
 	if (rc) {
-		socket_file_remove(&t->file); /* the file may still exist, although no socket listens on it */
+		socket_file_remove(&t->file); /* the file may exist although no socket listens on it */
 		error_prefix(&e, rc, "the status socket's file was removed, and cannot be made anew yet");
 		report_once(t, e.text);
 		return;
@@ -509,7 +511,7 @@ void status_tick(struct status_socket *t)
 	if (t->caller_waits && t->listener)
 		on_connection((uv_stream_t *)t->listener, 0);
 	t->tick_waits = t->making;
-	if (t->making) /* what has changed is seen after it has been sent: lines that are newer do not come before it */
+	if (t->making) /* changes are looked for after the snapshot has been sent, so that no newer line precedes it */
 		return;
 	for (struct reader *r = LIST_FIRST(&t->readers); r; r = LIST_NEXT(r, next))
 		topics |= r->topics;
