@@ -2,15 +2,15 @@
 /*
  * Checkpoints: films, seeds, chain states and counters of a job in one file, so that its journal can start over.
  *
- * checkpoint_where_due starts one when a job's journal has grown beyond the last checkpoint or a minimum (room.h), one
- * job at a time. The thread pool writes the next journal (with the last results of each group and part, which may still
- * be taken back), then checkpoint.tmp, syncs it, renames it to checkpoint and syncs the folder. Results that arrive
- * meanwhile wait in memory. Then the new journal is used and older ones are deleted.
+ * checkpoint_where_due starts a checkpoint when a job's journal has grown beyond the limit of room_for_journal, one
+ * job at a time. The thread pool writes the next journal (with the last results of each group and part, which may
+ * still have to be taken back), then checkpoint.tmp, flushes it, renames it to checkpoint and flushes the folder.
+ * Results that arrive meanwhile wait in memory. Then the new journal is used and older ones are deleted.
  *
- * If writing fails, the old checkpoint and journal stay in use, and another attempt follows after a pause. If only the
- * sync of the folder fails, it is unknown which of the two pairs a crash would leave; both contain everything
- * acknowledged, and the job is held until a checkpoint succeeds. A checkpoint that is damaged when it is read makes its
- * job start over.
+ * If writing fails, the old checkpoint and journal stay in use, and another attempt follows after a pause. If only
+ * the flush of the folder fails, it is unknown which of the two pairs a crash would leave; both contain everything
+ * acknowledged, and the job is held until a checkpoint succeeds. A checkpoint that is damaged when it is read makes
+ * its job start over.
  */
 #include "coordinator/jobs/checkpoint.h"
 
@@ -35,11 +35,11 @@ struct writing {
 	struct journal *journal; /* the next journal */
 	struct checkpoint_head head;
 	uint64_t bytes, kept_most;
-	struct merged_record *merged; /* in the next journal */
+	struct merged_record *merged; /* records copied into the next journal */
 	size_t merged_count;
 	char folder[SPOOL_PATH_MAX];
 	int rc;
-	bool unsure; /* it was renamed, but perhaps not durably */
+	bool unsure; /* the checkpoint was renamed, but perhaps not durably */
 	struct error error;
 };
 
@@ -75,7 +75,7 @@ static void write_checkpoint(uv_work_t *work)
 	}
 }
 
-/* Closing and unlinking a journal of hundreds of megabytes takes as many milliseconds, so the pool does it. */
+/* Closing and deleting a journal of hundreds of megabytes takes hundreds of milliseconds, so the pool does it. */
 struct tidying {
 	uv_work_t work;
 	struct jobs *jobs;
@@ -87,7 +87,7 @@ struct tidying {
 static void run_tidy(uv_work_t *work)
 {
 	struct tidying *t = work->data;
-	journal_release(t->old); /* also referenced by answers that wait for its flush */
+	journal_release(t->old); /* acknowledgements that wait for its flush also hold references */
 	journal_clear(t->folder, t->keep);
 }
 
@@ -95,11 +95,11 @@ static void on_tidied(uv_work_t *work, int status)
 {
 	struct tidying *t = work->data;
 	(void)status;
-	t->jobs->checkpointing = false; /* late, so that no younger journal is in the way */
+	t->jobs->checkpointing = false; /* not earlier, so that journal_clear cannot meet a newer journal */
 	mem_free(t);
 }
 
-/* Deletes the journals before `keep`. */
+/* Deletes all journals but that of generation `keep`. */
 static void delete_old_journals(struct jobs *jobs, struct journal *old, const char *folder, uint64_t keep)
 {
 	struct tidying *t = mem_alloc(1, sizeof *t);
@@ -122,12 +122,12 @@ static void checkpoint_written(uv_work_t *work, int status)
 	uint64_t id = job->id;
 	assert(status == 0);
 	(void)status;
-	if (w->rc && (w->unsure || job->unsure)) { /* this checkpoint with its journal, or the old pair: both contain
-						      everything acknowledged */
+	/* A crash may leave this checkpoint with its journal, or the old pair; both contain everything acknowledged. */
+	if (w->rc && (w->unsure || job->unsure)) {
 		job->unsure = true;
 		job->generation_least = w->head.generation + 1;
 		job->checkpoint_after = jobs_now(jobs) + jobs->config.retry_seconds;
-	} else if (w->rc) { /* the old pair stays in use */
+	} else if (w->rc) { /* the old checkpoint and journal stay in use */
 		live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
 		bool room = disk_is_full(w->rc) && room_make(jobs);
 		job->checkpoint_after = jobs_now(jobs) + (room ? jobs->config.retry_seconds : pause_seconds);
@@ -150,9 +150,9 @@ static void checkpoint_written(uv_work_t *work, int status)
 	mem_free(w->merged);
 	job->busy = false;
 	jobs->checkpointing = jobs->checkpointing && !w->rc;
+	/* This ends the job at once if it was cancelled. */
 	if (!jobs->stopping && job->unsure)
-		durable_hold(jobs, job, "its results cannot be stored",
-			     w->error.text); /* which ends it, if it was cancelled */
+		durable_hold(jobs, job, "its results cannot be stored", w->error.text);
 	if (!jobs->stopping) {
 		jobs_films_free(jobs);
 		jobs->peers.films_free(jobs->peers.user, id);
@@ -160,7 +160,7 @@ static void checkpoint_written(uv_work_t *work, int status)
 	mem_free(w);
 }
 
-/* most: as room_for_journal. */
+/* Starts a checkpoint. most: limit on the bytes of results copied into the next journal. */
 static void start(struct jobs *jobs, struct live_job *job, uint64_t most)
 {
 	struct job_status status;
@@ -181,15 +181,15 @@ static void start(struct jobs *jobs, struct live_job *job, uint64_t most)
 
 void checkpoint_where_due(struct jobs *jobs)
 {
-	if (jobs->stepping || jobs->stopping ||
-	    jobs->checkpointing) /* one at a time: meanwhile results of its job wait in memory */
+	/* One at a time, because the results of its job wait in memory meanwhile. */
+	if (jobs->stepping || jobs->stopping || jobs->checkpointing)
 		return;
 	const bool ample = room_is_ample(jobs);
 	for (struct live_job *job = jobs->live; job; job = job->next) {
-		if (!job->canvas || job->busy || job->ended ||
-		    job->late_count) /* stored results that wait are only in the journal */
+		/* Stored results that wait (late.h) exist only in the journal. */
+		if (!job->canvas || job->busy || job->ended || job->late_count)
 			continue;
-		if (canvas_missing(job->canvas)) /* a taken-back batch is being computed again */
+		if (canvas_missing(job->canvas)) /* a batch that was taken back is being computed again */
 			continue;
 		uint64_t limit = room_for_journal(jobs, job, ample);
 		if ((journal_bytes(job->journal) - job->kept_bytes > limit || job->unsure) &&

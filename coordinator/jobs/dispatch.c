@@ -3,12 +3,13 @@
  * Carries out the core's answer to an event, action by action: sends leases, revocations and acknowledgements, merges
  * results, prepares jobs after their bootstrap, starts publishing, records changes of state.
  *
- * A result that the core wants merged is first appended to the job's journal (durable_merged), then added to its films;
- * its acknowledgement waits for the flush (durable_ack). A job that the core has ended is finished later (finish.c).
+ * A result that the core wants merged is first appended to the job's journal (durable_merged), then added to its
+ * films; its acknowledgement waits for the flush (durable_ack). A job that the core has ended is finished later
+ * (finish.c).
  *
- * If memory runs out while a result is merged, the process exits: the films may contain half of it, nobody was told
- * that it is stored, and the next start takes it from the journal or computes it again. Any other failure of a merge
- * ends the job. A job that cannot be prepared because the disk is full is tried again.
+ * If memory runs out while a result is merged, the process exits: the films may contain half of the result, and
+ * nobody was told that it is stored. The next start takes it from the journal or has it computed again. Any other
+ * failure of a merge ends the job. A job that cannot be prepared because the disk is full is tried again.
  */
 #include "coordinator/jobs/dispatch.h"
 
@@ -29,13 +30,12 @@
 #include <string.h>
 #include <unistd.h>
 
-/* ---- jobs ---- */
-
-/* After an error nothing is left of it, and the submission is still `from`'s. */
+/* Stores a new job: id, folder, live job, row. After an error nothing is left, and the submission still belongs to
+ * `from`. */
 static int store_submission(struct jobs *jobs, uint64_t id, const struct submission *from, struct live_job **job,
 			    struct error *e)
 {
-	int rc = ledger_skip_ids(jobs->ledger, id, e); /* before there is a folder: reconcile.c */
+	int rc = ledger_skip_ids(jobs->ledger, id, e); /* before there is a folder (see reconcile.c) */
 	if (!rc)
 		rc = spool_make_job(jobs->spool, id, e);
 	if (!rc)
@@ -45,7 +45,7 @@ static int store_submission(struct jobs *jobs, uint64_t id, const struct submiss
 		memset(&(*job)->submit, 0, sizeof(*job)->submit);
 		live_job_free(*job);
 	}
-	if (rc) /* files that are left belong to no row, and are deleted at the next start */
+	if (rc) /* files that are left behind belong to no row, and are deleted at the next start */
 		spool_drop_job(jobs->spool, id, NULL);
 	return rc;
 }
@@ -123,8 +123,6 @@ void dispatch_prepare(struct jobs *jobs, struct live_job *job)
 	jobs_defer(jobs, &ev);
 }
 
-/* ---- batches ---- */
-
 static void keep_partials(const struct jobs *jobs, const struct lease_key *k, const struct incoming *in)
 {
 	for (size_t i = 0; i < in->result->n_tile_sizes; i++) {
@@ -158,7 +156,7 @@ static void merge(struct jobs *jobs, const struct action *a, const struct incomi
 		rc = live_job_merge(job, in->batch, &e);
 	if (!rc)
 		rollback_note(job, &a->key, at, in->result->maker);
-	if (rc == -ENOMEM) { /* half merged, and not acknowledged */
+	if (rc == -ENOMEM) { /* merged by half, and not acknowledged */
 		log_event(LOG_STOP,
 			  "text=\"no memory to merge a result: to be started again, all goes on from the disk\"");
 		_exit(1);
@@ -186,7 +184,7 @@ static void acknowledge(struct jobs *jobs, const struct action *a)
 {
 	const struct live_job *job = jobs_find(jobs, a->job);
 	const char *name = jobs->peers.name(jobs->peers.user, a->peer);
-	if (a->ack == ACK_MERGED || (a->ack == ACK_REPEAT && job)) /* the original may not be on disk yet */
+	if (a->ack == ACK_MERGED || (a->ack == ACK_REPEAT && job)) /* the original result may not be on disk yet */
 		durable_ack(jobs, job, a->peer, &a->key, a->ack);
 	else
 		jobs->peers.acknowledge(jobs->peers.user, a->peer, &a->key, a->ack, a->text);
@@ -197,8 +195,6 @@ static void acknowledge(struct jobs *jobs, const struct action *a)
 			  "job=j%llu peer=%llu worker=%s " LEASE_FORMAT " text=%s", log_u64(a->job), log_u64(a->peer),
 			  log_quote(name ? name : "?").text, LEASE_VALUES(&a->key), log_quote(a->text).text);
 }
-
-/* ---- leases and peers ---- */
 
 static void send_lease(struct jobs *jobs, const struct action *a)
 {
@@ -220,7 +216,7 @@ static void revoke_lease(struct jobs *jobs, const struct action *a)
 
 static void close_peer(struct jobs *jobs, const struct action *a)
 {
-	live_jobs_drop_waiting(jobs->live, a->peer); /* it may return with the same number */
+	live_jobs_drop_waiting(jobs->live, a->peer); /* the worker may return under the same number */
 	jobs->peers.dismiss(jobs->peers.user, a->peer, a->text);
 }
 

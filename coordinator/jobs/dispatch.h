@@ -7,9 +7,9 @@
 
 struct incoming;
 
-/* in: what came with the event that the update answers. */
+/* in: data that came with the event. */
 void dispatch_update(struct jobs *jobs, const struct update *u, const struct incoming *in);
-/* The job's bootstrap is merged: makes its films, or tries again later if the disk has no room. */
+/* Makes the films of a job whose bootstrap is merged; tries again later if the disk has no room. */
 void dispatch_prepare(struct jobs *jobs, struct live_job *job);
 
 #endif

@@ -2,14 +2,15 @@
 /*
  * Everything that must be on disk before it is acknowledged: submissions, results, the ends of jobs.
  *
- * Results: durable_reserve makes room in the journal and the films before the core sees a result, so merging it cannot
- * fail for lack of space. durable_merged appends it. durable_ack queues its acknowledgement; flush_next syncs the
- * journals of all queued ones in the thread pool (group commit), and journals_flushed sends them.
+ * Results: durable_reserve reserves space in the journal and the films before the core sees a result, so merging it
+ * cannot fail for lack of space. durable_merged appends it. durable_ack queues its acknowledgement; flush_next
+ * flushes the journals of all queued acknowledgements in the thread pool (group commit), and journals_flushed sends
+ * them.
  *
- * A full or failing disk never loses an acknowledged result: the job is held with the reason, its acknowledgements are
- * parked, and durable_mend tries again every retry_seconds, with a new journal if the old one cannot be trusted. A job
- * whose end cannot be recorded stays in a list of endings until it can; room for that is kept (spool_reserve). Only
- * running out of memory for these lists (some 200 bytes) ends the process.
+ * A full or failing disk never loses an acknowledged result: the job is held with the reason, its acknowledgements
+ * are parked, and durable_mend tries again every retry_seconds, with a new journal if the old one cannot be trusted.
+ * A job whose end cannot be recorded stays in a list of endings until it can; disk space for that is kept
+ * (spool_reserve). Only running out of memory for these lists (some 200 bytes) ends the process.
  */
 #include "coordinator/jobs/durable.h"
 
@@ -28,33 +29,31 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { PINNED_ROOM = 512 /* for the record of the fingerprint, before the first batch */ };
-enum { NOBODY = 0 /* peers are numbered from 1 */ };
+enum { PINNED_ROOM = 512 /* bytes for the record of the fingerprint, which is written before the first batch */ };
+enum { NOBODY = 0 /* no peer: peers are numbered from 1 */ };
 
-/* A job that has ended, which the disk does not know yet. */
+/* A job whose end is not recorded on disk yet. */
 struct ending {
 	struct ending *next;
 	struct job_record record;
-	bool kept; /* its films stay (keep.h), and it may go on meanwhile */
+	bool kept; /* its films are kept (keep.h), and it may be extended meanwhile */
 };
 
 struct durable_ack {
 	STAILQ_ENTRY(durable_ack) next;
-	uint64_t peer; /* NOBODY: nobody waits for the answer */
+	uint64_t peer; /* NOBODY: no peer waits for the answer */
 	struct lease_key key;
 	enum ack ack;
-	int failed;		 /* -errno; 0: it has not */
-	struct journal *journal; /* held */
+	int failed;		 /* -errno of the flush; 0: none */
+	struct journal *journal; /* a reference */
 };
 
-/* One flush for everything queued so far. */
+/* A flush of the journals of all acknowledgements queued before it. */
 struct flush {
 	uv_work_t work;
 	struct jobs *jobs;
 	struct ack_list acks;
 };
-
-/* ---- jobs ---- */
 
 static int pack_plan(const struct live_job *job, unsigned char **frame, size_t *size, struct error *e)
 {
@@ -96,7 +95,7 @@ int durable_begin(struct jobs *jobs, struct live_job *job, struct error *e)
 	if (!rc) {
 		j.record = record;
 		rc = ledger_add(jobs->ledger, &j, e);
-		if (rc) /* in case it was written in spite of the error: the client is told that it failed */
+		if (rc) /* it may have been written in spite of the error, and the client is told that it failed */
 			ledger_forget(jobs->ledger, job->id, NULL);
 	}
 	mem_free(record);
@@ -105,7 +104,8 @@ int durable_begin(struct jobs *jobs, struct live_job *job, struct error *e)
 	return rc;
 }
 
-/* Must also work on a full disk if the job ends without a result, since only its end may free the space. */
+/* Records the end of a job. If it has no result, this must also work on a full disk, since its end may be all that
+ * frees space, so the reserve is used. */
 static int ledger_end_at_last(struct jobs *jobs, const struct job_record *r, bool kept, struct error *e)
 {
 	int rc = ledger_end(jobs->ledger, r, kept, e);
@@ -114,11 +114,12 @@ static int ledger_end_at_last(struct jobs *jobs, const struct job_record *r, boo
 		       : rc;
 }
 
-/* Deletes its films only once the ledger durably says that it has ended. kept: they stay (keep.h). */
+/* Records the end of a job, and deletes its films once the ledger durably contains the end. kept: the films stay
+ * (keep.h). */
 static int write_end(struct jobs *jobs, const struct job_record *r, bool kept, struct error *e)
 {
 	int rc = ledger_end(jobs->ledger, r, kept, e);
-	if (rc && !r->has_result && !kept) /* its merged data is useless now, and may be what fills the disk */
+	if (rc && !r->has_result && !kept) /* its films are useless now, and may be what fills the disk */
 		keep_drop(jobs, r->id);
 	if (disk_is_full(rc))
 		keep_drop_all(jobs);
@@ -152,7 +153,7 @@ void durable_end_again(struct jobs *jobs, const struct job_record *r)
 int durable_end(struct jobs *jobs, struct live_job *job)
 {
 	struct error e;
-	if (journal_write(job->journal, &e)) /* for an extension; what is not stored is computed again */
+	if (journal_write(job->journal, &e)) /* for an extension; results that are not written are computed again */
 		live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 	int rc = write_end(jobs, &job->record, keep_films(jobs, job, &job->record), &e);
 	if (rc)
@@ -162,10 +163,10 @@ int durable_end(struct jobs *jobs, struct live_job *job)
 		return rc;
 	}
 	if (!rc)
-		journal_settle(job->journal); /* the record contains more than what still waits for a flush */
-	journal_release(job->journal);	      /* with its last reference it frees its room, too */
+		journal_settle(job->journal); /* nothing that still waits for a flush is needed any more */
+	journal_release(job->journal);	      /* its space is freed together with its last reference */
 	job->journal = NULL;
-	/* The journal that write_end deleted took up its room until now. */
+	/* The journal that write_end deleted took up space until now. */
 	if (rc && write_end(jobs, &job->record, false, &e))
 		end_later(jobs, &job->record, false);
 	return 0;
@@ -198,8 +199,6 @@ static void end_again(struct jobs *jobs)
 	}
 }
 
-/* ---- batches ---- */
-
 static void hold_job(struct jobs *jobs, struct live_job *job, const char *text)
 {
 	struct event ev = {.kind = EVENT_HOLD, .job = job->id, .text = text};
@@ -219,7 +218,7 @@ void durable_hold(struct jobs *jobs, struct live_job *job, const char *what, con
 	hold_job(jobs, job, text);
 }
 
-/* Where its chain states need more memory than those that they replace. */
+/* Checks whether memory has room for the result's chain states, if they are larger than those that they replace. */
 static int reserve_memory(const struct jobs *jobs, struct live_job *job, const struct batch *b, struct error *e)
 {
 	const struct chain_state *now = job->states[(size_t)b->key.group * job->plan.parts + b->key.part];
@@ -255,7 +254,7 @@ int durable_reserve(struct jobs *jobs, struct live_job *job, struct incoming *in
 	union {
 		const Farm__LeaseResult *from;
 		Farm__LeaseResult *to;
-	} result = {in->result}; /* generated structures are not const */
+	} result = {in->result}; /* generated structures have no const members */
 	if (job->unsure)
 		return error_set(e, EIO, "the job's files cannot be written");
 	int rc = envelope_pack(ENVELOPE_OF(LEASE_RESULT, lease_result, result.to), NULL, 0, &in->frame, &in->frame_size,
@@ -274,7 +273,7 @@ int durable_reserve(struct jobs *jobs, struct live_job *job, struct incoming *in
 	return rc;
 }
 
-/* Records the job's fingerprint, once, before its first batch. */
+/* Appends the job's fingerprint to the journal, once, before its first batch. */
 static int write_pinned(struct jobs *jobs, struct live_job *job, double elapsed, struct error *e)
 {
 	struct job_status status;
@@ -298,8 +297,6 @@ int durable_merged(struct jobs *jobs, struct live_job *job, const struct incomin
 				   in->frame_size, in->payload, e);
 }
 
-/* ---- group commit ---- */
-
 static void flush_next(struct jobs *jobs);
 
 static void flush_journals(uv_work_t *work)
@@ -320,7 +317,7 @@ static void drop_ack(struct durable_ack *a)
 	mem_free(a);
 }
 
-/* Waits until the journal is replaced. */
+/* Keeps an acknowledgement whose flush failed until the journal is replaced. */
 static void park_ack(struct jobs *jobs, struct durable_ack *a)
 {
 	struct live_job *job = jobs->stopping ? NULL : jobs_find(jobs, a->key.job);
@@ -328,7 +325,7 @@ static void park_ack(struct jobs *jobs, struct durable_ack *a)
 		drop_ack(a);
 		return;
 	}
-	if (a->journal != job->journal) { /* which is resolved by now */
+	if (a->journal != job->journal) { /* the journal has been replaced */
 		STAILQ_INSERT_TAIL(&jobs->acks, a, next);
 		return;
 	}
@@ -371,7 +368,7 @@ static void flush_next(struct jobs *jobs)
 	if (jobs->flushing || STAILQ_EMPTY(&jobs->acks))
 		return;
 	struct flush *w = mem_alloc(1, sizeof *w);
-	if (!w) /* as for an event: without 200 bytes nothing can continue */
+	if (!w) /* as with events: without 200 bytes nothing can continue */
 		abort();
 	w->jobs = jobs;
 	STAILQ_INIT(&w->acks);
@@ -383,7 +380,7 @@ static void flush_next(struct jobs *jobs)
 void durable_ack(struct jobs *jobs, const struct live_job *job, uint64_t peer, const struct lease_key *k, enum ack ack)
 {
 	struct durable_ack *a = mem_alloc(1, sizeof *a);
-	if (!a) /* not answered: the worker sends it again, and it is a repeat */
+	if (!a) /* no answer: the worker will send the result again, as a repeat */
 		return;
 	*a = (struct durable_ack){.peer = peer, .key = *k, .ack = ack, .journal = job->journal};
 	journal_hold(a->journal);
@@ -391,9 +388,7 @@ void durable_ack(struct jobs *jobs, const struct live_job *job, uint64_t peer, c
 	flush_next(jobs);
 }
 
-/* ---- the rest ---- */
-
-/* Data that nobody waits for: it is flushed soon, but not at once. */
+/* Appends a record that nobody waits for; it is flushed soon, but not at once. */
 static int append_note(struct jobs *jobs, const struct live_job *job, enum journal_kind kind, double elapsed,
 		       const void *bytes, size_t size, struct error *e)
 {
@@ -414,15 +409,15 @@ void durable_look(struct jobs *jobs, uint64_t id)
 	if (l->work <= job->look_written)
 		return;
 	job->look_written = l->work;
-	/* Used by forecasts only: the estimate itself is made again. */
+	/* Only forecasts use it: after a restart the estimate itself is made again. */
 	unsigned char note[STORED_NOTE_MOST];
 	size_t size = stored_pack_look(l, note);
 	if (append_note(jobs, job, JOURNAL_LOOK, farm_elapsed(jobs->farm, id, jobs_now(jobs)), note, size, &e))
 		log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)id, log_quote(e.text).text);
 }
 
-/* Counters are only for the record, so not before each answer; and not while a checkpoint is written, which has the
- * latest and replaces the journal. */
+/* Appends the job's counters if they have changed. They are only informative, so they are not written before each
+ * acknowledgement; nor during a checkpoint, which contains the latest counters and replaces the journal. */
 static void write_counts(struct jobs *jobs, struct live_job *job)
 {
 	struct job_counts now;
@@ -435,7 +430,7 @@ static void write_counts(struct jobs *jobs, struct live_job *job)
 		job->record.counts = now;
 }
 
-/* Answers that waited for journals which have been replaced. */
+/* Queues the parked acknowledgements whose journals have been replaced, for another flush. */
 static void release_parked_acks(struct jobs *jobs)
 {
 	struct ack_list list = STAILQ_HEAD_INITIALIZER(list);
@@ -465,11 +460,12 @@ int durable_mend(struct jobs *jobs, struct live_job *job)
 		rc = journal_is_bad(job->journal) ? journal_renew(job->journal, &e) : 0;
 		if (rc && rc != -EAGAIN)
 			live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
-		if (!rc && !room_is_left(jobs, job, 2 * job->held_bytes)) /* or its next result would hold it again */
+		/* Otherwise the next result would be held again. */
+		if (!rc && !room_is_left(jobs, job, 2 * job->held_bytes))
 			rc = -ENOSPC;
 		if (!rc)
 			rc = journal_reserve(job->journal, 2 * job->held_bytes, &e);
-	} while (disk_is_full(rc) && room_make(jobs)); /* of what has been of use until now */
+	} while (disk_is_full(rc) && room_make(jobs)); /* deletes scene files and films that were kept for later use */
 	if (!rc)
 		hold_job(jobs, job, "");
 	return rc;

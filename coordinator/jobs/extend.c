@@ -2,12 +2,12 @@
 /*
  * Extensions of jobs: a list of requests until they are answered.
  *
- * extend_job appends a request; extend_waiting handles those whose jobs are not in use. A running job gets its new plan
- * in the ledger and then in the core. A finished job is read from what was kept of it (keep.h) by a thread of the pool,
- * one at a time, and continues as after a restart.
+ * extend_job appends a request; extend_waiting handles those whose jobs are not in use. A live job gets its new plan
+ * in the ledger and then in the core. A finished job is read from its kept films (keep.h) by a thread of the pool,
+ * one job at a time, and continues as after a restart.
  *
- * Each request is answered once, unless its peer is gone; a job that was read for it is then dropped. A request that
- * cannot be fulfilled is answered with a sentence, and the job stays as it was.
+ * Each request is answered once, unless its peer is gone; a job that was read for that peer is then dropped. A
+ * request that cannot be fulfilled is answered with a sentence, and the job stays as it was.
  */
 #include "coordinator/jobs/extend.h"
 
@@ -28,14 +28,12 @@
 
 static const char *const again = "submit it again with hslt-submit";
 
-/* ---- the new plan ---- */
-
 static double error_of(const struct forecast_history *h)
 {
 	return h->count && !h->looks[h->count - 1].doubtful ? sqrt(h->looks[h->count - 1].rel_mse_upper) : NAN;
 }
 
-/* r: the record of its end; NULL: it runs. */
+/* r: the record of the job's end; NULL: it is live. */
 static struct extension_from extension_from_job(const struct live_job *job, double seconds, const struct job_record *r)
 {
 	return (struct extension_from){.rounds = live_job_rounds(job),
@@ -83,7 +81,7 @@ static int store(struct jobs *jobs, const struct live_job *job, struct error *e)
 	return rc;
 }
 
-/* The job's current bounds, for its log and for the client. */
+/* Describes the job's bounds, for its log and for the client. */
 static void describe(const struct live_job *job, char *text, size_t size)
 {
 	struct text t = {text, size};
@@ -109,8 +107,6 @@ static void log_extension(const struct requester *by, struct live_job *job, char
 		     log_quote(text).text);
 }
 
-/* ---- running jobs ---- */
-
 static int extend_live(struct jobs *jobs, const struct requester *by, struct live_job *job, const struct extension *x,
 		       char *text, size_t size, struct error *e)
 {
@@ -134,9 +130,7 @@ static int extend_live(struct jobs *jobs, const struct requester *by, struct liv
 	return jobs_ask(jobs, &ev, &(struct incoming){0}, e);
 }
 
-/* ---- finished jobs ---- */
-
-/* Its row, if its films are kept. */
+/* Reads the job's row. Returns -ENOENT if its films have been deleted. */
 static int read_row(const struct jobs *jobs, uint64_t job, struct ledger_job *j, struct error *e)
 {
 	int rc = ledger_get(jobs->ledger, job, j, e);
@@ -148,7 +142,7 @@ static int read_row(const struct jobs *jobs, uint64_t job, struct ledger_job *j,
 	return bytes ? 0 : error_set(e, ENOENT, "its films have been deleted: %s", again);
 }
 
-/* The journal's numbers are from shortly before the end: the record of the end is more accurate. */
+/* Takes the counters of the record, which are from the very end, where they are higher than those of the journal. */
 static void take_counts(struct job_counts *c, const struct job_record *r)
 {
 #define COUNTER(member, key, wire)        \
@@ -158,7 +152,7 @@ static void take_counts(struct job_counts *c, const struct job_record *r)
 #undef COUNTER
 }
 
-/* r: its record. */
+/* Makes the job live again. r: the record of its end. */
 static int begin_again(struct jobs *jobs, const struct requester *by, struct live_job *job, const struct job_record *r,
 		       struct error *e)
 {
@@ -182,7 +176,7 @@ static int begin_again(struct jobs *jobs, const struct requester *by, struct liv
 	return rc;
 }
 
-/* A full disk may have room again; otherwise its films are of no more use. */
+/* Explains why the films cannot be read: a full disk may have room later; otherwise the films are of no more use. */
 static int cannot_continue(int rc, struct error *e)
 {
 	return error_prefix(e, rc, "it cannot continue: %s",
@@ -222,13 +216,13 @@ static void answer(struct jobs *jobs, uint64_t peer, int rc, const struct error 
 	jobs->peers.extended(jobs->peers.user, peer, rc ? e->text : NULL, text);
 }
 
-/* Films may have hundreds of megabytes, so the pool reads them, those of one job at a time. */
+/* A task of the pool, because films may have hundreds of megabytes; one job at a time. */
 struct reading {
 	uv_work_t work;
 	struct jobs *jobs;
-	struct requester by; /* its peer may be gone */
+	struct requester by; /* the peer may be gone */
 	struct extension what;
-	struct job_record record; /* of its end */
+	struct job_record record; /* record of the job's end */
 	struct live_job *job;
 	int rc;
 	struct error error;
@@ -238,7 +232,7 @@ static void read_ended_job(uv_work_t *work)
 {
 	struct reading *w = work->data;
 	w->rc = replay_films(w->jobs->spool, w->job, NULL, &w->error);
-	if (!w->rc) /* results from before its end may still wait for a flush of the old file */
+	if (!w->rc) /* acknowledgements from before its end may still wait for a flush of the old file */
 		w->rc = journal_renew(w->job->journal, &w->error);
 }
 
@@ -266,8 +260,8 @@ static void ended_job_read(uv_work_t *work, int status)
 		extend_waiting(jobs);
 }
 
-/* Everything that can be checked without its films, assuming that less was done, so that nothing is refused which
- * the films would allow. */
+/* Checks the request as far as that is possible without the films. Assumes that no round is complete, so that nothing
+ * is refused which the films would allow. */
 static int ask_beforehand(const struct jobs *jobs, const struct requester *by, const struct live_job *job,
 			  const struct extension *x, const struct job_record *r, struct error *e)
 {
@@ -317,9 +311,7 @@ static int extend_ended(struct jobs *jobs, const struct extension_request *q, co
 	return start_reading(jobs, q, r, e);
 }
 
-/* ---- both ---- */
-
-/* Its films are in use, or those of another job are being read. */
+/* Whether the request must wait: the job's films are in use, or those of another job are being read. */
 static bool must_wait(const struct jobs *jobs, uint64_t id)
 {
 	const struct live_job *job = jobs_find(jobs, id);
@@ -339,11 +331,11 @@ static void handle_request(struct jobs *jobs, const struct extension_request *q)
 		rc = error_set(&e, ENOENT, "no such job");
 	else
 		rc = extend_ended(jobs, q, &v.record, &e);
-	if (rc || job) /* otherwise when it has been read */
+	if (rc || job) /* a finished job is answered when it has been read */
 		answer(jobs, q->by.peer, rc, &e, text);
 }
 
-/* A request that is not answered yet. */
+/* Whether the peer has a request that is not answered yet. */
 static bool has_asked(const struct jobs *jobs, uint64_t peer)
 {
 	const struct extension_request *q = jobs->extending;

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Checks files of scenes: a queue of files to read, the first of which is read and hashed by the pool.
+ * Checks files of scenes: a queue of files, the first of which is read and hashed by the pool.
  *
- * files_check answers at once for a file that was read within FILES_CHECKED seconds, and otherwise puts it into the
- * queue. When the first of the queue has been read, the peers that wait for it are told. If it is damaged, all jobs
- * are looked at: one that lacks a file waits and names it, one that has them all continues.
+ * files_check answers at once for a file that was read within the last FILES_CHECKED seconds, and otherwise puts it
+ * into the queue. When the first file has been read, the peers that wait for it are told. If it is damaged, all jobs
+ * are looked at: a job that lacks a file is held with the file's name, and one that has all its files is released.
  *
- * A file that cannot be read now is not taken for a damaged one: the jobs that need it have it read again.
+ * A file that cannot be read at the moment is not considered damaged: the jobs that need it have it read again.
  */
 #include "coordinator/jobs/files.h"
 
@@ -25,7 +25,7 @@ static void hold_job(struct jobs *jobs, struct live_job *job, const char *text)
 	jobs_step(jobs, &ev);
 }
 
-/* The first missing one; NULL: all exist. */
+/* Returns the first file of the job that the store does not have; NULL: it has all. */
 static const Farm__File *find_missing_file(const struct jobs *jobs, const struct live_job *job)
 {
 	const Farm__Submit *m = live_job_submit(job);
@@ -59,10 +59,10 @@ static void look_at_all(struct jobs *jobs)
 		job = files_look(jobs, job) ? jobs->live : job->next;
 }
 
-/* ---- reading: some megabytes at a time, so that a large scene keeps no thread of the pool from others ---- */
+/* Files are read some megabytes at a time, so that a large scene does not occupy a thread of the pool for long. */
 
 struct file_check {
-	STAILQ_ENTRY(file_check) next; /* one is read at a time, the first */
+	STAILQ_ENTRY(file_check) next; /* only the first one is being read */
 	uv_work_t work;
 	struct jobs *jobs;
 	struct blob_hash hash;
@@ -94,7 +94,7 @@ static void read_first(struct jobs *jobs)
 		jobs_in_pool(jobs, &c->work, c, read_some, on_read);
 }
 
-/* Those who wait for the first file continue. */
+/* Ends the check of the first file, and lets those who wait for it continue. */
 static void finish_first(struct jobs *jobs)
 {
 	struct file_check *c = STAILQ_FIRST(&jobs->checks);
@@ -109,7 +109,7 @@ static void finish_first(struct jobs *jobs)
 	if (rc == -EBADMSG)
 		look_at_all(jobs);
 	jobs->peers.file_read(jobs->peers.user, &c->hash, rc, e.text);
-	jobs_films_free(jobs); /* complaints that waited for it */
+	jobs_films_free(jobs); /* failures may have waited for the file */
 	mem_free(c);
 }
 
@@ -158,7 +158,8 @@ static int check(struct jobs *jobs, const struct blob_hash *h, double seconds, s
 int files_check(struct jobs *jobs, const struct blob_hash *h, struct error *e)
 {
 	int rc = check(jobs, h, FILES_CHECKED, e);
-	if (rc == -ENOENT && blob_is_held(jobs->blobs, h)) /* a worker may ask for any, thousands of times a second */
+	/* only for files of live jobs: a worker may ask for any file, thousands of times a second. */
+	if (rc == -ENOENT && blob_is_held(jobs->blobs, h))
 		look_at_all(jobs);
 	return rc;
 }
@@ -166,7 +167,8 @@ int files_check(struct jobs *jobs, const struct blob_hash *h, struct error *e)
 bool files_are_read(const struct jobs *jobs, const struct live_job *job)
 {
 	const Farm__Submit *m = live_job_submit(job);
-	for (size_t i = m->n_files; !STAILQ_EMPTY(&jobs->checks) && i-- > 0;) { /* the last one is read last */
+	/* From the end, because the last one is read last. */
+	for (size_t i = m->n_files; !STAILQ_EMPTY(&jobs->checks) && i-- > 0;) {
 		struct blob_hash h = file_hash_from_wire(m->files[i]);
 		if (blob_is_being_checked(jobs->blobs, &h))
 			return true;
@@ -186,7 +188,7 @@ void files_read(struct jobs *jobs, struct live_job *job)
 		missing |= rc == -ENOENT;
 		job->unread |= rc && rc != -EINPROGRESS;
 	}
-	if (missing) /* last: the job may be gone afterwards */
+	if (missing) /* at the end, because the job may be gone afterwards */
 		look_at_all(jobs);
 }
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The end of a live job. A job that the core has ended is finished as soon as no thread reads its films: its record is
- * written and its row ended (durable.h), workers are told, its memory is freed. A record that the disk refuses is tried
- * again (start.c), and until then the job counts as running.
+ * The end of a live job. A job that the core has ended is finished as soon as no thread reads its films: its record
+ * is written and its row ended (durable.h), workers are told, its memory is freed. If the disk refuses the record,
+ * finishing is tried again (start.c), and until then the job counts as running.
  */
 #include "coordinator/jobs/finish.h"
 
@@ -28,7 +28,7 @@ static struct job_record record_of(const struct jobs *jobs, const struct live_jo
 static void finish(struct jobs *jobs, struct live_job *job)
 {
 	job->record = record_of(jobs, job);
-	if (durable_end(jobs, job)) { /* try again later */
+	if (durable_end(jobs, job)) { /* start.c tries again */
 		job->unrecorded = true;
 		job->try_again = jobs_now(jobs) + jobs->config.retry_seconds;
 		return;
@@ -45,7 +45,7 @@ static void finish(struct jobs *jobs, struct live_job *job)
 	struct waiting_list late = STAILQ_HEAD_INITIALIZER(late);
 	STAILQ_CONCAT(&late, &job->waiting);
 	live_job_free(job);
-	for (struct waiting_batch *w; (w = STAILQ_FIRST(&late));) { /* the core knows that the job is over */
+	for (struct waiting_batch *w; (w = STAILQ_FIRST(&late));) { /* the core refuses them, since the job is over */
 		STAILQ_REMOVE_HEAD(&late, next);
 		results_take_waiting(jobs, w);
 		waiting_batch_free(w);
@@ -71,7 +71,7 @@ void finish_ended(struct jobs *jobs)
 		if (job->ended && !job->busy && !job->unpublished && !job->unrecorded) {
 			finish(jobs, job);
 			finished = true;
-			next = jobs->live; /* stored batches may have ended others */
+			next = jobs->live; /* results that waited may have ended other jobs */
 		}
 	}
 	if (finished)

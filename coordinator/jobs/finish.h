@@ -5,11 +5,11 @@
 
 #include "coordinator/live_job/jobs.h"
 
-/* Finishes all jobs that the core has ended and whose films are free: record, workers, memory. Then handles
- * extensions that waited for them. */
+/* Finishes all jobs that the core has ended and whose films are free: writes the record, tells workers, frees memory.
+ * Then handles extensions that waited for these jobs. */
 void finish_ended(struct jobs *jobs);
-/* After a job was cancelled: 0 if it stays so when the coordinator is killed, even if a thread still reads its films;
- * or why not. */
+/* Call after a job was cancelled. Returns 0 if it would stay cancelled after a crash of the coordinator, even if a
+ * thread still reads its films; otherwise an error that says why not. */
 int finish_cancelled(struct jobs *jobs, uint64_t job, struct error *e);
 
 #endif

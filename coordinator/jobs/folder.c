@@ -25,8 +25,8 @@ static int make_anew(struct jobs *jobs, struct live_job *job, struct error *e)
 	return 0;
 }
 
-/* Merged data is in memory or in the old journal, whose file is open: the former goes into a checkpoint, the latter
- * into a new file. */
+/* Restores the folder of a live job. Merged data is in memory or in the old journal, whose file is still open: a
+ * checkpoint is made of the former, and the latter is copied into a new file. */
 static void restore_folder(struct jobs *jobs, struct live_job *job)
 {
 	char folder[SPOOL_PATH_MAX];
@@ -44,7 +44,8 @@ static void restore_folder(struct jobs *jobs, struct live_job *job)
 		return;
 	journal_distrust(job->journal);
 	if (job->checkpoint_bytes) {
-		if (!late_drop(jobs, job->id)) /* no checkpoint has them */
+		/* Results that wait exist only in the old journal, and no checkpoint contains them. */
+		if (!late_drop(jobs, job->id))
 			return;
 		job->unsure = true;
 		if (job->generation_least <= journal_generation(job->journal))
@@ -54,8 +55,9 @@ static void restore_folder(struct jobs *jobs, struct live_job *job)
 	durable_hold(jobs, job, "its results cannot be stored", "its folder was removed, and is being restored");
 }
 
-/* A journal that failed already has no file to look for, and an ended job needs none: then the folder itself is
- * checked, which may disappear while it is being restored. */
+/* Whether the job's folder has disappeared. Normally the journal's file is looked for. If the journal is bad already,
+ * or the job has ended and needs none, the folder itself is looked for; it may disappear again while it is being
+ * restored. */
 static bool is_gone(const struct jobs *jobs, const struct live_job *job)
 {
 	char folder[SPOOL_PATH_MAX];

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Moves the files of earlier coordinators into the ledger: the notes of the spool, then job after job its record
- * (job.json) and the copy of its row (order).
+ * Moves the files of earlier versions into the ledger: the notes of the spool, then job by job its record (job.json)
+ * and the copy of its row (order).
  *
- * An undamaged row counts, unless its copy has a higher revision; a missing or damaged one is made from its copy, or,
- * of a job that has ended, from its record. The record says whether the job has ended: it was written before the row. A
+ * An undamaged row counts, unless its copy has a higher revision. A missing or damaged row is made from its copy or,
+ * if the job has ended, from its record. The record says whether the job has ended: it was written before the row. A
  * job of which neither row nor copy is left keeps its files, and is reported as lost (reconcile.h).
  *
- * A record that is damaged is kept as job.json.damaged and replaced by what the row knows, with a note. An error of the
+ * A damaged record is kept as job.json.damaged and replaced by one made from the row, with a note. An error of the
  * machine, or a file of another version, ends the import.
  */
 #include "coordinator/jobs/import.h"
@@ -55,13 +55,11 @@ static int take_counter(struct jobs *jobs, struct error *e)
 	return rc;
 }
 
-/* ---- jobs ---- */
-
 struct old_job {
-	char *text;		  /* of its record; NULL: none, or damaged */
-	bool damaged;		  /* the record */
-	struct job_record record; /* if there is a text */
-	struct old_row row;	  /* its copy; .job.id 0: none, or damaged */
+	char *text;		  /* text of the record; NULL: none, or damaged */
+	bool damaged;		  /* the record is damaged */
+	struct job_record record; /* valid if there is a text */
+	struct old_row row;	  /* copy of the row; its id is 0 if there is none, or it is damaged */
 };
 
 static int read_record(const struct jobs *jobs, uint64_t id, struct old_job *old, struct error *e)
@@ -90,7 +88,7 @@ static int read_old_job(const struct jobs *jobs, uint64_t id, struct old_job *ol
 	return rc == -ENOENT || rc == -EBADMSG ? 0 : rc;
 }
 
-/* The row of a job that has ended, made from its record. */
+/* Makes the row of a job that has ended from its record. */
 static void row_of_record(const struct job_record *r, struct ledger_job *j)
 {
 	*j = (struct ledger_job){.id = r->id,
@@ -108,13 +106,13 @@ static void set_end(struct ledger_job *j, const struct old_job *old)
 	j->state = old->record.state;
 	j->ended = old->record.ended > 0 ? old->record.ended : 1;
 	j->held = "";
-	j->submission = old->row.job.submission; /* there as long as its films are */
+	j->submission = old->row.job.submission; /* present as long as the job's films are */
 	j->submission_size = old->row.job.submission_size;
 	j->plan = old->row.job.plan;
 	j->plan_size = old->row.job.plan_size;
 }
 
-/* The record of an ended job was damaged: the job is listed, and its image can be fetched. */
+/* Makes a record for an ended job whose record is damaged, so that the job is listed and its image can be fetched. */
 static int make_record(const struct jobs *jobs, struct ledger_job *j, struct old_job *old, struct error *e)
 {
 	struct job_record *r = &old->record;
@@ -143,7 +141,7 @@ static int put_row(struct jobs *jobs, uint64_t id, struct old_job *old, struct e
 	struct ledger_job j;
 	int rc = ledger_get(jobs->ledger, id, &j, e);
 	bool ended = old->text && record_is_ended(&old->record);
-	if (rc < 0 || (rc > 0 && !j.damaged && *j.record)) /* it has been imported */
+	if (rc < 0 || (rc > 0 && !j.damaged && *j.record)) /* imported before */
 		return rc < 0 ? rc : 0;
 	uint64_t revision = rc > 0 && !j.damaged ? j.revision : 0;
 	if (old->row.job.id && (rc == 0 || j.damaged || old->row.job.revision > revision))

@@ -7,7 +7,8 @@
 #include "coordinator/live_job/late.h"
 #include "coordinator/jobs/step.h"
 
-/* It has been damaged meanwhile: its lease is open. */
+/* Gives up a stored result that has been damaged meanwhile or is dropped: if the core had given its lease to a
+ * worker, the lease is open again. */
 static void give_up(struct jobs *jobs, struct live_job *job, const struct late_result *l, const char *why)
 {
 	struct event ev = {.kind = EVENT_LEASE_RETURNED, .peer = l->peer, .job = job->id, .lease = {.key = l->key}};
@@ -16,7 +17,7 @@ static void give_up(struct jobs *jobs, struct live_job *job, const struct late_r
 		jobs_step(jobs, &ev);
 }
 
-/* Gives it to the core, which says whether it counts. */
+/* Gives a stored result to the core, which decides whether it counts. */
 static int offer(struct jobs *jobs, const struct live_job *job, const struct late_result *l, struct error *e)
 {
 	struct event ev = {.kind = EVENT_STORED, .job = job->id, .lease = {.key = l->key, .valid = true}};
@@ -65,7 +66,8 @@ bool late_drop(struct jobs *jobs, uint64_t id)
 	return job != NULL;
 }
 
-/* true: a step was made: others may follow, and any job may be gone. */
+/* Offers the first stored result of the job that fits. Returns true if a step was made, after which other results may
+ * fit, and any job may be gone. */
 static bool feed_one(struct jobs *jobs, struct live_job *job)
 {
 	for (size_t i = 0; i < job->late_count; i++) {
@@ -76,9 +78,9 @@ static bool feed_one(struct jobs *jobs, struct live_job *job)
 		if (place == REPLAY_LATE)
 			continue;
 		int rc = place == REPLAY_FITS ? offer(jobs, job, &l, &e) : 0;
-		if (rc == -ENOMEM) /* later */
+		if (rc == -ENOMEM) /* try again later */
 			return false;
-		if (!rc && !jobs_find(jobs, id)) /* a result outside the films' range ends its job */
+		if (!rc && !jobs_find(jobs, id)) /* a sum left the films' range, which ended the job */
 			return true;
 		if (!rc && replay_place(job, &l.key) != REPLAY_MERGED) /* the core waits for an estimate of the error */
 			continue;

@@ -5,9 +5,10 @@
 
 #include "coordinator/live_job/jobs.h"
 
-/* They are computed again instead. false: the job has ended meanwhile, and is gone. */
+/* Drops the waiting results of a job, which are computed again instead. Returns false if the job has ended meanwhile
+ * and is gone. */
 bool late_drop(struct jobs *jobs, uint64_t job);
-/* Gives the core all results that can count now. Call after every step, and when films are free again. */
+/* Gives the core all waiting results that can be merged now. Call after every step, and when films are free again. */
 void late_feed(struct jobs *jobs);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Finds jobs for display, wherever they are: running, being read after a restart, among the last ENDED_MAX that ended,
- * or only on the disk.
+ * Finds jobs for display, wherever they are: live, being read after a restart, among the last ENDED_MAX that ended,
+ * or only in the ledger.
  */
 #include "coordinator/jobs/listing.h"
 
@@ -18,7 +18,7 @@ bool jobs_view_end(const struct jobs *jobs, const struct live_job *job, struct j
 	struct job_status status;
 	struct canvas_counts counted;
 	view_of_record(v, &job->record);
-	if (job->canvas) { /* at the end what the image contains, until then everything received */
+	if (job->canvas) { /* at the end only what the image contains, before that everything received */
 		canvas_counts(job->canvas, !job->ended, &counted);
 		record_take_counted(&v->record, &job->plan, &counted, job->black, job->lit.beyond_share);
 		record_add_note(&v->record, job->doubts);
@@ -42,7 +42,8 @@ static void view_live(const struct jobs *jobs, const struct live_job *job, struc
 {
 	if (!jobs_view_end(jobs, job, v))
 		return;
-	if (job->ended && (job->busy || job->unpublished || job->unrecorded)) { /* not before its image exists */
+	/* It is not shown as ended before its image and record exist. */
+	if (job->ended && (job->busy || job->unpublished || job->unrecorded)) {
 		text_copy(v->record.state, sizeof v->record.state, job_state_name(JOB_RUNNING));
 		if (*job->record.why)
 			text_print(v->waiting, sizeof v->waiting, "its %s cannot be written: %s",

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Images and errors of live jobs. publish_start gives the films to the thread pool, which makes the image of their
- * complete rounds, judges it, and writes it into the job's folder; until then the job is busy. Then the core is told.
- * An image that the disk refuses is tried again, and its job counts as running until it is written.
+ * complete rounds, judges its convergence, and writes it into the job's folder; until then the job is busy. Then the
+ * core is told. If the disk refuses an image, it is tried again, and its job counts as running until the image is
+ * written.
  */
 #include "coordinator/jobs/publish.h"
 
@@ -39,7 +40,7 @@ static void inputs_of(const Farm__Submit *m, struct plan_scene *out)
 		out->paths[out->path_count++] = m->paths[i];
 }
 
-/* false: the submission has no such file. */
+/* Writes the hash of the scene file. Returns false if the submission has no such file. */
 static bool scene_hash(const Farm__Submit *m, char hex[BLOB_HEX_SIZE])
 {
 	struct blob_hash h;
@@ -95,7 +96,8 @@ static void work_on_film(uv_work_t *work)
 		w->rc = write_image(w);
 }
 
-/* The last two tell the core, which may request the next image at once or end the job: w is not ours any more. */
+/* tell_error and tell_image make steps of the core, which may request the next image at once or end the job, so w may
+ * be reused or freed. */
 static void tell_error(const struct publishing *w)
 {
 	struct jobs *jobs = w->jobs;
@@ -127,7 +129,7 @@ static void tell_image(const struct publishing *w)
 	jobs_step(w->jobs, &ev);
 }
 
-/* The core's job is done, but its data stays until the disk takes the image. */
+/* Keeps a job that the core has ended until the disk accepts the image. */
 static void cannot_write(struct publishing *w)
 {
 	struct live_job *job = w->job;
@@ -153,7 +155,7 @@ static void has_written(struct live_job *job)
 static void take_outcome(struct publishing *w)
 {
 	struct live_job *job = w->job;
-	/* Every image states its error, requested or not. */
+	/* Every image states its error, whether the job has a target error or not. */
 	if (!w->rc && isfinite(w->image.rel_mse_upper))
 		record_take_error(&job->record, &w->image);
 	if (!w->rc)
@@ -197,7 +199,7 @@ void publish_start(struct jobs *jobs, struct live_job *job, enum publish_what wh
 	assert(!job->busy);
 	struct publishing *w = &job->publishing;
 	*w = (struct publishing){.jobs = jobs, .job = job, .what = what, .rounds = rounds};
-	struct job_status status; /* from the first lease until now */
+	struct job_status status; /* for the time from the first lease until now */
 	if (farm_job(jobs->farm, job->id, jobs_now(jobs), &status)) {
 		w->end = status.end;
 		w->wall_seconds = (isnan(status.ended) ? jobs_now(jobs) : status.ended) - status.started;

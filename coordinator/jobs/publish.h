@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Work on a whole film: estimating its error, writing its image into the spool. Runs in the pool; meanwhile the live
- * job is busy and its results wait. Started and finished on the loop's thread. Starting allocates nothing and cannot
- * fail; a final image for which there is no memory or disk space is made again later.
+ * Tasks that read whole films: estimating the error, writing an image into the spool. They run in the pool; meanwhile
+ * the live job is busy and its results wait. Started and finished on the loop's thread. Starting a task allocates
+ * nothing and cannot fail; a final image that fails for lack of memory or disk space is made again later.
  */
 #ifndef COORDINATOR_JOBS_PUBLISH_H
 #define COORDINATOR_JOBS_PUBLISH_H

@@ -2,11 +2,12 @@
 /*
  * Opens the ledger and compares it with the jobs' folders, before any job is read.
  *
- * Files of earlier coordinators are imported first (import.h). A folder without a row is deleted if nothing was merged
- * in it: its job was never accepted, unless the whole ledger is missing. Otherwise the job is lost, as is one whose row
- * is damaged in both files of the ledger: without --accept-loss the start ends with -EBADMSG and a list of what is
- * missing; with it the folder is moved to spool/lost with an explanation. An error of the machine ends the start
- * without further changes.
+ * Files of earlier versions are imported first (import.h). A folder without a row is deleted if nothing was merged in
+ * it, because its job was never accepted; if the whole ledger is new, a folder with a journal counts as that of an
+ * accepted job. A folder without a row but with results is that of a lost job, as is a row that is damaged in both
+ * files of the ledger. Without --accept-loss the start then ends with -EBADMSG and a list of what is missing; with it
+ * the folder is moved to spool/lost with an explanation. An error of the machine ends the start without further
+ * changes.
  */
 #include "coordinator/jobs/reconcile.h"
 
@@ -19,12 +20,12 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { NAMED_MOST = 8 /* of the lost jobs, in the error */ };
+enum { NAMED_MOST = 8 /* lost jobs that the error names */ };
 
 struct looking {
 	struct jobs *jobs;
-	uint64_t lost;	/* number of jobs */
-	char text[600]; /* which */
+	uint64_t lost;	/* number of lost jobs */
+	char text[600]; /* their names */
 	struct text names;
 };
 
@@ -33,9 +34,7 @@ static void log_fault(uint64_t id, const char *what)
 	log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)id, log_quote(what).text);
 }
 
-/* ---- lost jobs ---- */
-
-/* Its folder is kept, so that an operator can look into it. */
+/* Moves the folder to spool/lost, so that an operator can look into it, and deletes the row. */
 static int move_to_lost(struct looking *l, uint64_t id, const char *why, struct error *e)
 {
 	const struct spool *spool = l->jobs->spool;
@@ -77,11 +76,9 @@ static int is_lost(struct looking *l, uint64_t id, const char *why, struct error
 	return rc;
 }
 
-/* ---- one job ---- */
-
-/* Something of it was merged or started, so the job had been accepted: 1 or 0. started: it has a journal at least, as
- * each accepted job has; for a ledger that knows no job, since each is noted there before it gets a folder. A folder
- * that cannot be read says nothing: -errno. */
+/* Whether the job must have been accepted, because something of it was merged or made: returns 1, 0 or -errno.
+ * started: a journal is enough, even an empty one. This is for a ledger that knows no job: otherwise an id is noted
+ * in the ledger before the job gets a folder. A folder that cannot be read says nothing, hence -errno. */
 static int has_results(const struct spool *spool, uint64_t id, bool started, struct error *e)
 {
 	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX];
@@ -140,7 +137,7 @@ static int look_at_folders(struct looking *l, struct error *e)
 	return rc;
 }
 
-/* Rows without a folder: live jobs fail with a sentence (restore.h). */
+/* Looks at rows without a folder. Live jobs among them fail later with a sentence (recovery.c). */
 static int look_at_rows(struct looking *l, struct error *e)
 {
 	struct ledger_job j;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Opens the ledger at the start, and compares it with the jobs' folders. What is lost is not deleted: the start is
- * refused, and says what is missing. With --accept-loss such folders are moved to spool/lost, each with an explanation,
- * and the rest continues.
+ * Opens the ledger at the start, and compares it with the jobs' folders. If something is lost, nothing is deleted:
+ * the start is refused, with a list of what is missing. With --accept-loss the folders of lost jobs are moved to
+ * spool/lost, each with an explanation, and the other jobs continue.
  */
 #ifndef COORDINATOR_JOBS_RECONCILE_H
 #define COORDINATOR_JOBS_RECONCILE_H

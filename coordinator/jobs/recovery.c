@@ -2,9 +2,9 @@
 /*
  * Reads the jobs of the last run from the spool.
  *
- * recovery_begin makes a job from each row of the ledger (restore.c) and lists them. The pool then reads their films,
- * one job after the other (replay.h). After the last one, the core is told of all of them in the order of their
- * numbers, they join the running jobs, and requests that arrived meanwhile are served.
+ * recovery_begin makes a live job from each row of the ledger (restore.c) and lists them. The pool then reads their
+ * films, one job after the other (replay.h). After the last one, the core is told of all of them in the order of
+ * their ids, they join the live jobs, and requests that arrived meanwhile are served.
  *
  * A job whose checkpoint or journal is damaged is read again without them, so it starts over; the files are kept as
  * *.damaged. A job without folder, plan or scene fails, with the reason in its record. An error of the machine, or a
@@ -28,14 +28,12 @@
 struct recovery {
 	uv_work_t work;
 	struct jobs *jobs;
-	struct recovering_job **last, *at; /* of jobs.found. at: the one being read; NULL: none */
-	uint64_t bytes, read;		   /* of all jobs; of finished ones */
+	struct recovering_job **last, *at; /* last: end of the list jobs.found; at: the job being read, NULL: none */
+	uint64_t bytes, read;		   /* bytes to read for all jobs; bytes of the jobs that have been read */
 	bool under_way;
-	int rc; /* of the job just read */
+	int rc; /* result for the job just read */
 	struct error error;
 };
-
-/* ---- progress ---- */
 
 bool recovery_is_on(const struct jobs *jobs)
 {
@@ -84,10 +82,8 @@ size_t recovery_views(const struct jobs *jobs, struct job_view *v)
 	return n;
 }
 
-/* ---- jobs that cannot be read ---- */
-
-/* The stored data is damaged: the job's batches can be computed again, with the same bits. Nothing is deleted, since
- * somebody may want to look at it. -errno: some of it is where it was, and would be read again. */
+/* Puts damaged files of a job aside. Its batches can be computed again, with the same bits. Nothing is deleted, since
+ * somebody may want to look at the files. Returns -errno if a file is still where it was, and would be read again. */
 static int keep_damaged(struct jobs *jobs, struct live_job *job, struct error *e)
 {
 	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX], damaged[SPOOL_PATH_MAX];
@@ -105,7 +101,8 @@ static int keep_damaged(struct jobs *jobs, struct live_job *job, struct error *e
 	return 0;
 }
 
-/* An error of the stored data rather than of the machine: it recurs at every start. ENOENT: its folder is missing. */
+/* Whether this is an error of the stored data and not of the machine, so that it would recur at every start. ENOENT:
+ * the folder is missing. */
 static bool is_lasting(int rc)
 {
 	return rc == -EBADMSG || rc == -ERANGE || rc == -ENOENT;
@@ -126,7 +123,7 @@ static void write_end(struct jobs *jobs, struct job_record *r, const char *why)
 	ended_jobs_add(jobs, r);
 }
 
-/* The job fails if the error would recur at every start; otherwise it is an error of the machine. */
+/* Fails the job if its error would recur at every start; otherwise returns the error, which is one of the machine. */
 static int give_up(struct jobs *jobs, uint64_t id, uint64_t extended, int rc, struct error *e)
 {
 	struct error why = *e;
@@ -145,8 +142,6 @@ static int give_up(struct jobs *jobs, uint64_t id, uint64_t extended, int rc, st
 	return rc;
 }
 
-/* ---- one job after the other */
-
 static void fail(struct jobs *jobs, int rc, const struct error *e)
 {
 	jobs->fault = rc;
@@ -154,7 +149,8 @@ static void fail(struct jobs *jobs, int rc, const struct error *e)
 	jobs->stop(jobs->stop_user);
 }
 
-/* With a smaller --blobs than before, a million files may have to go. */
+/* Deletes scene files beyond the limit bit by bit: if --blobs is smaller than before, there may be a million of them.
+ */
 static void on_trim(uv_idle_t *h)
 {
 	struct jobs *jobs = h->data;
@@ -162,7 +158,7 @@ static void on_trim(uv_idle_t *h)
 		uv_idle_stop(h);
 }
 
-/* All have been read: tells the core. */
+/* All jobs have been read: tells the core of them, in order. */
 static int finish(struct jobs *jobs, struct error *e)
 {
 	struct recovery *r = jobs->recovery;
@@ -179,7 +175,7 @@ static int finish(struct jobs *jobs, struct error *e)
 		rc = rc > 0   ? restore_tell(jobs, job, j.held, 0, e)
 		     : rc < 0 ? rc
 			      : error_set(e, ENOENT, "its row is missing");
-		if (!rc && (job = jobs_find(jobs, id))) /* it may have ended at once */
+		if (!rc && (job = jobs_find(jobs, id))) /* the job may have ended at once */
 			files_look(jobs, job);
 		if (rc)
 			rc = error_prefix(e, rc, "j%llu", (unsigned long long)id);
@@ -189,7 +185,7 @@ static int finish(struct jobs *jobs, struct error *e)
 	mem_free(r);
 	jobs->recovery = NULL;
 	jobs->changes++;
-	uv_idle_start(&jobs->trim, on_trim); /* live jobs hold their files by now */
+	uv_idle_start(&jobs->trim, on_trim); /* by now live jobs hold their files */
 	keep_trim(jobs);
 	jobs->peers.jobs_read(jobs->peers.user);
 	return 0;
@@ -203,7 +199,7 @@ static void read_films(uv_work_t *work)
 
 static void films_read(uv_work_t *work, int status);
 
-/* Reads the next job, or ends. */
+/* Starts to read the next job, or finishes. */
 static int read_next(struct jobs *jobs, struct error *e)
 {
 	struct recovery *r = jobs->recovery;
@@ -224,7 +220,7 @@ static void remove_found(struct recovery *r, struct recovering_job *f)
 	mem_free(f);
 }
 
-/* A job cannot be read. 0: it is read again, or has failed for good. */
+/* Handles a job that could not be read. Returns 0 if it is to be read again, or has failed for good. */
 static int take_failure(struct jobs *jobs, struct error *e)
 {
 	struct recovery *r = jobs->recovery;
@@ -277,8 +273,6 @@ static void films_read(uv_work_t *work, int status)
 		fail(jobs, rc, &e);
 }
 
-/* ---- start and end ---- */
-
 static int add_found(struct jobs *jobs, const struct ledger_job *j, struct error *e)
 {
 	struct recovery *r = jobs->recovery;
@@ -292,7 +286,8 @@ static int add_found(struct jobs *jobs, const struct ledger_job *j, struct error
 		return give_up(jobs, id, extended, rc, e);
 	}
 	f->record = f->job->record;
-	struct error unread; /* which its reader will meet and tell; here it is only about the share of what is read */
+	/* Whoever reads the files will meet and report an error; here they only count for the progress. */
+	struct error unread;
 	spool_film_bytes(jobs->spool, id, 2, &f->bytes, &unread);
 	r->bytes += f->bytes;
 	*r->last = f;

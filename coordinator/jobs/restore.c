@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Makes a job from its row in the ledger: submission, plan and record, then the core.
+ * Makes a live job from its row in the ledger: submission, plan and record; and tells the core of it.
  *
- * restore_live_job unpacks it, holds the files of its scene and takes from its record what the submission does not
- * contain. Once its films are read, restore_tell tells the core which epoch of each group and part comes next, and who
- * made the states it starts from.
+ * restore_live_job unpacks the row, takes references to the scene files and takes from the record what the submission
+ * does not contain. Once its films are read, restore_tell tells the core which epoch of each group and part comes
+ * next, and who made the states that it starts from.
  *
- * A submission or plan that cannot be unpacked is -EPROTO if another version accepted the job, otherwise -EBADMSG; the
- * caller decides what happens to the job. Nothing is left behind: held files are released.
+ * A submission or plan that cannot be unpacked is -EPROTO if another version accepted the job, otherwise -EBADMSG;
+ * the caller decides what happens to the job. Nothing is left behind: references to files are released.
  */
 #include "coordinator/jobs/restore.h"
 
@@ -20,8 +20,6 @@
 
 #include <string.h>
 
-/* ---- the core */
-
 static uint64_t next_epoch(const struct live_job *job, uint32_t group, uint32_t part)
 {
 	if (job->bootstrap)
@@ -31,7 +29,7 @@ static uint64_t next_epoch(const struct live_job *job, uint32_t group, uint32_t 
 			      .group = group,
 			      .part = part,
 			      .epoch = canvas_rounds(job->canvas)};
-	for (struct lease_key before = k; k.epoch > 0; k.epoch--) { /* a taken-back batch is missing */
+	for (struct lease_key before = k; k.epoch > 0; k.epoch--) { /* a batch that was taken back may be missing */
 		before.epoch = k.epoch - 1;
 		if (canvas_has(job->canvas, &before))
 			break;
@@ -89,7 +87,7 @@ int restore_tell(struct jobs *jobs, const struct live_job *job, const char *held
 				       .looks = &job->record.looks,
 				       .counts = job->record.counts}};
 	int rc = jobs_ask(jobs, &ev, &(struct incoming){0}, e);
-	if (rc && !tag) /* there is no other reason then */
+	if (rc && !tag) /* without a tag the core refuses for no other reason */
 		rc = error_set(e, ENOMEM, "no memory for a job");
 	mem_free(next);
 	mem_free(makers);
@@ -100,8 +98,6 @@ int restore_tell(struct jobs *jobs, const struct live_job *job, const char *held
 	}
 	return rc;
 }
-
-/* ---- one job */
 
 static int hold_blobs(struct jobs *jobs, const Farm__Submit *m, struct error *e)
 {
@@ -126,7 +122,8 @@ int restore_record(const struct jobs *jobs, uint64_t id, struct job_record *r, b
 	return rc == -ENOENT || rc == -EBADMSG ? 0 : rc;
 }
 
-/* What the submission does not contain, except for its earlier end: its image exists until the next one does. */
+/* Takes what the submission does not contain: priority, number of extensions, and the record of the end before an
+ * extension, since that image exists until there is a new one. */
 static int take_record_of(const struct jobs *jobs, const struct ledger_job *j, struct live_job *job, struct error *e)
 {
 	job->record.priority = j->priority;
@@ -145,7 +142,7 @@ static int take_record_of(const struct jobs *jobs, const struct ledger_job *j, s
 	return rc;
 }
 
-/* Plan or submission cannot be read: another version, or damaged. */
+/* Explains why plan or submission cannot be read: another version wrote it, or it is damaged. */
 static int not_known(const struct ledger_job *j, int rc, struct error *e)
 {
 	if (rc != -EBADMSG && rc != -EINVAL)

@@ -1,15 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Passes results of leases to the core, at once or when nobody reads their film any more.
+ * Passes results of leases to the core, at once or when no thread reads the job's films any more.
  *
  * A result is unpacked and checked, room for its record is reserved, and the core decides: it is merged, noted,
- * repeated or refused. A result that the core would merge while its film is being read waits, and comes here again
+ * repeated or refused. A result that the core would merge while the films are being read waits, and comes here again
  * afterwards.
  *
- * Failures: a key that cannot be read is a fault of the peer, which is hung up on. Values that may be those of any
- * worker (-ERANGE) count as a failed lease. Other contents that fail the checks go to the core as invalid, with the
- * reason. Without room, in memory, on the disk or among those that wait, a result is refused and its lease handed out
- * again. A failure that may be the fault of the job's files counts once these have been read.
+ * Failures: a key that cannot be read is a fault of the peer, which is disconnected. Values out of range (-ERANGE),
+ * which may be the same for any worker, count as a failed lease. Other contents that fail the checks go to the core
+ * as invalid, with the reason. If there is no room, in memory, on the disk or among the results that wait, a result
+ * is refused and its lease handed out again. A failure that may be the fault of the job's files counts once these
+ * have been read.
  */
 #include "coordinator/jobs/results.h"
 
@@ -24,7 +25,7 @@
 #include "coordinator/jobs/files.h"
 #include "coordinator/jobs/step.h"
 
-/* It can be computed again. */
+/* Refuses a result through no fault of the worker. Its lease is computed again. */
 static void refuse(struct jobs *jobs, uint64_t peer, const struct lease_key *k, const char *why)
 {
 	struct event ev = {.kind = EVENT_LEASE_RETURNED, .peer = peer, .job = k->job, .lease = {.key = *k}};
@@ -60,7 +61,7 @@ static void take_result(struct jobs *jobs, uint64_t peer, const Farm__LeaseResul
 		rc = digest_batch(&batch, &ev.lease.digest, &e);
 	if (job && !rc && job->canvas && batch.key.kind == LEASE_RENDER)
 		rc = canvas_admits(job->canvas, &batch, &e);
-	if (rc == -ERANGE) { /* perhaps any worker's result would be like that: treated as a failed lease */
+	if (rc == -ERANGE) { /* treated as a failed lease, because the results of all workers may be like that */
 		fail(jobs, job, peer, &ev.lease.key, e.text);
 		batch_fini(&batch);
 		return;
@@ -81,8 +82,8 @@ static void take_result(struct jobs *jobs, uint64_t peer, const Farm__LeaseResul
 	ev.lease.valid = rc == 0;
 	ev.text = e.text;
 	struct incoming in = {.batch = &batch, .result = &stored, .payload = payload};
-	if (rc == -ENOMEM || (job && ev.lease.valid &&
-			      durable_reserve(jobs, job, &in, &e))) /* no room for it, in memory or on the disk */
+	/* There is no room for it, in memory or on the disk. */
+	if (rc == -ENOMEM || (job && ev.lease.valid && durable_reserve(jobs, job, &in, &e)))
 		refuse(jobs, peer, &ev.lease.key, e.text);
 	else
 		jobs_step_with(jobs, &ev, &in);
@@ -98,15 +99,15 @@ static bool has_room(const struct jobs *jobs, const struct buf *payload)
 	return bytes <= jobs->config.waiting_bytes;
 }
 
-/* The film is in use. Results that the core would merge wait: one for each lease that its worker holds, and one for
- * a lease without holder. */
+/* Keeps a result that arrives while the films are in use, if the core would merge it: one for each lease that its
+ * worker holds, and one for a lease that the worker does not hold. */
 static void put_off(struct jobs *jobs, struct live_job *job, uint64_t peer, const struct lease_key *k,
 		    struct envelope *env, struct buf *payload)
 {
 	struct event ev = {.kind = EVENT_DELIVERED, .peer = peer, .job = k->job, .lease = {.key = *k, .valid = true}};
 	enum farm_delivery awaited = answer_awaits(jobs->farm, peer, k);
 	const struct waiting_batch *w = awaited == DELIVERY_OPEN ? live_job_waits_for(job, k) : NULL;
-	if (w && w->peer == peer) /* the answer to that one answers this one */
+	if (w && w->peer == peer) /* the acknowledgement of the waiting result will do for this one, too */
 		return;
 	if (awaited == DELIVERY_USELESS)
 		ev.kind = EVENT_BATCH;
@@ -118,8 +119,8 @@ static void put_off(struct jobs *jobs, struct live_job *job, uint64_t peer, cons
 	jobs_step(jobs, &ev);
 }
 
-/* A worker that does not hold the lease, or refuses states of an earlier grant, refuses nothing current: there is no
- * maker. */
+/* Logs a failed lease. holds: the worker holds the lease and refuses its current states; otherwise no maker is named.
+ */
 static void log_failure(const struct jobs *jobs, const char *from, struct live_job *job, const Farm__LeaseFailed *f,
 			const struct lease_key *k, const char *text, bool holds)
 {
@@ -139,7 +140,7 @@ static void fail_lease(struct jobs *jobs, uint64_t peer, const Farm__LeaseFailed
 	char text[1024];
 	struct blob_hash states = {{0}};
 	struct event ev = {.kind = *f->text ? EVENT_LEASE_FAILED : EVENT_LEASE_RETURNED, .peer = peer, .text = text};
-	/* Sanitised: it may contain texts of a scene's author. */
+	/* Removes control characters: the text may contain parts of a scene. */
 	text_copy(text, sizeof text, f->text);
 	text_clean(text);
 	if (lease_key_from_wire(f->key, &ev.lease.key, &e) ||
@@ -161,8 +162,8 @@ static void fail_lease(struct jobs *jobs, uint64_t peer, const Farm__LeaseFailed
 	}
 	struct rollback back = {0};
 	bool holds = answer_awaits(jobs->farm, peer, &ev.lease.key) == DELIVERY_AWAITED &&
-		     !ev.lease.other_states; /* otherwise nothing is read for it */
-	/* `later` may come every few seconds: the status shows it, and the log stays short. */
+		     !ev.lease.other_states; /* otherwise no batch is read for it */
+	/* Failures with `later` may come every few seconds: the status shows them, but they are not logged. */
 	if (job && *text && !f->later)
 		log_failure(jobs, jobs->peers.name(jobs->peers.user, peer), job, f, &ev.lease.key, text, holds);
 	if (job && *text && f->bad_states && holds && !job->busy && !jobs->stepping &&
@@ -175,7 +176,8 @@ static void fail_lease(struct jobs *jobs, uint64_t peer, const Farm__LeaseFailed
 	rollback_fini(&back);
 }
 
-/* A failure that may be the spool's fault: its job's files are read first, once. false: they have been. */
+/* Has the job's files read, once, before a failure counts that the spool may be to blame for. Returns false if they
+ * have been read. */
 static bool awaits_files(struct jobs *jobs, struct live_job *job, bool *checked)
 {
 	if (*checked)
@@ -189,8 +191,8 @@ static bool awaits_files(struct jobs *jobs, struct live_job *job, bool *checked)
 	return job && files_are_read(jobs, job);
 }
 
-/* Refused states are handled when nobody reads the film. Nothing is read for a failure that does not count: anybody can
- * send many of them. checked: as in struct waiting_batch. */
+/* Handles a failed lease. Refused states are handled when no thread reads the films. No file is read for a failure
+ * that does not count, since anybody can send many of them. checked: as in struct waiting_batch. */
 static void take_failure(struct jobs *jobs, uint64_t peer, struct envelope *env, struct buf *payload, bool checked)
 {
 	const Farm__LeaseFailed *m = env->message->lease_failed;

@@ -5,13 +5,13 @@
 
 #include "coordinator/live_job/jobs.h"
 
-/* A LeaseResult or a LeaseFailed: now, or when the films are free and the job's files have been read. May take either.
- */
+/* Handles a LeaseResult or LeaseFailed, now, or when the films are free and the job's files have been read. May take
+ * over envelope and payload. */
 void results_take(struct jobs *jobs, uint64_t peer, struct envelope *env, struct buf *payload);
-/* One that was put off; the caller frees it. */
+/* Handles a message that was put off; the caller frees it. */
 void results_take_waiting(struct jobs *jobs, struct waiting_batch *w);
-/* A worker leaves. Its failures count now, by what is known of the files so far, since a worker that hangs reports that
- * and leaves; its results are dropped. */
+/* Call when a worker leaves. Its failures count now, by what is known of the files so far, since a worker that hangs
+ * reports that and leaves; its results are dropped. */
 void results_let_go(struct jobs *jobs, uint64_t peer);
 
 #endif

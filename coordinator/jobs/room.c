@@ -12,7 +12,8 @@ bool room_make(const struct jobs *jobs)
 	return blob_store_evict(jobs->blobs) || keep_drop_all(jobs);
 }
 
-/* Bytes of the next checkpoint; before the first one, an upper bound. */
+/* Returns the size of the next checkpoint, supposing that it is as large as the last one; before the first one, an
+ * upper bound. */
 static uint64_t checkpoint_size(const struct live_job *job)
 {
 	return job->checkpoint_bytes ? job->checkpoint_bytes : canvas_bytes(&job->plan);
@@ -30,7 +31,8 @@ static uint64_t available(const struct jobs *jobs)
 	return disk_available(path);
 }
 
-/* What ended and running jobs have on the disk besides their images and files. false: not all of it could be read. */
+/* Adds up the merged results of ended and live jobs on the disk, without images and scene files. Returns false if not
+ * all of them could be read. */
 static bool job_bytes(const struct jobs *jobs, uint64_t *sum)
 {
 	uint64_t bytes;
@@ -109,7 +111,8 @@ static uint64_t claim_of(const struct jobs *jobs, const struct live_job *job)
 	return size + (most > journal ? most - journal : 0) + films;
 }
 
-/* In order of room_share; mem_alloc'd, NULL: no memory. */
+/* Returns the claims of all jobs from which results may come, and of `asking`, sorted and decided by room_share;
+ * mem_alloc'd, NULL: out of memory. */
 static struct room_claim *claims_of_all(const struct jobs *jobs, const struct live_job *asking, size_t *count)
 {
 	size_t live = 0;

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Opens and closes the jobs, and does from time to time what nobody asks for.
+ * Opens and closes the jobs, and runs their periodic work.
  *
- * jobs_open opens the spool and the ledger, lists the jobs that have ended, makes the core and starts to read those
- * that had not (recovery.c). After each step of the core: finishes jobs that have ended, merges results that waited for
- * others, and starts a checkpoint if one is due. When films are free again: the same without checkpoints; then results
- * that arrived while the films were read follow, one in each turn of the loop, by `drain`. An error of the spool ends
- * the start with a sentence; jobs_close then closes what was opened.
+ * jobs_open opens the spool and the ledger, lists the jobs that have ended, makes the core and starts to read the
+ * jobs that have not (recovery.c). After each step of the core: finishes jobs that have ended, merges results that
+ * waited for others, and starts a checkpoint if one is due. When films are free again: the same without checkpoints;
+ * then results that arrived while the films were read follow, one in each turn of the loop, by `drain`. An error of
+ * the spool ends the start with a sentence; jobs_close then closes what was opened.
  */
 #include "coordinator/jobs/start.h"
 
@@ -29,7 +29,7 @@
 #include "coordinator/retention/clear.h"
 #include "coordinator/retention/keep.h"
 
-/* One at a time, so that nobody else waits for all of them. */
+/* Handles one waiting result per turn of the loop, so that nothing else has to wait for all of them. */
 static void on_drain(uv_idle_t *h)
 {
 	struct jobs *jobs = h->data;
@@ -117,8 +117,7 @@ void jobs_init(struct jobs *jobs)
 	jobs->read = jobs_now(jobs);
 }
 
-/* Retries, for each live job whose time has come, what the disk refused: image, record, films, and the journal for its
- * results. */
+/* Retries, for each live job whose time has come, what the disk refused: image, record, films, or results. */
 static void retry(struct jobs *jobs)
 {
 	for (struct live_job *job = jobs->live; job; job = job->next) {

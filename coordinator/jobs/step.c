@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Passes an event through the core and carries out what follows.
+ * Passes an event through the core and carries out the core's actions.
  *
- * jobs_step gives it to the core (core/farm.h), which changes its state and answers with a list of actions. The table
- * `follow_up` carries these out. Events that arise meanwhile are queued and handled before jobs_step returns; then the
- * table is told that the step is over. The core says by when it must be told the time: the timer `wake`.
+ * jobs_step gives the event to the core (core/farm.h), which changes its state and answers with a list of actions.
+ * The table `follow_up` carries these out. Events that arise meanwhile are queued and handled before jobs_step
+ * returns; then the table is told that the step is over. The timer `wake` sends the event that the core needs when
+ * only time has passed.
  *
  * A step does not fail. If there is no memory for a queued event (300 bytes), the process ends.
  */
@@ -17,8 +18,6 @@
 #include <assert.h>
 #include <math.h>
 #include <stdlib.h>
-
-/* ---- the core ---- */
 
 void jobs_defer(struct jobs *jobs, const struct event *ev)
 {
@@ -46,7 +45,7 @@ static void one_step(struct jobs *jobs, struct event *ev, const struct incoming 
 	struct update u;
 	ev->time = jobs_now(jobs);
 	ev->unread = ev->time - jobs->read;
-	if (ev->unread < jobs->config.heartbeat_seconds + 1e-3 * TICK_MS) /* nobody is blamed for so short a silence */
+	if (ev->unread < jobs->config.heartbeat_seconds + 1e-3 * TICK_MS) /* too short a silence to blame anybody */
 		ev->unread = 0;
 	farm_step(jobs->farm, ev, &u);
 	jobs->changes++;
@@ -61,7 +60,7 @@ static void one_step(struct jobs *jobs, struct event *ev, const struct incoming 
 
 void jobs_step(struct jobs *jobs, struct event *ev)
 {
-	if (jobs->stepping) /* messages of sessions while an update is being carried out */
+	if (jobs->stepping) /* messages of sessions may arrive while an update is being carried out */
 		jobs_defer(jobs, ev);
 	else
 		jobs_step_with(jobs, ev, &nothing);

@@ -1,29 +1,30 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Passes an event through the core and carries out what follows. The loop's thread. */
+/* Passes events through the core and carries out the core's actions. The loop's thread. */
 #ifndef COORDINATOR_JOBS_STEP_H
 #define COORDINATOR_JOBS_STEP_H
 
 #include "coordinator/live_job/jobs.h"
 
-/* Functions that carry out the core's answers. A table, because they make steps themselves (start.c). */
+/* The functions that carry out the core's actions, as a table, because they make steps themselves (start.c). */
 struct follow_up {
-	/* Carries out the actions of an update, in order. in: what came with the event. */
+	/* Carries out the actions of an update, in order. in: data that came with the event. */
 	void (*carry_out)(struct jobs *jobs, const struct update *u, const struct incoming *in);
-	void (*stepped)(struct jobs *jobs);    /* the event and all events deferred meanwhile are handled */
-	void (*films_free)(struct jobs *jobs); /* some live job is no longer busy */
+	void (*stepped)(struct jobs *jobs);    /* the event and all events deferred meanwhile have been handled */
+	void (*films_free)(struct jobs *jobs); /* a live job is no longer busy */
 };
 
-/* Gives the event to the core and carries out the update and everything that follows. */
+/* Gives the event to the core, and carries out its actions and everything that follows from them. */
 void jobs_step(struct jobs *jobs, struct event *ev);
-/* The same, for an event with more data (incoming.h). Not while an update is being carried out. */
+/* Like jobs_step(), for an event with more data (incoming.h). Not while an update is being carried out. */
 void jobs_step_with(struct jobs *jobs, struct event *ev, const struct incoming *in);
-/* The same, for one that the core, or the disk, may refuse: -EPERM, with its reason. in: its refusal is set here. */
+/* Like jobs_step_with(), for an event that the core, or the disk, may refuse. Returns -EPERM with the reason if it is
+ * refused. Sets in->refusal. */
 int jobs_ask(struct jobs *jobs, struct event *ev, struct incoming *in, struct error *e);
-/* Later, after the current update. Copies the text. */
+/* Handles the event after the current update. Copies the text. */
 void jobs_defer(struct jobs *jobs, const struct event *ev);
-void jobs_break(struct jobs *jobs, uint64_t job, const char *text); /* the job fails */
+void jobs_break(struct jobs *jobs, uint64_t job, const char *text); /* fails the job after the current update */
 
-/* Some live job is no longer busy: what waited for its canvas continues. Live jobs that have ended are gone
+/* Call when a live job is no longer busy: what waited for its canvas continues. Live jobs that have ended are gone
  * afterwards. */
 void jobs_films_free(struct jobs *jobs);
 

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Quarantined workers are a note in the ledger, which is told to the core at the start and written again whenever the
- * core finds one; wrong results are counted, named in the job's note and logged.
+ * Quarantined workers and wrong results. The list of quarantined workers is a note in the ledger; the core is told of
+ * them at the start, and the note is written again whenever the core quarantines another. Wrong results are logged,
+ * and how many unverified results a quarantined worker has contributed is noted in the job.
  *
- * A note that cannot be read is kept under another name, and a list that cannot be written is logged; neither stops the
- * farm.
+ * A note that cannot be read is kept under another name, and a list that cannot be written is logged; neither stops
+ * the farm.
  */
 #include "coordinator/jobs/trust.h"
 
@@ -17,9 +18,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char note[] = "quarantined"; /* in the ledger */
-
-/* ---- the list of quarantined workers */
+static const char note[] = "quarantined"; /* name of the note in the ledger */
 
 static int add_worker(json_t *list, const struct worker_status *w, struct error *e)
 {
@@ -75,7 +74,8 @@ static void tell_core(struct jobs *jobs, const json_t *w)
 	jobs_step(jobs, &ev);
 }
 
-/* A start with the same option as before is no mistake, but a typing error would leave the worker where it is. */
+/* Logs that --forgive names nobody in the list. This may be a start with the same option as before, which is no
+ * mistake; but a typing error would leave the worker quarantined. */
 static void tell_unforgiven(const struct jobs *jobs, const json_t *list)
 {
 	const char *name = jobs->config.forgive;
@@ -95,7 +95,8 @@ static void tell_unforgiven(const struct jobs *jobs, const json_t *list)
 
 static const char empty[] = "{\"schema\": 1, \"workers\": []}";
 
-/* The farm does not stop for it: a worker that gives wrong results will do so again, and be found again. */
+/* Keeps a damaged note under another name. The farm need not stop for it: a worker that gives wrong results will do
+ * so again, and be found again. */
 static int keep_damaged_note(struct jobs *jobs, const char *text, struct error *e)
 {
 	log_event(LOG_SPOOL_FAULT,
@@ -132,8 +133,6 @@ int trust_open(struct jobs *jobs, struct error *e)
 		write_quarantined(jobs);
 	return rc;
 }
-
-/* ---- wrong results */
 
 double trust_share(const struct jobs *jobs, const Farm__Submit *m)
 {

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Records workers that gave wrong results. Quarantined ones are listed in a note of the ledger, so they stay
+ * Records workers that gave wrong results. Quarantined workers are listed in a note of the ledger, so they stay
  * quarantined after a restart; an operator readmits one with --forgive. A job's log and note say how many unverified
- * results of such a worker are in its image, where they cannot be taken out. Who made which result is known until the
- * coordinator ends. The loop's thread.
+ * results of such a worker are in its image; they cannot be taken out. Which worker made which result is known only
+ * until the coordinator ends. The loop's thread.
  */
 #ifndef COORDINATOR_JOBS_TRUST_H
 #define COORDINATOR_JOBS_TRUST_H
@@ -11,16 +11,21 @@
 #include "coordinator/live_job/jobs.h"
 
 /* Tells the core who is quarantined, except for workers that the configuration forgives. A damaged list is kept as
- * quarantined-damaged, and the log says so. */
+ * quarantined-damaged, and logged. */
 int trust_open(struct jobs *jobs, struct error *e);
 
-/* Share of the job's leases to verify: what it requests, but at least the minimum for all jobs; none of a mixed job. */
+/* Returns the fraction of the job's leases to verify: what the job requests, but at least the minimum for all jobs; 0
+ * for a mixed job. */
 double trust_share(const struct jobs *jobs, const Farm__Submit *m);
 
+/* Counts a merged result of the worker that was not verified. */
 void trust_merged(struct live_job *job, const struct action *a);
 void trust_taken_back(struct live_job *job, uint64_t who); /* one of its results does not count any more */
+/* Logs a wrong result in the job's log. */
 void trust_wrong(struct jobs *jobs, const struct action *a);
-void trust_anew(struct jobs *jobs, const struct action *a); /* chains that lost their states */
+/* chains start again from their seeds: logs and notes that in the job. */
+void trust_anew(struct jobs *jobs, const struct action *a);
+/* Logs and stores that a worker is quarantined, and notes its unverified results in all live jobs. */
 void trust_quarantined(struct jobs *jobs, const struct action *a);
 
 #endif
