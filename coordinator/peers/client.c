@@ -2,13 +2,13 @@
 /*
  * A client's side of a session: submit, list, watch; fetch.c and control.c have the rest.
  *
- * A submission waits in the session until its files have arrived (upload.h), and then goes to the core, whose answer is
- * the client's. A client sees only its own jobs, by the name in its certificate; an operator sees all, and so does
- * everybody without TLS. A client that watches a job gets its status whenever it has changed and the previous one has
- * been read.
+ * A submission waits in the session until its files have arrived (upload.h), and then goes to the core, whose answer
+ * is sent to the client. A client sees only its own jobs, by the name in its certificate; an operator sees all, and
+ * so does everybody without TLS. A client that watches a job is sent its status whenever it has changed and the
+ * previous one has been read.
  *
  * A submission that is refused, or exceeds its owner's quota, is answered with a sentence, and the client may submit
- * another. Where there is no room for files, submissions give way whose clients send nothing. An invalid message is
+ * another. If there is no room for files, submissions whose clients send nothing give way. An invalid message is
  * answered by Fault, and the connection ends.
  */
 #include "coordinator/peers/client.h"
@@ -31,9 +31,8 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { CHUNK = 1 << 20, PACE = CHUNK, UPLOADS_MOST = 1 << 28 /* bytes of all submissions that wait for files */ };
-
-/* ---- submit ---- */
+/* Limit on the bytes of all submissions that wait for files. */
+enum { CHUNK = 1 << 20, PACE = CHUNK, UPLOADS_MOST = 1 << 28 };
 
 static void answer_submit(struct session *p, uint64_t job, const char *refusal, const struct upload *u)
 {
@@ -88,8 +87,9 @@ static int within_quota(const struct session *p, struct error *e)
 				 p->upload->submit.message->submit, e);
 }
 
-/* Whether it could be stored once all other jobs are over: otherwise it would be held for ever, and with it others.
- * Whether memory has room for its chain states, if workers send the longest that there are. */
+/* Checks whether the job could be stored if all other jobs were over, since otherwise it would be held forever, and
+ * other jobs with it; and whether memory has room for its chain states, supposing that workers send the longest
+ * possible. */
 static int fits(const struct session *p, struct error *e)
 {
 	uint64_t bytes = canvas_bytes(&p->upload->plan) + upload_bytes(p->upload),
@@ -104,13 +104,14 @@ static int fits(const struct session *p, struct error *e)
 	return rc ? rc : room_could_hold(p->jobs, bytes, e);
 }
 
-/* All blobs have arrived: the core decides. */
+/* Gives the submission, whose blobs have all arrived, to the core, and answers the client. */
 static void submit(struct session *p)
 {
 	const Farm__Submit *m = p->upload->submit.message->submit;
 	char name[128];
 	struct error e;
-	if (within_quota(p, &e)) { /* checked again: other jobs may have been submitted while its files arrived */
+	/* Checked again, because other jobs may have been submitted while its files arrived. */
+	if (within_quota(p, &e)) {
 		refuse_upload(p, &e);
 		return;
 	}
@@ -135,7 +136,8 @@ static void submit(struct session *p)
 
 static void on_looks(uv_idle_t *h);
 
-/* Asks for the files that the store lacks; those that it has are read first. */
+/* Looks for the submission's files in the store, where existing ones are read first, and asks the client for the
+ * missing ones. */
 static void look_for_files(struct session *p)
 {
 	struct error e;
@@ -157,7 +159,7 @@ static void look_for_files(struct session *p)
 	answer_submit(p, 0, "", p->upload);
 }
 
-/* In each turn of the loop one submission goes on, in turns with others. */
+/* Continues one submission in each turn of the loop; the submissions take turns. */
 static void on_looks(uv_idle_t *h)
 {
 	struct peers *s = h->data;
@@ -174,16 +176,17 @@ static void on_looks(uv_idle_t *h)
 	look_for_files(next);
 }
 
-/* It has sent less than PACE bytes for twice the time within which a frame must be complete. */
+/* Whether the client has sent less than PACE bytes for twice the time within which a frame must be complete. */
 static bool stands_still(const struct session *p)
 {
 	return !p->upload->flush && jobs_now(p->jobs) - p->upload->pace.paced > 2 * p->jobs->config.stall_seconds;
 }
 
-/* There is no room for the files of a submission that began then. The submission that has been idle longest gives way;
- * if none is idle, the latest of those that began later and have sent something. So no submission keeps room by
- * waiting, and later ones take none from those that are halfway. INFINITY: before anything of it is there, for which
- * only the first do. false: there is none. */
+/* Makes room for the files of a submission by refusing another one. The submission that has been idle longest gives
+ * way; if none is idle, the latest of those that began after `begun` and have received something. So no submission
+ * keeps room by waiting, and later submissions take no room from those that are halfway. begun: when the submission
+ * in need began; INFINITY if nothing of it has arrived yet, in which case only idle ones give way. Returns false if
+ * none gives way. */
 static bool other_gives_way(struct peers *s, const struct session *sender, double begun)
 {
 	struct session *still = NULL, *latest = NULL;
@@ -289,8 +292,6 @@ static void take_blob(struct session *p, const Farm__BlobChunk *c, const unsigne
 	if (rc < 0)
 		refuse_upload(p, &e);
 }
-
-/* ---- other requests ---- */
 
 static void take_list(struct session *p)
 {

@@ -10,7 +10,7 @@
 #include "coordinator/jobs/step.h"
 #include "coordinator/peers/client_answers.h"
 
-/* Without certificates anybody can use any name. */
+/* The name in the certificate. Without certificates clients could give any name, so none is used. */
 static const char *name_of(const struct session *p)
 {
 	return *p->who.name ? p->who.name : "a client";
@@ -22,7 +22,8 @@ static int ask_core(struct session *p, struct event *ev, struct error *e)
 	return jobs_ask(p->jobs, ev, &(struct incoming){0}, e);
 }
 
-/* The core knows whether it can be done, so it is asked first. done: "held" or the like. */
+/* Explains an order that the core has carried out but that could not be stored. The core is asked first, because only
+ * it knows whether the order can be carried out. done: "held" or the like. */
 static int not_for_long(int rc, const char *done, struct error *e)
 {
 	return error_prefix(e, rc, "%s, but only until the coordinator restarts", done);
@@ -63,7 +64,8 @@ static int set_priority(struct session *p, uint64_t id, int priority, struct err
 	return 0;
 }
 
-/* The core may have forgotten a job that is over. */
+/* Returns an error if the client has no such job or, unless over_too is set, the job is over. The core may have
+ * forgotten a job that is over. */
 static int check_job_exists(const struct session *p, uint64_t job, bool over_too, struct error *e)
 {
 	struct job_view v;
@@ -114,8 +116,8 @@ void control_job(struct session *p, const Farm__Control *c)
 						       .mutations = c->more_mutations,
 						       .seconds = c->more_seconds,
 						       .target_error = c->target_error});
-			return; /* answered now or later */
-		default:	/* an untrusted number */
+			return; /* extend_job answers, now or later */
+		default:	/* an unknown number in the message */
 			rc = error_set(&e, EINVAL, "unknown request for a job");
 		}
 	}

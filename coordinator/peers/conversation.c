@@ -4,13 +4,13 @@
  *
  * The first message must be hello, within a time limit, and at most 4 KiB long. Version, names and the certificate's
  * role are checked; a peer that is refused gets a sentence, and a worker is also told whether reconnecting can help.
- * Then a worker asks for leases, sends results or failures, asks for files, and sends heartbeats; each message becomes
- * an event for the core, and each result is checked first (results.c).
+ * Then a worker asks for leases, sends results or failures, asks for files, and sends heartbeats; each message
+ * becomes an event for the core, and each result is checked first (results.c).
  *
- * An invalid message is answered by Fault, and the connection ends. Data that a peer does not read is bounded by a send
- * limit, data of all peers by another: then those that have not read for longest are disconnected. When the maximum of
- * connections is reached, the oldest one without a hello is closed. When a connection ends, the core gets EVENT_LEFT,
- * and the peer's uploads, fetches and requests are dropped.
+ * An invalid message is answered by Fault, and the connection ends. The data that a peer has not read is bounded by a
+ * send limit for each peer, and by another for all peers together: beyond it, those that have not read for longest
+ * are disconnected. When the maximum number of connections is reached, the oldest one without a hello is closed. When
+ * a connection ends, the core gets EVENT_LEFT, and the peer's uploads, fetches and requests are dropped.
  */
 #include "coordinator/peers/conversation.h"
 
@@ -30,9 +30,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* ---- hello ---- */
-
-/* text: why it is refused, or a note for a peer that is accepted. */
+/* final: reconnecting will not help. said: why the peer is refused, or a note for a peer that is accepted. */
 static void answer_hello(struct session *p, bool accepted, bool final, const char *said)
 {
 	char text[256];
@@ -50,13 +48,13 @@ static void answer_hello(struct session *p, bool accepted, bool final, const cha
 	}
 }
 
-/* Reasons that reconnecting does not change. */
+/* Refuses a peer for a reason that reconnecting does not change. */
 static void refuse_for_good(struct session *p, const char *said)
 {
 	answer_hello(p, false, true, said);
 }
 
-/* Notes for a peer that is accepted. */
+/* Writes notes for a peer that is accepted. */
 static const char *what_to_know(const struct session *p, char *text, size_t size)
 {
 	struct peer_status s;
@@ -98,7 +96,7 @@ static void join(struct session *p, const Farm__Hello *h)
 	answer_hello(p, true, false, what_to_know(p, text, sizeof text));
 }
 
-/* What the certificate does not allow; NULL: it allows everything. */
+/* Returns what the peer wants to do but its certificate does not allow; NULL: nothing. Sets p->who. */
 static const char *find_overreach(struct session *p, Farm__Role role, char *text, size_t size)
 {
 	const struct tls_peer *who = conn_peer(p->conn);
@@ -114,7 +112,7 @@ static const char *find_overreach(struct session *p, Farm__Role role, char *text
 	return text;
 }
 
-/* Hexadecimal digits, as many as the core stores. */
+/* Whether a home's name is hexadecimal digits, and no longer than the core can store. */
 static bool home_ok(const char *home)
 {
 	size_t n = strspn(home, "0123456789abcdef");
@@ -158,9 +156,7 @@ static void take_hello(struct session *p, const Farm__Hello *h)
 	}
 }
 
-/* ---- connections ---- */
-
-/* Handles a message. May take the envelope. */
+/* Handles a message. May take over the envelope. */
 static void take_message(struct session *p, struct envelope *env, const unsigned char *payload, size_t size)
 {
 	if (p->state == SESSION_NEW && env->message->body_case == FARM__ENVELOPE__BODY_HELLO)
@@ -177,7 +173,7 @@ static void on_message(void *user, struct envelope *env, const unsigned char *pa
 {
 	struct session *p = user;
 	bool known = p->state == SESSION_WORKER || p->state == SESSION_CLIENT;
-	Farm__Envelope__BodyCase what = env->message->body_case; /* which may be taken */
+	Farm__Envelope__BodyCase what = env->message->body_case; /* read now, because the envelope may be taken over */
 	double begun = jobs_now(p->jobs);
 	if (known && held_take(p, env))
 		return;
@@ -219,7 +215,7 @@ static void on_closed(void *user, const char *why)
 	struct session *p = user;
 	struct peers *s = p->peers;
 	if (!p->jobs->stopping)
-		results_let_go(p->jobs, p->id); /* while it has a name */
+		results_let_go(p->jobs, p->id); /* while the session still has a name */
 	peers_delist(s, p);
 	client_upload_abort(p);
 	fetch_end(p);

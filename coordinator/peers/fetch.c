@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Files of jobs for clients, chunk by chunk. A file is opened once per fetch, so all chunks are of the same file even
- * if another one takes its name meanwhile.
+ * Sends files of jobs to clients, chunk by chunk. A file is opened once per fetch, so all chunks are of the same file
+ * even if another one takes its name meanwhile.
  */
 #include "coordinator/peers/fetch.h"
 
@@ -14,7 +14,7 @@
 #include <string.h>
 
 enum { CHUNK = 1 << 20 };
-static const double preview_seconds = 5; /* an image younger than this is reused */
+static const double preview_seconds = 5; /* a preview younger than this is sent again */
 
 static const char *file_of(Farm__What what)
 {
@@ -26,7 +26,7 @@ static const char *file_of(Farm__What what)
 	case FARM__WHAT__WHAT_PREVIEW:
 		return "preview.exr";
 	default:
-		return NULL; /* an untrusted number */
+		return NULL; /* an unknown number in the message */
 	}
 }
 
@@ -50,7 +50,8 @@ void fetch_end(struct session *p)
 	p->peers->fetches--;
 }
 
-/* The fetch that has been idle longest is dropped: clients that start and stop must not block those that continue. */
+/* Drops the fetch that has been idle longest if there are too many: clients that start and stop must not block those
+ * that continue. */
 static void make_room(struct peers *s)
 {
 	struct session *silent = NULL;
@@ -78,7 +79,7 @@ static int open_file(struct session *p, const Farm__Fetch *f, const char *file, 
 			disk_close(fd);
 		return rc;
 	}
-	if (st.st_size > CHUNK) /* otherwise this is its only chunk */
+	if (st.st_size > CHUNK) /* otherwise the first chunk is the only one */
 		make_room(p->peers);
 	p->fetch = (struct fetching){.job = f->job, .what = f->what, .fd = fd, .size = (uint64_t)st.st_size};
 	p->peers->fetches++;
@@ -142,7 +143,8 @@ static void answer(struct session *p, const Farm__Fetch *f)
 	mem_free(bytes);
 }
 
-/* Made on demand: it delays the job's results for as long as making the image takes. */
+/* Whether a new preview must be made. Previews are made on demand; making one delays the job's results for as long as
+ * it takes. */
 static bool is_preview_old(const struct jobs *jobs, const struct live_job *job)
 {
 	return job && job->canvas && !job->ended &&

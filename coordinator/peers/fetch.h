@@ -7,11 +7,12 @@
 
 /* Handles a request for a chunk, now or when the preview is ready. */
 void fetch_begin(struct session *p, const Farm__Fetch *f);
+/* Ends the session's fetch, if there is one. */
 void fetch_end(struct session *p);
-/* The live job's canvas is free, or the job has ended: sends the preview to those that wait for it, or starts making
- * it. */
+/* Call when the live job's canvas is free, or the job has ended: sends the preview to the clients that wait for it,
+ * or starts making it. */
 void fetch_previews(struct peers *s, uint64_t job);
-/* Whether somebody fetches the job's result, or waits for it. */
+/* Whether a client is fetching the job's result, or waits for it. */
 bool fetch_uses(const struct peers *s, uint64_t job);
 
 #endif

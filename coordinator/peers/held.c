@@ -7,7 +7,8 @@
 
 #include <string.h>
 
-/* Limits of memory, in total and per peer: a worker asks once for each job that it knows, and reports lost leases. */
+/* Limits on the memory of waiting requests, in total and per peer. A worker asks once for each job that it knows, and
+ * reports lost leases. */
 enum { HELD_MOST = 1 << 28, PEER_MOST = 1 << 23 };
 
 struct held {
@@ -20,16 +21,16 @@ static size_t cost_of(const struct envelope *env)
 	return env->bytes + sizeof(struct held);
 }
 
-/* first: nothing of this peer is waiting yet. */
+/* first: no request of this peer is waiting. */
 static bool is_answered_at_once(Farm__Envelope__BodyCase what, bool first)
 {
 	return what == FARM__ENVELOPE__BODY_HEARTBEAT || what == FARM__ENVELOPE__BODY_BYE ||
 	       (first && what == FARM__ENVELOPE__BODY_JOB_LIST);
 }
 
-/* A client's messages that are requests, to be answered in turn: an order is flushed on the loop's thread, and a list
- * of hundreds of jobs takes milliseconds. Messages with a payload are not, since a client sends them only when it has
- * an answer. */
+/* Whether this is a client's request that takes turns with others: an order is flushed on the loop's thread, and
+ * listing hundreds of jobs takes milliseconds. Chunks of blobs are excluded, since a client sends them only after it
+ * has got an answer. */
 static bool is_request(const struct session *p, Farm__Envelope__BodyCase what)
 {
 	return p->state == SESSION_CLIENT && what != FARM__ENVELOPE__BODY_BLOB_CHUNK &&

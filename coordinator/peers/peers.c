@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * All connections: accepting them, and what the jobs ask of them.
+ * All connections: accepting them, and the functions through which the jobs use them.
  *
- * peers_accept makes a session for a connection, which is in the list until its connection has closed (conversation.c).
- * When the maximum of connections is reached, the oldest one without a hello is closed; if there is none, or no memory,
- * the new one is closed, or waits for the next tick if not even that can be done.
+ * peers_accept makes a session for a connection, which stays in the list until its connection has closed
+ * (conversation.c). When the maximum number of connections is reached, the oldest one without a hello is closed. If
+ * there is none, or no memory, the new connection is closed; if not even that can be done, it waits for the next
+ * tick.
  *
- * The functions that the jobs call are at the end of the file: each finds the session, and does nothing if it is gone.
+ * The functions that the jobs call are at the end of the file. Each looks for the session, and does nothing if it is
+ * gone.
  */
 #include "coordinator/peers/peers.h"
 
@@ -27,8 +29,8 @@ static void on_refused(void *user, const char *why)
 }
 static const struct conn_events refused_events = {.closed = on_refused};
 
-/* Peers that have not said hello are closed first, the oldest first: strangers that hold connections and say nothing
- * must not block others. */
+/* Closes the oldest connection that has not said hello: strangers that hold connections and say nothing must not
+ * block others. Returns false if there is none. */
 static bool make_room(struct peers *s)
 {
 	struct session *oldest = NULL;
@@ -100,8 +102,6 @@ void peers_stop(struct peers *s)
 	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next))
 		conn_close(p->conn, "the coordinator stops");
 }
-
-/* ---- calls of the jobs (peer_calls.h) ---- */
 
 static const char *name(struct peers *s, uint64_t peer)
 {

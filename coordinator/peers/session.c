@@ -6,8 +6,6 @@
 #include <stdarg.h>
 #include <stdio.h>
 
-/* ---- all sessions ---- */
-
 struct session *peers_find(const struct peers *s, uint64_t id)
 {
 	for (struct session *p = LIST_FIRST(&s->by_id[id % SESSION_BUCKETS]); p; p = LIST_NEXT(p, alike))
@@ -29,8 +27,6 @@ void peers_delist(struct peers *s, struct session *p)
 	LIST_REMOVE(p, next);
 	s->session_count--;
 }
-
-/* ---- one session ---- */
 
 void session_fault(struct session *p, const char *format, ...)
 {

@@ -3,13 +3,13 @@
  * A submission on its way from its message to the core.
  *
  * upload_new checks it: names and texts, that paths stay inside the scene's folder, sizes against the limits, and the
- * plan. upload_look holds the files that the spool has, each once it has been read and is right. The client is told the
- * hashes of the others and sends these, each in order, and upload_add writes them. The pool flushes what has arrived
- * while more arrives: a scene may have thousands of small files. What is flushed is stored under its hash and held.
- * When none is missing any more, the job can be submitted.
+ * plan. upload_look holds the files that the spool has, each after it has been read and found right. The client is
+ * told the hashes of the missing files and sends these, each in order, and upload_add writes them. The pool flushes
+ * files that have arrived while more arrive, since a scene may have thousands of small files. A flushed file is
+ * stored under its hash and held. When none is missing any more, the job can be submitted.
  *
  * Errors are -EINVAL with a sentence for the client, including bytes with a wrong hash or out of order. upload_free
- * releases everything that is held.
+ * releases all files that are held.
  */
 #include "coordinator/peers/upload.h"
 
@@ -22,24 +22,25 @@
 #include <string.h>
 
 enum { FILES_MAX = 10000, EFFECTS_MAX = 64, NOTES_MAX = 1000, NAME_MAX_BYTES = 1024 };
-enum { LOOKS_AT_ONCE = 64 /* a millisecond, on a disk that answers at once */ };
-/* Mutations or samples of a lease whose length was asked for: some minutes of a thread in usual scenes, an hour where
- * each is 30 us. Without that a mistyped --epoch takes a farm from all others for days. */
+enum { LOOKS_AT_ONCE = 64 /* files looked for in one turn; about a millisecond, on a disk that answers at once */ };
+/* Limit on the mutations or samples of a lease whose length was requested: some minutes of a thread in usual scenes,
+ * an hour if each takes 30 us. Without a limit a mistyped --epoch could keep a farm from all other jobs for days. */
 enum { LEASE_MOST = 1 << 27 };
 static const uint64_t scene_bytes_max = 1ull << 34; /* 16 GiB */
 
 struct upload_flush {
 	uv_work_t work;
-	struct upload *upload; /* NULL: it was freed */
+	struct upload *upload; /* NULL: it has been freed */
 	struct blob_batch *batch;
-	struct blob_batch *rest; /* what has arrived since for an upload that was freed; NULL: nothing */
+	/* The batch of an upload that has been freed: blobs that have arrived since this flush began; NULL: none. */
+	struct blob_batch *rest;
 	upload_flushed done;
 	void *user;
 	int rc;
 	struct error error;
 };
 
-/* A relative path without "..": what a scene may refer to, and a worker may look up. */
+/* Whether a name is a relative path without "..", so that a scene may refer to it and a worker may look it up. */
 static bool name_ok(const char *name)
 {
 	if (!envelope_text_ok(name, NAME_MAX_BYTES) || !*name || *name == '/')
@@ -78,7 +79,7 @@ static int compare_names(const void *x, const void *y)
 	return strcmp((*a)->name, (*b)->name);
 }
 
-/* Two files with the same name would be ambiguous. */
+/* Returns -EINVAL if two files have the same name, which would be ambiguous. */
 static int check_names(const Farm__Submit *m, struct error *e)
 {
 	Farm__File **sorted = mem_alloc(m->n_files, sizeof *sorted);
@@ -124,7 +125,7 @@ static int check_paths(const Farm__Submit *m, struct error *e)
 	return rc;
 }
 
-/* What the client made of the scene. */
+/* Checks effects and notes, which the client has derived from the scene. */
 static int check_notes(const Farm__Submit *m, struct error *e)
 {
 	bool ok = m->n_effects <= EFFECTS_MAX && m->n_notes <= NOTES_MAX;
@@ -195,7 +196,7 @@ static int compare_hashes(const void *x, const void *y, void *files)
 	return memcmp(f[*(const uint32_t *)x]->hash.data, f[*(const uint32_t *)y]->hash.data, BLOB_HASH_SIZE);
 }
 
-/* There may be thousands of files, each looked up when it arrives, so they are sorted once. */
+/* Sorts the files by hash, once: there may be thousands, and each is looked up when it arrives. */
 static int sort_hashes(struct upload *u, struct error *e)
 {
 	const Farm__Submit *m = u->submit.message->submit;
@@ -222,7 +223,7 @@ uint64_t upload_bytes(const struct upload *u)
 	return bytes;
 }
 
-/* The index of the first in by_hash that is not before h. */
+/* Returns the index of the first entry of by_hash that is not below h. */
 static size_t place_of(const struct upload *u, const struct blob_hash *h)
 {
 	const Farm__Submit *m = u->submit.message->submit;
@@ -237,7 +238,7 @@ static size_t place_of(const struct upload *u, const struct blob_hash *h)
 	return low;
 }
 
-/* A blob has arrived: every file with that content holds it. */
+/* A blob has been stored: holds it for every file with that content. */
 static void hold_blob(struct upload *u, const struct blob_hash *h)
 {
 	const Farm__Submit *m = u->submit.message->submit;
@@ -250,14 +251,14 @@ static void hold_blob(struct upload *u, const struct blob_hash *h)
 	}
 }
 
-/* The next file that was looked for is right, or missing. */
+/* Notes whether the next file to be looked for is in the store and right. */
 static void take_look(struct upload *u, const struct blob_hash *h, bool right)
 {
 	u->held[u->looked] = right && blob_hold(u->blobs, h);
 	u->missing_count += !u->held[u->looked++];
 }
 
-/* A size that differs from the blob's would mislead workers. */
+/* Checks the sizes in the submission: one that differs from its blob's would mislead workers. */
 static int check_sizes(const struct upload *u, struct error *e)
 {
 	const Farm__Submit *m = u->submit.message->submit;
@@ -341,7 +342,8 @@ void upload_free(struct upload *u)
 	if (u->flush) {
 		u->flush->upload = NULL;
 		u->flush->rest = u->batch;
-		blob_batch_give_up(u->flush->batch); /* others wait for a thread of the pool */
+		/* Stops the flush early, since others wait for a thread of the pool. */
+		blob_batch_give_up(u->flush->batch);
 	} else {
 		blob_batch_free(u->batch);
 	}
@@ -368,7 +370,7 @@ static const Farm__File *missing_file(const struct upload *u, const struct blob_
 		       : NULL;
 }
 
-/* The writer has all bytes of its blob. */
+/* Adds the blob of the writer, which is complete, to the batch. */
 static int keep_blob(struct upload *u, struct error *e)
 {
 	struct blob_writer *w = u->writer;
@@ -403,7 +405,7 @@ int upload_add(struct upload *u, const Farm__BlobChunk *c, const unsigned char *
 		return rc;
 	u->received += size;
 	if (blob_write_at(u->writer) < c->size) {
-		blob_write_pause(u->writer); /* thousands of clients may stop midway */
+		blob_write_pause(u->writer); /* closes the file: thousands of clients may stop midway */
 		return 0;
 	}
 	rc = keep_blob(u, e);
@@ -439,12 +441,12 @@ static void flush_done(uv_work_t *work, int status)
 	struct upload *u = f->upload;
 	if (u)
 		u->flush = NULL;
-	if (!f->rc) /* also if nobody waits any more: they are on the disk, and count */
+	if (!f->rc) /* also if the upload was freed: the blobs are on the disk, and count */
 		blob_batch_enter(f->batch);
 	for (size_t i = 0; u && !f->rc && i < blob_batch_count(f->batch); i++)
 		hold_blob(u, blob_batch_hash(f->batch, i));
 	blob_batch_free(f->batch);
-	/* Thousands of files may have arrived in the meantime. */
+	/* Thousands of blobs may have arrived in the meantime, so the pool deletes them. */
 	if (f->rest && uv_queue_work(work->loop, work, run_discard, discarded) == 0)
 		return;
 	blob_batch_free(f->rest);

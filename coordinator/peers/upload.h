@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A submission that is checked and waits for the blobs that the spool lacks. When the last one has arrived, the job is
- * given to the core. Belongs to its session. The loop's thread.
+ * A submission that has been checked and waits for the blobs that the spool lacks. When the last one has arrived, the
+ * job is given to the core. Belongs to its session. The loop's thread.
  */
 #ifndef COORDINATOR_PEERS_UPLOAD_H
 #define COORDINATOR_PEERS_UPLOAD_H
@@ -18,45 +18,49 @@ struct upload_flush;
 struct upload {
 	struct envelope submit; /* owned */
 	struct plan plan;
-	char rule[160]; /* what its epochs' length was derived from; "": it was requested */
+	char rule[160]; /* what the length of its epochs was derived from; "": it was requested */
 	struct blob_store *blobs;
-	bool *held;	      /* by file: its blob is in the store and held */
-	uint32_t *by_hash;    /* the files, sorted by hash */
-	bool *arrived;	      /* by place in by_hash: its blob has arrived, and may not be flushed yet */
-	size_t looked;	      /* so many files have been looked for in the store */
-	bool looks_later;     /* for the others, once others have had a turn */
-	size_t missing_count; /* of these, not held */
+	bool *held;	      /* [files]: the file's blob is in the store and held */
+	uint32_t *by_hash;    /* [files]: indices of the files, sorted by hash */
+	bool *arrived;	      /* [places in by_hash]: the blob has arrived, but may not be flushed yet */
+	size_t looked;	      /* number of files that have been looked for in the store */
+	bool looks_later;     /* the other files are looked for in a later turn of the loop */
+	size_t missing_count; /* number of files looked for that are not held */
 	struct blob_writer *writer;
 	struct blob_hash writing;
-	uint64_t received; /* bytes of files */
+	uint64_t received; /* bytes of files received so far */
 	struct {
-		double begun;	    /* s of the loop's clock: when its message came */
-		double paced;	    /* and when it last had enough new bytes; INFINITY: none are expected yet */
-		uint64_t bytes;	    /* `received` then */
-	} pace;			    /* the session's */
-	struct blob_batch *batch;   /* blobs that arrived and wait for the next flush; NULL: none */
-	struct upload_flush *flush; /* is running; NULL: none */
+		double begun; /* s of the loop's clock: when the submission arrived */
+		/* s of the loop's clock: when enough new bytes had arrived last; INFINITY: none are expected yet. */
+		double paced;
+		uint64_t bytes;	    /* `received` at that time */
+	} pace;			    /* set and used by the session */
+	struct blob_batch *batch;   /* blobs that have arrived and wait for the next flush; NULL: none */
+	struct upload_flush *flush; /* the running flush; NULL: none */
 };
 
-/* Takes the envelope of a Submit. bandwidth: as in struct plan_request. -EINVAL with a sentence for the client. */
+/* Checks a Submit and takes over its envelope. bandwidth: as in struct plan_request. Returns -EINVAL with a sentence
+ * for the client. */
 int upload_new(struct upload **u, struct envelope *submit, struct blob_store *blobs, double bandwidth, struct error *e);
-uint64_t upload_bytes(const struct upload *u); /* of its files; several with the same content are stored once */
-/* Then its files are looked for in the store, some at a time, each of which costs two calls of the system. -EAGAIN:
- * call it again in another turn of the loop. -EINPROGRESS: one is being read; it goes on after upload_file_read has
- * said true. Otherwise all are known: 0, or -EINVAL with a sentence. */
+uint64_t upload_bytes(const struct upload *u); /* bytes of its files; several files with the same content count once */
+/* Looks for the files in the store, some per call, since each costs two system calls. Returns -EAGAIN: call again in
+ * another turn of the loop; -EINPROGRESS: a file is being read, call again when upload_file_read has returned true;
+ * 0: all files have been looked for; -EINVAL with a sentence. */
 int upload_look(struct upload *u, struct jobs *jobs, struct error *e);
+/* Whether files are left to be looked for. */
 bool upload_is_looking(const struct upload *u);
+/* A file has been read. Returns true if the upload was waiting for it. */
 bool upload_file_read(struct upload *u, const struct blob_hash *h, bool right);
 void upload_free(struct upload *u); /* releases the blobs that it holds */
 
-/* One chunk from the client. 1: a blob is complete, and waits for upload_flush. -EFBIG: there is no room for it now,
- * and the same call may succeed once there is. */
+/* Takes one chunk from the client. Returns 1 if a blob is complete, and waits for upload_flush; 0 if not; -EFBIG if
+ * there is no room for it now, in which case the same call may succeed later. */
 int upload_add(struct upload *u, const Farm__BlobChunk *c, const unsigned char *payload, size_t size, struct error *e);
-/* The pool flushes what has arrived, unless it is doing so already. Then `done` is called, unless the upload was freed
- * meanwhile; what was flushed is no longer missing, but more may have arrived. */
+/* Lets the pool flush the blobs that have arrived, unless a flush is running already. Then calls `done`, unless the
+ * upload has been freed meanwhile. What was flushed is no longer missing, but more may have arrived. */
 typedef void (*upload_flushed)(void *user, int rc, const struct error *e);
 int upload_flush(struct upload *u, uv_loop_t *loop, upload_flushed done, void *user, struct error *e);
-/* Each missing hash once, ascending. Returns the number; hashes has room for missing_count. */
+/* Writes the hash of each missing blob once, ascending, and returns their number. hashes: room for missing_count. */
 size_t upload_missing(const struct upload *u, struct blob_hash *hashes);
 
 #endif

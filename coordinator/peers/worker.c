@@ -2,9 +2,9 @@
 /*
  * A worker's side of a session: its messages.
  *
- * It asks for leases, sends results or failures, asks for jobs and chunks of their files, and sends heartbeats. Each
- * message becomes an event for the core; results and failures are checked first (results.c). An invalid message is
- * answered by Fault, and the connection ends.
+ * A worker asks for leases, sends results or failures, asks for jobs and chunks of their files, and sends heartbeats.
+ * Each message becomes an event for the core; results and failures are checked first (results.c). An invalid message
+ * is answered by Fault, and the connection ends.
  */
 #include "coordinator/peers/worker.h"
 
@@ -38,8 +38,8 @@ static void take_lease_result(struct session *p, struct envelope *env)
 	buf_fini(&payload);
 }
 
-/* A long message counts as a sign of life, and its worker needs one from us meanwhile: its heartbeats, and with them
- * our answers, are queued behind that message. */
+/* Counts a part of a long message as a sign of life, and sends the worker a heartbeat: its own heartbeats, and with
+ * them our answers, are queued behind that message. */
 void worker_heard(void *session)
 {
 	struct session *p = session;

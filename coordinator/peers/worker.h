@@ -5,8 +5,8 @@
 
 #include "coordinator/peers/session.h"
 
-/* Handles a message. May take the envelope. */
+/* Handles a message. May take over the envelope. */
 void worker_message(struct session *p, struct envelope *env);
-void worker_heard(void *session); /* a part of an incomplete message has arrived */
+void worker_heard(void *session); /* call when a part of an incomplete message has arrived */
 
 #endif

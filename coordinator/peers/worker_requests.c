@@ -11,12 +11,13 @@
 enum {
 	CHUNK_LEAST = 1 << 16,
 	CHUNK_MOST = 1 << 20,
-	AHEAD = 1 << 22,	/* bytes that may be unsent when the next answer is made */
-	AHEAD_OF_ALL = 1 << 30, /* shared by all connections: thousands of workers may begin a job at the same time */
+	AHEAD = 1 << 22,	/* another answer is made while fewer bytes than this are unsent */
+	AHEAD_OF_ALL = 1 << 30, /* shared by all connections, since thousands of workers may begin a job at once */
 	REQUESTS_MOST = 512,	/* twice what a worker can need that has leases of as many jobs as it may hold */
 };
 
-/* Half of all that may wait to be sent is left to other answers. */
+/* Returns how many bytes may be unsent when the next answer is made. Half of the limit on all unsent bytes is left to
+ * other answers. */
 static size_t send_ahead_bytes(const struct session *p)
 {
 	uint64_t half = p->peers->sending.limit / 2, all = half < AHEAD_OF_ALL ? half : AHEAD_OF_ALL;
@@ -49,7 +50,7 @@ static void send_job_info(struct session *p, uint64_t id)
 		  NULL, 0);
 }
 
-/* refusal: why it cannot be sent; "": it can. */
+/* refusal: why the file cannot be sent; "": it can be. */
 static void send_piece(struct session *p, const struct worker_request *a, const char *refusal)
 {
 	struct error e;
@@ -73,7 +74,8 @@ static void send_piece(struct session *p, const struct worker_request *a, const 
 	mem_free(bytes);
 }
 
-/* Before its first piece is sent, a file is checked. false: it is being read for that. */
+/* Answers a request. A file is checked before its first piece is sent: returns false while it is being read for that.
+ */
 static bool answer(struct session *p, const struct worker_request *a)
 {
 	struct error e = {""};
@@ -123,7 +125,8 @@ void worker_requests_file_read(struct session *p, const struct blob_hash *h, con
 	const struct worker_request *a = STAILQ_FIRST(&p->requests);
 	if (!a || p->state != SESSION_WORKER)
 		return;
-	if (a->blob && a->number == 0 && blob_hash_equal(&a->hash, h)) { /* not checked again, however long it took */
+	/* It is not checked again, however long the reading took. */
+	if (a->blob && a->number == 0 && blob_hash_equal(&a->hash, h)) {
 		send_piece(p, a, refusal);
 		drop_first(p);
 	}

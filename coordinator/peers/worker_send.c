@@ -12,7 +12,7 @@ void worker_allow_results(struct session *p, const struct live_job *job)
 	}
 }
 
-/* As many leases as it wants, of the largest size, may wait for it to read. */
+/* Raises the send limit so that as many of the largest leases as the worker wants may wait for it to read. */
 static void allow_lease(struct session *p, size_t size)
 {
 	struct peer_status s;
