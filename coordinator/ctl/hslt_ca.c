@@ -9,7 +9,7 @@
 
 struct arguments {
 	const char *ca, *verb, *what, *name;
-	double seconds; /* of validity; 0: not given */
+	double seconds; /* validity in s; 0: not given */
 	bool renew;
 };
 

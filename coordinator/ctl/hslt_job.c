@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * hslt-job, what it asks and prints: list as a table or as JSON, cancel and the other orders, fetch, log.
+ * hslt-job's requests and output: list as a table or as JSON, cancel and the other orders, fetch, log.
  *
- * Each verb sends one message and waits for its answer; what the coordinator refuses is printed as it says it, and
- * ends the program with an error.
+ * Each verb sends one message and waits for its answer. A refusal of the coordinator is printed in the coordinator's
+ * words, and ends the program with an error.
  */
 #include "common/base/progress.h"
 #include "common/base/target.h"
@@ -19,8 +19,6 @@
 
 enum { EXIT_DISAGREE = 5 };
 
-/* ---- list ---- */
-
 static void put_error(const Farm__JobStatus *s, char *text, size_t size)
 {
 	snprintf(text, size, "-");
@@ -30,7 +28,8 @@ static void put_error(const Farm__JobStatus *s, char *text, size_t size)
 		snprintf(text, size, "~%.3g %%", 100 * s->error_about);
 }
 
-/* Its place is "3 of 8 machines; j4 comes first": the column has the numbers, what comes after them is a remark. */
+/* Splits a job's place, such as "3 of 8 machines; j4 comes first": writes the numbers for the column, and returns the
+ * rest as a remark. */
 static const char *put_machines(const Farm__JobStatus *s, char *text, size_t size)
 {
 	const char *end = s->ended ? NULL : strstr(s->place, " machine"), *more = end ? strstr(end, "; ") : NULL;
@@ -62,7 +61,7 @@ static void print_row(const Farm__JobStatus *s, bool owners)
 	printf("%s", s->name);
 	if (*remark)
 		printf("  # %s", remark);
-	else if (s->ended && strcmp(s->reason, "error") == 0) /* "ended by error" reads like a failure */
+	else if (s->ended && strcmp(s->reason, "error") == 0) /* "ended by error" would read like a failure */
 		printf("  # target error reached");
 	else if (s->ended && s->target_error > 0 && strcmp(s->reason, s->state) != 0)
 		printf("  # ended by %s", s->reason);
@@ -74,7 +73,7 @@ static bool is_wanted(const struct job_options *o, const Farm__JobStatus *s)
 	return !o->state || strcmp(s->state, o->state) == 0;
 }
 
-/* Owners are known by their certificates. */
+/* Prints a column of owners if any job has one; owners are known only with certificates. */
 static void print_table(const Farm__JobListAnswer *a, const struct job_options *o)
 {
 	bool owners = false;
@@ -125,8 +124,6 @@ static int list(struct client *cl, const struct job_options *o, struct error *e)
 	return 0;
 }
 
-/* ---- workers ---- */
-
 static json_t *worker_json(const Farm__WorkerStatus *w)
 {
 	return json_pack("{s:i s:s s:s s:I s:i s:i s:I s:s}", "schema", 1, "name", w->name, "state", w->state,
@@ -164,9 +161,7 @@ static int workers(struct client *cl, const struct job_options *o, struct error 
 	return 0;
 }
 
-/* ---- the other verbs ---- */
-
-/* What was done, if the coordinator's answer does not say it. */
+/* Prints what was done, if the coordinator's answer does not say it. */
 static void print_done(const struct job_options *o)
 {
 	static const char *const became[] = {
@@ -214,8 +209,9 @@ static int send_control(struct client *cl, const struct job_options *o, struct e
 			 o, e);
 }
 
-/* -o may name the final image, which a preview never takes: either file is checked before anything is fetched. A pipe
- * or a device is no image. */
+/* Fetches a preview into -o. That may be the name of the final image, which a preview never replaces; then it goes to
+ * a file beside it. Both files are checked before anything is fetched, except beside a pipe or a device, which holds
+ * no image. */
 static int fetch_preview(struct client *cl, const struct job_options *o, struct error *e)
 {
 	char other[TARGET_PATH];
@@ -263,7 +259,7 @@ static int print_log(struct client *cl, const struct job_options *o, struct erro
 	return client_fetch_log(cl, o->job, STDOUT_FILENO, e);
 }
 
-/* -ENOENT: the coordinator refuses. */
+/* Returns -ENOENT if the coordinator refuses. */
 static int run_verb(struct client *cl, const struct job_options *o, struct error *e)
 {
 	static int (*const verbs[])(struct client *, const struct job_options *, struct error *) = {

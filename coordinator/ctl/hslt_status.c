@@ -2,12 +2,12 @@
 /*
  * hslt-status: prints what the coordinator's status socket says.
  *
- * It connects, reads the snapshot and prints jobs and workers, or one job with its leases. A job that has ended is not
- * in the snapshot with all that is known of it, so it asks for that one; with --all it asks for the jobs that ended
- * earlier, page by page. With --watch it subscribes and prints again whenever something changes, until the job has
- * ended. With --json it prints the objects unchanged.
+ * It connects, reads the snapshot and prints jobs and workers, or one job with its leases. The snapshot does not
+ * contain the details of jobs that have ended, so for such a job it asks for them; with --all it asks for the jobs
+ * that ended earlier, page by page. With --watch it subscribes and prints again whenever something changes, until the
+ * job has ended. With --json it prints the objects unchanged.
  *
- * If nobody answers, or not a coordinator, it says so and exits with 75; 1: there is no such job.
+ * If nobody answers, or not a coordinator, it says so and exits with 75. If there is no such job it exits with 1.
  */
 #include "common/base/progress.h"
 #include "common/base/terminal.h"
@@ -103,8 +103,6 @@ static FILE *connect_socket(const char *path, struct error *e)
 	return f;
 }
 
-/* ---- the table ---- */
-
 static const char *text_of(const json_t *o, const char *key)
 {
 	const char *s = json_string_value(json_object_get(o, key));
@@ -132,7 +130,7 @@ static const char *color_of(const char *state, bool colors)
 										  : "\033[33m";
 }
 
-/* Which of several bounds ended it. */
+/* Says which of several bounds ended a job with a target error. */
 static const char *bound_of(const json_t *job)
 {
 	const char *reason = text_of(job, "reason");
@@ -144,7 +142,7 @@ static const char *bound_of(const json_t *job)
 						  : "";
 }
 
-/* null or negative: open-ended */
+/* Returns infinity if the bound is null or negative: the range is open. */
 static double range_bound(const json_t *range, const char *key)
 {
 	const json_t *x = json_object_get(range, key);
@@ -180,12 +178,13 @@ static void print_job(const json_t *job, bool colors)
 
 static void print_doubt(const json_t *job)
 {
-	if (*text_of(job, "errorDoubt") && !is_ended(job)) /* then the note says it */
+	if (*text_of(job, "errorDoubt") && !is_ended(job)) /* once the job has ended, its note says it */
 		printf("       the error is about %.3g %%, its interval is not known: %s\n",
 		       100 * number_of(job, "errorAbout"), text_of(job, "errorDoubt"));
 }
 
-/* "3.2 % (3.0 - 3.5 %), halving it costs 12 min of CPU time, 6.0 min more; done in 31 min (25 min - 40 min)" */
+/* Prints "error 3.2 % (3.0 - 3.5 %), target 2 %; halving it costs 12 min of CPU time, 6.0 min more; done in 31 min
+ * (25 min - 40 min)". */
 static void print_forecast(const json_t *job)
 {
 	const json_t *error = json_object_get(job, "errorNow"), *half = json_object_get(job, "nextHalving");
@@ -211,7 +210,7 @@ static void print_forecast(const json_t *job)
 	printf("\n");
 }
 
-/* What its priority means: "priority 5, of ann; 3 of 8 machines; j4 comes first; by its priority 2.7" */
+/* Prints what the job's priority means: "priority 5, of ann; 3 of 8 machines; j4 comes first; by its priority 2.7". */
 static void print_share(const json_t *job)
 {
 	if (is_ended(job) || !json_is_number(json_object_get(job, "share")))
@@ -368,15 +367,13 @@ static void print_snapshot(const json_t *snapshot, const char *only)
 	}
 }
 
-/* ---- reading ---- */
-
 struct reading {
 	FILE *f;
 	char *line;
 	size_t room;
 };
 
-/* The next line; NULL: an error was printed. */
+/* Reads the next line. Returns NULL after printing an error. */
 static json_t *next_line(struct reading *r)
 {
 	json_error_t fault;
@@ -391,13 +388,15 @@ static json_t *next_line(struct reading *r)
 	return o;
 }
 
-/* It may have hung up already: what it said before is still there to be read. */
+/* Sends a text. EPIPE is no error: the coordinator may have hung up already, but what it sent before can still be
+ * read. */
 static bool send_text(const struct reading *r, const char *text)
 {
 	return send(fileno(r->f), text, strlen(text), MSG_NOSIGNAL) >= 0 || errno == EPIPE;
 }
 
-/* Sends a question, and reads on to its answer, of that type or an error. NULL: an error was printed. */
+/* Sends a question and reads on to its answer, an object of this type or an error. Returns NULL after printing an
+ * error. */
 static json_t *ask_for(struct reading *r, const char *type, json_t *question)
 {
 	char *text = json_dumps(question, JSON_COMPACT);
@@ -421,7 +420,8 @@ static size_t place_of(const json_t *jobs, const char *id)
 	return i;
 }
 
-/* Puts all that is known of the one job into the snapshot, which has it of live jobs already. An exit code. */
+/* Completes the snapshot by the details of the one job that was asked for, unless it is live and has them already.
+ * Returns an exit code. */
 static int complete_job(const struct arguments *a, struct reading *r, json_t *snapshot)
 {
 	json_t *jobs = json_object_get(snapshot, "jobs"), *job = json_array_get(jobs, place_of(jobs, a->job));
@@ -463,7 +463,7 @@ static void sort_jobs(json_t *jobs)
 	free(sorted);
 }
 
-/* Adds the jobs that ended before those of the snapshot. An exit code. */
+/* Adds the jobs that ended before those of the snapshot. Returns an exit code. */
 static int complete_list(struct reading *r, json_t *snapshot)
 {
 	json_t *jobs = json_object_get(snapshot, "jobs"), *had = json_copy(jobs), *job, *before = json_null();
@@ -489,7 +489,7 @@ static int complete_list(struct reading *r, json_t *snapshot)
 	return code;
 }
 
-/* Prints one snapshot in the requested form. false: stop watching. */
+/* Prints one snapshot in the requested form. Returns false to stop watching. */
 static bool show(const struct arguments *a, const json_t *snapshot, bool first)
 {
 	const json_t *jobs = json_object_get(snapshot, "jobs");

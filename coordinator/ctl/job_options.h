@@ -21,8 +21,8 @@ enum job_verb {
 
 struct job_options {
 	const char *coordinator, *tls, *output;
-	const char *state;  /* that list is about; NULL: all */
-	enum job_verb verb; /* JOB_VERBS: none */
+	const char *state;  /* list: only jobs in this state; NULL: all */
+	enum job_verb verb; /* JOB_VERBS: none given */
 	uint64_t job;
 	int priority;
 	uint64_t more_spp, more_mutations; /* for extend only */
