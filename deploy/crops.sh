@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
-# Renders a film in crops, each a job of its own, on one coordinator or several, and puts them together.
+# Renders a film in crops, each as a job of its own, on one coordinator or several, and assembles the image.
 set -eu
 
 usage() {
@@ -32,7 +32,7 @@ die() {
 	exit 2
 }
 
-# pair NAME TEXT: prints the two positive numbers that an x stands between
+# pair NAME TEXT: prints the two positive numbers in a text such as 5x5
 pair() {
 	case $2 in
 	*[!0-9x]* | x* | *x | *x*x* | 0* | *x0*) die "$1 takes two positive numbers, as in 5x5, not '$2'" ;;
@@ -78,7 +78,7 @@ mkdir -p "$crops"
 pids=
 trap 'trap - TERM; kill $pids 2>/dev/null || :; wait; exit 130' INT TERM
 
-# What must not be mixed with crops of another call
+# Crops must not be mixed with those of a call with another scene, grid, size or options.
 printf '%s\n' "$grid" "$size" "$@" >"$crops/call.new"
 if [ -f "$crops/call" ] && ! cmp -s "$crops/call" "$crops/call.new"; then
 	rm "$crops/call.new"
@@ -86,12 +86,12 @@ if [ -f "$crops/call" ] && ! cmp -s "$crops/call" "$crops/call.new"; then
 fi
 mv "$crops/call.new" "$crops/call"
 
-# turn N: the N-th coordinator, beginning again behind the last one
+# turn N: prints the coordinator of the N-th crop: they take turns
 turn() {
 	echo "$coordinators" | awk -F, -v n="$1" '{ print $(n % NF + 1) }'
 }
 
-# crop FILE OPTION...: renders it, with the job's id, what hslt-submit says and its exit code beside it
+# crop FILE OPTION...: renders FILE.exr; FILE.id, FILE.log and FILE.code are the job's id, hslt-submit's messages and exit code
 crop() {
 	file=$1 code=0
 	shift
@@ -114,7 +114,7 @@ while [ $row -lt "$rows" ]; do
 			crop "$file" --coordinator "$(turn $n)" "$@" --size "$size" --crop "$x,$y,$w,$h" &
 			pids="$pids $!"
 			files="$files $column-$row"
-			# Each hslt-submit builds the scene, and then waits: one after the other.
+			# Each hslt-submit builds the scene before it submits: let only one at a time do that.
 			until [ -s "$file.id" ] || ! kill -0 $! 2>/dev/null; do
 				sleep 0.05
 			done

@@ -1,8 +1,8 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
-# Renders the demo scene with programs that are built: deploy/demo-run.sh BUILD OUT [OPTION OF hslt-submit...]
+# Renders the demo scene with the programs in BUILD/bin: deploy/demo-run.sh BUILD OUT [OPTION OF hslt-submit...]
 #
-# A coordinator and two workers on loopback, with a spool that goes afterwards; OUT/demo.exr and OUT/demo.png stay.
+# Starts a coordinator and two workers on loopback, whose spool is deleted afterwards. Writes OUT/demo.exr and OUT/demo.png.
 set -eu
 cd "$(dirname "$0")/.."
 bin=${1:?usage: demo-run.sh BUILD OUT [OPTION...]}/bin
@@ -11,7 +11,7 @@ shift 2
 dir=$(mktemp -d "${TMPDIR:-/tmp}/hslt-demo.XXXXXX")
 pids=""
 
-# What is still there after two seconds is not asked again.
+# Ends the processes that were started: SIGTERM, and SIGKILL to those still running after two seconds in total.
 finish() {
 	code=$?
 	trap - EXIT
@@ -67,7 +67,7 @@ echo "rendering tests/scenes/demo/scene.xml with two workers of $threads thread(
 submit=$!
 pids="$pids $submit"
 
-# The farm's state once, in the middle of the work (or at its end, when that comes sooner).
+# Whether the farm's state should be shown: once, in the middle of the work (or at its end if that comes sooner).
 half_done() {
 	"$bin/hslt-status" --json 2>/dev/null | grep -q '"progress":\(0\.[4-9]\|1\.\)'
 }

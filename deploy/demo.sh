@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
-# Installs what is missing, builds, and renders the demo scene on a farm of two workers on this machine: one of the two
-# commands of the README. The picture: build/demo/demo.png and demo.exr. Nothing that it starts is left running.
+# Installs missing packages, builds, and renders the demo scene with a coordinator and two workers on this machine: one of
+# the two commands of the README. Writes build/demo/demo.png and demo.exr. Leaves nothing running that it has started.
 set -eu
 cd "$(dirname "$0")/.."
 case "${1:-}" in

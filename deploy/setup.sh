@@ -1,11 +1,11 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
-# Installs what building and testing need, through the system's package manager (Debian 12 or 13, and what is like them).
-# Says what it installs; does nothing where all is there.
+# Installs the packages that building and testing need, with apt (Debian 12 or 13, or a system like them).
+# Prints what it installs; does nothing if nothing is missing.
 #
-#   sh deploy/setup.sh            what `make` and `make test` need
-#   sh deploy/setup.sh --full     also what the longer kinds of tests need (clang for fuzzers, valgrind for profiles, a
-#                                 Slurm, and checkers of units and manifests, for deploy/; Debian starts munge when it is installed)
+#   sh deploy/setup.sh            packages for `make` and `make test`
+#   sh deploy/setup.sh --full     also those for the longer kinds of tests: clang for fuzzers, valgrind for profiles, Slurm
+#                                 and checkers of units and manifests for deploy/ (Debian starts munge when it is installed)
 set -eu
 
 build="make gcc libc6-dev pkg-config libembree-dev libopenexr-dev libuv1-dev libprotobuf-c-dev protobuf-c-compiler
@@ -51,7 +51,7 @@ trap 'rm -f "$log"' EXIT
 install() {
 	$root env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends $missing >"$log" 2>&1
 }
-# Lists of packages may be missing or old: fetch them once, and only when they are needed.
+# apt's lists may be missing or outdated: they are fetched only if the first attempt fails.
 if ! install; then
 	if ! $root apt-get update >"$log" 2>&1 || ! install; then
 		tail -n 20 "$log" >&2

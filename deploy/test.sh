@@ -1,14 +1,14 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
-# Installs what is missing, builds, and runs the tests: one of the two commands of the README.
+# Installs missing packages, builds, and runs the tests: one of the two commands of the README.
 #
-#   sh deploy/test.sh          all that the build packages allow; says what it skipped
-#   sh deploy/test.sh --full   also what needs big packages: a build with clang, fuzzers, longer statistical runs
-#   sh deploy/test.sh --ci     all kinds at short lengths; ends after the first kind in which a test failed
+#   sh deploy/test.sh          all tests for which the build packages suffice; lists the skipped ones
+#   sh deploy/test.sh --full   also those that need large packages: a build with clang, fuzzers, longer statistical runs
+#   sh deploy/test.sh --ci     all kinds of tests at short lengths; stops after the first kind in which a test failed
 #
-# HSLT_SCENES names a folder of public scenes; without it the tests that need them are skipped. The run ends with one line
-# `N passed, N failed, N skipped` and exit code 0 when nothing failed; before it stands what was skipped, and why, and what failed. With
-# --full and --ci nothing is skipped for want of a package: that is a failure.
+# HSLT_SCENES names a folder of public scenes; without it the tests that need them are skipped. The last line is
+# `N passed, N failed, N skipped`; the lines before it say what was skipped, with reasons, and what failed. The exit code is
+# 0 if nothing failed. With --full and --ci a missing package is a failure, not a reason to skip.
 set -eu
 cd "$(dirname "$0")/.."
 mode=plain
@@ -34,7 +34,7 @@ fails=$(mktemp)
 trap 'rm -f "$results" "$results.code" "$skips" "$fails"' EXIT
 passed=0 failed=0 skipped=0
 
-# Runs one kind, shows its output, and takes its closing line into the sum instead of printing it.
+# kind TITLE COMMAND...: runs one kind of tests and shows its output, but adds its last line to the sums instead of printing it.
 kind() {
 	title=$1
 	shift
@@ -48,27 +48,28 @@ kind() {
 	set -- $(echo "$line" | tr -dc '0-9 ')
 	passed=$((passed + ${1:-0})) skipped=$((skipped + ${3:-0}))
 	bad=${2:-0}
-	# A kind that failed without counting a failure (it did not build, it crashed) is one failure.
+	# A kind that fails without counting a failure (because it did not build, or crashed) counts as one failure.
 	[ $code -eq 0 ] || [ "$bad" -gt 0 ] || bad=1
 	failed=$((failed + bad))
 	[ $code -eq 0 ] || echo "== FAILED: $title"
 	ended
 }
 
-# With --ci the first kind that fails is the last: the others would take as long again and bury what it said.
+# Ends a kind or step. With --ci the run stops at the first one that failed: the others would take as long again and bury its
+# output.
 ended() {
 	echo "== $(($(date +%s) - begin)) s since the beginning"
 	[ $mode != ci ] || [ $failed -eq 0 ] || sum_up
 }
 
-# The closing lines, and the end.
+# Prints the last lines and exits.
 sum_up() {
 	cat "$skips" "$fails"
 	echo "$passed passed, $failed failed, $skipped skipped"
 	exit $((failed > 0))
 }
 
-# A step that passes or fails as a whole.
+# step TITLE COMMAND...: runs a command that passes or fails as a whole; its output is shown only if it fails.
 step() {
 	title=$1
 	shift
@@ -107,7 +108,7 @@ if [ $mode = plain ]; then
 	skip "clang, fuzzers: --full"
 else
 	step "build with address and undefined sanitizers" make -s -j"$jobs" SAN=address,undefined programs tests
-	# Half an hour has no room for those that compare images for minutes, by code that others sanitize.
+	# With --ci, tests that compare images for minutes are left out, to stay within half an hour; others run the same code.
 	without=${HSLT_TEST_WITHOUT:-}
 	[ $mode != ci ] || without='path/test_(motion|volume_emission|closed_form|integrators|merging|longer)$|test_infinite$|bsdf/test_sampling$|test_redistribution$|test_many$|render/test_rays$'
 	kind "tests with sanitizers, 1/20 of the samples" env HSLT_TEST_KINDS=unit HSLT_TEST_WITHOUT="$without" \

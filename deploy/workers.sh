@@ -32,7 +32,7 @@ die() {
 	exit 2
 }
 
-# quote WORD: safe for the shell at the other end
+# quote WORD: quotes a word for the shell on the host
 quote() {
 	printf "'%s'" "$(printf %s "$1" | sed "s/'/'\\\\''/g")"
 }
@@ -67,7 +67,8 @@ case $threads in
 *[!0-9]*) die "--threads takes a number" ;;
 esac
 
-# Homes may be shared by hosts, and numbers of processes come again: whose is it?
+# Commands for the host. Its pid file is named after the host, because hosts may share home directories; and since process ids
+# are reused, the process counts only if it is an hslt-worker of this user.
 remote="f=~/.hslt-worker.\$(hostname).pid; is_running() { p=\$(cat \"\$f\" 2>/dev/null) && readlink \"/proc/\$p/exe\" >/dev/null 2>&1 &&"
 remote="$remote case \$(cat \"/proc/\$p/comm\") in hslt-worker | $(quote "$(basename "$program" | cut -c 1-15)")) ;; *) false ;; esac; };"
 if [ -n "$stop" ]; then

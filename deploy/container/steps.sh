@@ -1,16 +1,16 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
-# What an image is made by, on a bare Debian 12 or 13, as root. Containerfile says how the two steps go together.
+# The two steps that make an image, each run as root on a bare Debian 12 or 13. Containerfile combines them.
 #
-#   steps.sh build SOURCE OUT    installs what building needs, builds, and leaves in OUT the programs, the names of the packages
-#                                whose libraries they use, and this script
-#   steps.sh install OUT         installs those packages and the programs, and makes the user hslt (10001)
+#   steps.sh build SOURCE OUT    installs the packages for building, builds, and leaves in OUT the programs, the names of the
+#                                packages whose libraries they use, and this script
+#   steps.sh install OUT         installs those packages and the programs, and creates the user hslt (10001)
 set -eu
 
-# The packages that own the libraries which the programs load.
+# libraries PROGRAM...: prints the names of the packages whose libraries the programs load
 libraries() {
 	ldd "$@" | sed -n 's/.*=> \(\/[^ ]*\) .*/\1/p' | sort -u | while read -r path; do
-		# Where /lib is a link to /usr/lib, packages know a file by either name.
+		# If /lib is a link to /usr/lib, a package may list the file under either name.
 		owner=$(dpkg-query -S "$path" "/usr$path" "${path#/usr}" 2>/dev/null | head -n 1)
 		[ -n "$owner" ] || { echo "steps.sh: no package has $path" >&2; exit 1; }
 		echo "${owner%%:*}"
@@ -40,7 +40,7 @@ install_in() {
 	useradd --uid 10001 --gid hslt --home-dir /var/lib/hslt --create-home --shell /usr/sbin/nologin hslt
 	install -d -o hslt -g hslt -m 700 /var/cache/hslt
 	for p in /usr/local/bin/hslt-*; do
-		"$p" --version >/dev/null # every library is there
+		"$p" --version >/dev/null # fails if a library is missing
 	done
 }
 
