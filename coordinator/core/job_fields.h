@@ -45,20 +45,27 @@ typedef double field_real, field_positive, field_known;
 	TEXT(reason, 16, IN_RECORD, BY_JOBS, "reason", "reason", AT(reason)) /* the bound that ended it */ \
 	TEXT(why, 256, IN_RECORD, BY_CORE, "why", NULL, NOWHERE) /* why it failed, or a lease's last failure */ \
 	TEXT(output, 1024, IN_RECORD, BY_JOBS, "output", "output", AT(output)) /* where the client wants its image */ \
-	TEXT(owner, 72, IN_RECORD, BY_JOBS, "owner", "owner", AT(owner)) /* name in certificate; "": none */ \
+	/* Name in the owner's certificate; "": no certificate. */ \
+	TEXT(owner, 72, IN_RECORD, BY_JOBS, "owner", "owner", AT(owner)) \
 	NUMBER(int, priority, IN_RECORD, BY_CORE, "priority", "priority", AT(priority)) \
-	NUMBER(u32, exit_code, IN_RECORD, BY_JOBS, "exitCode", NULL, AT(exit_code)) /* of a waiting program */ \
+	/* Exit code of a program that waits for the job. */ \
+	NUMBER(u32, exit_code, IN_RECORD, BY_JOBS, "exitCode", NULL, AT(exit_code)) \
 	NUMBER(bool, has_result, IN_RECORD, BY_JOBS, "result", "result", AT(fetchable)) \
-	NUMBER(positive, cleared, IN_RECORD, BY_JOBS, "cleared", "cleared", NOWHERE) /* deletion; s since 1970 */ \
-	NUMBER(u64, extended, IN_RECORD, BY_JOBS, "extended", NULL, NOWHERE) /* extensions, as in the ledger */ \
+	/* When the result was deleted; s since 1970. */ \
+	NUMBER(positive, cleared, IN_RECORD, BY_JOBS, "cleared", "cleared", NOWHERE) \
+	/* Number of extensions, as in the ledger. */ \
+	NUMBER(u64, extended, IN_RECORD, BY_JOBS, "extended", NULL, NOWHERE) \
 	NUMBER(bool, cut, IN_RECORD, BY_JOBS, "cut", NULL, NOWHERE) /* an extension was cancelled since */ \
 	NUMBER(real, submitted, IN_RECORD, BY_JOBS, "submitted", "submitted", AT(submitted)) /* s since 1970 */ \
 	NUMBER(real, ended, IN_RECORD, BY_JOBS, "ended", "ended", NOWHERE) /* s since 1970; 0: not yet */ \
-	NUMBER(known, ended_seen, IN_RECORD, BY_JOBS, "endedSeen", NULL, NOWHERE) /* by store/age_clock.h */ \
+	/* The end in observed time, s (store/age_clock.h). */ \
+	NUMBER(known, ended_seen, IN_RECORD, BY_JOBS, "endedSeen", NULL, NOWHERE) \
 	NUMBER(real, progress, IN_RECORD, BY_CORE, "progress", "progress", AT(progress)) /* [0,1], never decreases */ \
 	NUMBER(known, rel_error, IN_RECORD, BY_JOBS, "relError", "error", AT(error)) /* of the last image */ \
-	NUMBER(known, rel_error_about, IN_RECORD, BY_JOBS, "relErrorAbout", "errorAbout", AT(error_about)) /* rough */ \
-	TEXT(rel_error_doubt, STATED_ERROR_TEXT, IN_RECORD, BY_JOBS, "relErrorDoubt", "errorDoubt", NOWHERE) /* why */ \
+	/* Estimate of the relative error, even if its interval is unknown. */ \
+	NUMBER(known, rel_error_about, IN_RECORD, BY_JOBS, "relErrorAbout", "errorAbout", AT(error_about)) \
+	/* Why the interval of the error is unknown; "": it is known. */ \
+	TEXT(rel_error_doubt, STATED_ERROR_TEXT, IN_RECORD, BY_JOBS, "relErrorDoubt", "errorDoubt", NOWHERE) \
 	NUMBER(positive, target_error, IN_RECORD, BY_JOBS, "targetError", "targetError", AT(target_error)) \
 	NUMBER(real, cpu_seconds, IN_RECORD, BY_JOBS, "cpuSeconds", "cpuSeconds", AT(cpu_seconds)) /* of all leases */ \
 	NUMBER(real, bootstrap_cpu_seconds, IN_RECORD, BY_JOBS, "bootstrapCpuSeconds", "bootstrapCpuSeconds", \
@@ -68,26 +75,36 @@ typedef double field_real, field_positive, field_known;
 	COUNT(rounds, BY_CORE, "rounds", "rounds", AT(rounds)) /* complete rounds */ \
 	COUNT(mutations, BY_CORE, "mutations", "mutations", NOWHERE) \
 	COUNT(leases_merged, BY_CORE, "merged", NULL, NOWHERE) /* render leases, including those of open rounds */ \
-	COUNT(stuck, BY_JOBS, "stuck", NULL, NOWHERE) /* how often a chain accepted nothing during an epoch */ \
+	/* How often a chain accepted nothing during an epoch. */ \
+	COUNT(stuck, BY_JOBS, "stuck", NULL, NOWHERE) \
 	COUNT(longest_stuck, BY_JOBS, "longestStuck", NULL, NOWHERE) /* most rejections in a row */ \
-	NUMBER(real, verify, IN_RECORD, BY_CORE, "verify", "verify", AT(verify)) /* share two workers do */ \
+	/* Fraction of the leases that two workers compute. */ \
+	NUMBER(real, verify, IN_RECORD, BY_CORE, "verify", "verify", AT(verify)) \
 	TEXT(mixture, PLAN_MUTATIONS_MAX, IN_RECORD, BY_JOBS, "mixture", "mixture", NOWHERE) \
 	TEXT(note, STRATEGY_NOTE, IN_RECORD, BY_JOBS, "note", "note", AT(note)) \
-	TEXT(scene_notes, HEADER_SCENE_NOTES, IN_RECORD, BY_JOBS, "sceneNotes", NULL, NOWHERE) /* see text_lines */ \
+	/* Notes about the scene, one per line (text_lines). */ \
+	TEXT(scene_notes, HEADER_SCENE_NOTES, IN_RECORD, BY_JOBS, "sceneNotes", NULL, NOWHERE) \
 	NUMBER(positive, b, IN_RECORD, BY_JOBS, "b", "b", NOWHERE) /* of the last image */ \
-	/* bootstrap samples or mutations merged per second, over the last half minute */ \
+	/* Bootstrap samples or mutations merged per second, over the last half minute. */ \
 	NUMBER(real, rate, IN_VIEW, BY_CORE, NULL, "rate", AT(rate)) \
 	NUMBER(known, eta, IN_VIEW, BY_CORE, NULL, "eta", AT(eta)) /* s; core: NAN: unknown */ \
 	NUMBER(known, eta_low, IN_VIEW, BY_CORE, NULL, NULL, AT(eta_low)) /* of the 90 % interval */ \
 	NUMBER(known, eta_high, IN_VIEW, BY_CORE, NULL, NULL, AT(eta_high)) \
 	NUMBER(u32, leases, IN_VIEW, BY_CORE, NULL, "leases", AT(leases)) /* leases out */ \
-	NUMBER(u32, workers, IN_VIEW, BY_CORE, NULL, "workers", AT(workers)) /* machines that hold leases of it */ \
-	NUMBER(u32, machines, IN_VIEW, BY_CORE, NULL, "machines", NOWHERE) /* machines that could */ \
-	NUMBER(known, share, IN_VIEW, BY_CORE, NULL, NULL, AT(share)) /* machines due by its priority (share.h) */ \
-	TEXT(place, 160, IN_VIEW, BY_CORE, NULL, "place", AT(place)) /* in words, and jobs that go first */ \
-	NUMBER(known, reading, IN_VIEW, BY_JOBS, NULL, "reading", NOWHERE) /* part of stored data, on restart */ \
-	TEXT(waiting, 256, IN_VIEW, BY_CORE, NULL, "waiting", NOWHERE) /* why no worker computes it; "": one does */ \
-	TEXT(owners_place, 160, IN_VIEW, BY_CORE, NULL, NULL, NOWHERE) /* for its owner: does not name others' jobs */ \
+	/* Machines that hold leases of the job. */ \
+	NUMBER(u32, workers, IN_VIEW, BY_CORE, NULL, "workers", AT(workers)) \
+	/* Machines that could compute it. */ \
+	NUMBER(u32, machines, IN_VIEW, BY_CORE, NULL, "machines", NOWHERE) \
+	/* Machines due to it by its priority (core/share.h). */ \
+	NUMBER(known, share, IN_VIEW, BY_CORE, NULL, NULL, AT(share)) \
+	/* `workers` and `machines` in words, and which jobs go first. */ \
+	TEXT(place, 160, IN_VIEW, BY_CORE, NULL, "place", AT(place)) \
+	/* Fraction of its stored data that has been read, after a restart. */ \
+	NUMBER(known, reading, IN_VIEW, BY_JOBS, NULL, "reading", NOWHERE) \
+	/* Why no worker computes it; "": one does. */ \
+	TEXT(waiting, 256, IN_VIEW, BY_CORE, NULL, "waiting", NOWHERE) \
+	/* `place` and `waiting` for its owner, without the ids of other owners' jobs. */ \
+	TEXT(owners_place, 160, IN_VIEW, BY_CORE, NULL, NULL, NOWHERE) \
 	TEXT(owners_waiting, 256, IN_VIEW, BY_CORE, NULL, NULL, NOWHERE) \
 	COUNTER(repeats, "repeats", NOWHERE)         /* results of leases that had been merged before */ \
 	COUNTER(refused, "refused", NOWHERE)         /* results that did not count */ \
@@ -97,7 +114,7 @@ typedef double field_real, field_positive, field_known;
 	COUNTER(lost, "lost", NOWHERE)               /* leases whose worker was lost before it sent a result */ \
 	COUNTER(duplicates, "duplicates", NOWHERE)   /* second copies of slow leases */ \
 	COUNTER(verified, "verified", AT(verified))  /* leases on which two workers agreed */ \
-	COUNTER(mismatched, "mismatched", AT(mismatched)) /* verified leases whose first two answers differed */
+	COUNTER(mismatched, "mismatched", AT(mismatched)) /* leases whose first two answers differed */
 /* clang-format on */
 
 /* For lists of only some kinds of fields. */

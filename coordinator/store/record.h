@@ -51,7 +51,7 @@ void record_add_doubt(struct job_record *r); /* notes why the interval of the er
 void record_take_convergence(struct job_record *r, const struct canvas_image *img, const struct convergence *a);
 /* Clears the record except for these three. */
 void record_begin(struct job_record *r, uint64_t id, const char *name, const char *owner);
-/* Img must contain an estimate of the error. */
+/* Takes the error of an image; img must contain an estimate of it. */
 void record_take_error(struct job_record *r, const struct canvas_image *img);
 void record_take_effects(struct job_record *r, json_t *list); /* takes over the reference; NULL: not known */
 json_t *record_effects(const struct job_record *r);	      /* a new array */
