@@ -24,8 +24,9 @@ int main(int argc, char **argv)
 	program_options(&server_program, argc, argv, &c);
 	log_event(LOG_START, "program=hslt-coordinator version=%s", HSLT_VERSION);
 	if (geteuid() == 0)
-		log_event(LOG_ROOT,
-			  "text=\"a coordinator needs no privileges: what comes over the network is read as root\"");
+		log_event(
+			LOG_ROOT,
+			"text=\"running as root, which a coordinator does not need: it reads data from the network\"");
 	int rc = server_run(&c, &e);
 	if (rc)
 		fprintf(stderr, "hslt-coordinator: %s\n", e.text);

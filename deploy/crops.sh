@@ -6,24 +6,24 @@ set -eu
 usage() {
 	cat <<'TEXT'
 Usage: deploy/crops.sh --grid CxR --size WxH -o FILE.exr [OPTION...] SCENE.xml [OPTION of hslt-submit...]
-Cuts a film of W x H pixels into C columns and R rows, submits each crop as a job, waits for all, and puts them together. Each job has
-its own chains, groups and error, and a lease sends the tiles of its crop alone: a film, or a farm, that is too large for one
-coordinator is shared out among several, each with workers of its own.
+Cuts a film of W x H pixels into C columns and R rows, submits each crop as a job, waits for all, and assembles them. Each job has its
+own chains, groups and error, and a lease sends only the tiles of its crop: a film, or a farm, that is too large for one coordinator
+can be divided among several, each with workers of its own.
 
   -g, --grid CxR               columns and rows
   -s, --size WxH               the whole film
-  -o, --output FILE.exr        the image; crops are kept in FILE.exr.crops until it is there
-  -c, --coordinators A,B,...   HOST:PORT of each; crops go to them in turns (or $HSLT_COORDINATORS, $HSLT_COORDINATOR)
+  -o, --output FILE.exr        the image; crops are kept in FILE.exr.crops until it is written
+  -c, --coordinators A,B,...   HOST:PORT of each coordinator; they take turns (or $HSLT_COORDINATORS, $HSLT_COORDINATOR)
   -p, --path FOLDER            where hslt-submit and hslt-assemble are (the build beside this script, else $PATH)
   -h, --help
 
 Example:
   deploy/crops.sh -g 5x5 -s 3840x2160 -c rack1:7700,rack2:7700 -o room.exr room.xml --target-error 2% --tls ~/.hslt-ca/ann
 
-Called again with the same options it goes on: crops that are there are not rendered again. Jobs that run when it is ended go on and
-are not found again by it: hslt-job list, hslt-job cancel. Exit codes are those of hslt-submit --wait (0 done, 4 done, but a bound came
-before the target error in some crop, 5 done, but chains of some crop disagree, 2 usage), or 1 if a crop failed, with the message of
-its hslt-submit.
+After an interruption, call it again with the same options: finished crops are not rendered again. Jobs that were running continue, but
+their crops are submitted again: cancel them with hslt-job. Exit codes are those of hslt-submit --wait (0 done, 4 done, but a bound
+came before the target error in some crop, 5 done, but chains of some crop disagree, 2 usage), or 1 if a crop failed, with the message
+of its hslt-submit.
 TEXT
 }
 

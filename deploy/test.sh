@@ -17,7 +17,7 @@ case "${1:-}" in
 --full) mode=full ;;
 --ci) mode=ci ;;
 -h | --help)
-	sed -n '2,10s/^# \{0,1\}//p' "$0"
+	sed -n '3,/^set /s/^# \{0,1\}//p' "$0"
 	exit 0
 	;;
 *)

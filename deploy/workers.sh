@@ -6,15 +6,15 @@ set -eu
 usage() {
 	cat <<'TEXT'
 Usage: deploy/workers.sh [OPTION...] HOST...
-Starts hslt-worker on each HOST over ssh (user@host works), in the background, with its log on that host: one at a time, whose
-number is in ~/.hslt-worker.HOSTNAME.pid there.
+Starts hslt-worker on each HOST over ssh (user@host works), in the background, with its log on that host: one per host, whose
+process id is in ~/.hslt-worker.HOSTNAME.pid there.
 
   -c, --coordinator HOST:PORT  the coordinator, as the hosts reach it (or $HSLT_COORDINATOR)
   -t, --threads N              render threads (all cores of the host)
-  -p, --path PROGRAM           hslt-worker on the hosts (hslt-worker); one of another name must be said to --stop, too
+  -p, --path PROGRAM           name or path of hslt-worker on the hosts (hslt-worker); if it has another name, give it to --stop, too
   -l, --log FILE               log on the hosts (~/hslt-worker.log)
   -k, --tls DIR                the certificate's folder on the hosts (hslt-ca worker NAME makes one; deploy/README.md)
-  -i, --insecure               without TLS, though the coordinator is not on the same host
+  -i, --insecure               without TLS, even if the coordinator is on another host
   -s, --stop                   stop the workers that this script started there (SIGTERM: they finish their epochs)
   -n, --dry-run                only print what would be done
   -h, --help
@@ -23,7 +23,7 @@ Examples:
   deploy/workers.sh -c farm.lan:7700 --tls .hslt-node node1 node2 node3
   deploy/workers.sh --stop node1
 
-$SSH is the ssh command (ssh -o BatchMode=yes). Exit code: 0 when all hosts worked, 1 when one did not, 2 usage.
+$SSH is the ssh command (ssh -o BatchMode=yes). Exit code: 0 done on all hosts, 1 failed on some, 2 usage.
 TEXT
 }
 
@@ -61,7 +61,7 @@ while [ $# -gt 0 ]; do
 	*) break ;;
 	esac
 done
-[ $# -gt 0 ] || die "which hosts? (see --help)"
+[ $# -gt 0 ] || die "no host is given (see --help)"
 [ -n "$stop" ] || [ -n "$coordinator" ] || die "--coordinator HOST:PORT is needed (or \$HSLT_COORDINATOR)"
 case $threads in
 *[!0-9]*) die "--threads takes a number" ;;
@@ -72,7 +72,7 @@ esac
 remote="f=~/.hslt-worker.\$(hostname).pid; is_running() { p=\$(cat \"\$f\" 2>/dev/null) && readlink \"/proc/\$p/exe\" >/dev/null 2>&1 &&"
 remote="$remote case \$(cat \"/proc/\$p/comm\") in hslt-worker | $(quote "$(basename "$program" | cut -c 1-15)")) ;; *) false ;; esac; };"
 if [ -n "$stop" ]; then
-	remote="$remote if is_running; then kill \"\$p\" && rm -f \"\$f\" && echo stopped; else rm -f \"\$f\"; echo 'no worker of this script is here' >&2; exit 1; fi"
+	remote="$remote if is_running; then kill \"\$p\" && rm -f \"\$f\" && echo stopped; else rm -f \"\$f\"; echo 'this script has started no worker here' >&2; exit 1; fi"
 else
 	command="$(quote "$program") --coordinator $(quote "$coordinator")"
 	[ -z "$threads" ] || command="$command --threads $threads"
@@ -80,7 +80,7 @@ else
 	[ -z "$insecure" ] || command="$command --insecure"
 	target='~/hslt-worker.log'
 	[ -z "$log" ] || target=$(quote "$log")
-	remote="$remote if is_running; then echo \"a worker of this script is here (process \$p): --stop first\" >&2; exit 1; fi;"
+	remote="$remote if is_running; then echo \"this script has started a worker here already (process \$p): use --stop first\" >&2; exit 1; fi;"
 	remote="$remote nohup $command --name \"\$(hostname)\" >>$target 2>&1 </dev/null & echo \$! >\"\$f\";"
 	remote="$remote sleep 1; kill -0 \"\$(cat \"\$f\")\" && echo started || { tail -n 3 $target; exit 1; }"
 fi

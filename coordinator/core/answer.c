@@ -165,13 +165,13 @@ static enum verdict verify(struct farm *f, struct job *j, struct slot *s, struct
 		return NOTE;
 	case VERIFY_DIFFERS:
 	case VERIFY_HOPELESS:
-		*why = "it differs from another worker's";
+		*why = "the result differs from another worker's";
 		return NOTE;
 	case VERIFY_REPEATED:
-		*why = "it waits for another worker's";
+		*why = "the result waits for another worker's";
 		return REPEAT;
 	case VERIFY_CONTRADICTS:
-		*why = "it differs from what the same worker sent before";
+		*why = "the result differs from the same worker's earlier one";
 		return FAULT;
 	}
 	return FAULT;

@@ -28,11 +28,11 @@ static struct peer *peer_new(struct farm *f, const struct event_join *e, uint32_
 struct peer *connection_join(struct farm *f, const struct event_join *e, const char **refused)
 {
 	if (f->peer_count == f->config.max_peers) {
-		*refused = "the farm accepts no more workers";
+		*refused = "the farm has as many workers as it accepts";
 		return NULL;
 	}
 	if (!*e->name || strlen(e->name) >= PEER_NAME) {
-		*refused = "a worker must have a name, and a short one";
+		*refused = "a worker needs a name, of at most 127 bytes";
 		return NULL;
 	}
 	if (e->threads == 0 || strlen(e->fingerprint) >= FINGERPRINT_SIZE) {

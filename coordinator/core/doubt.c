@@ -12,7 +12,7 @@
 static const char *name_of(const struct farm *f, uint64_t who)
 {
 	const struct identity *k = who ? identity_index_id(&f->index, who) : NULL;
-	return k ? k->name : who ? "a worker that is forgotten" : "a worker before the coordinator's start";
+	return k ? k->name : who ? "a worker no longer known" : "a worker of an earlier run";
 }
 
 const char *doubt_maker(const struct farm *f, const struct lease_key *k)

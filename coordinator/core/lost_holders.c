@@ -88,8 +88,9 @@ void lost_holders_add(struct farm *f, struct lease *l)
 	if (n < LOST_TOLD)
 		return;
 	text_print(f->text, sizeof f->text,
-		   "%s: %u of %d workers that were lost in a row while they held %s " LEASE_WORDS "; the last one: %s",
-		   j->name, n, LOST_FATAL, LEASE_VALUES(&k), p->name);
+		   "%s: %u workers in a row were lost while they held %s " LEASE_WORDS
+		   " (%d end the job); the last one: %s",
+		   j->name, n, LEASE_VALUES(&k), LOST_FATAL, p->name);
 	text_copy(j->text, sizeof j->text, f->text);
 	if (n < LOST_FATAL || certificates < failure_quorum_certificates(f))
 		return;

@@ -78,7 +78,7 @@ void restore_job(struct farm *f, const struct event *ev)
 	const struct event_restore *r = &ev->restore;
 	struct job *ended = farm_find_job(f, r->job);
 	assert(!ended || !job_is_live(ended));
-	const char *refused = "the coordinator accepts no more jobs";
+	const char *refused = "the coordinator has as many live jobs as it accepts";
 	struct job *j = make_room(f, ev->tag) ? job_new(f, &r->submit, &refused) : NULL;
 	if (!j) {
 		struct action *a = update_add(f, ACTION_REJECTED);

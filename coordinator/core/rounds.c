@@ -99,7 +99,7 @@ void rounds_submit(struct farm *f, const struct event *ev)
 		return;
 	}
 	if (f->live_count >= f->config.max_jobs) {
-		rounds_reject(f, ev, "the coordinator accepts no more jobs");
+		rounds_reject(f, ev, "the coordinator has as many live jobs as it accepts");
 		return;
 	}
 	const char *refused = "";

@@ -198,11 +198,11 @@ static const struct job *why_waiting(const struct farm *f, const struct job *j, 
 	else if (j->evaluating && (j->ending != END_NONE || !job_ready(j)))
 		snprintf(text, size, "its error is being estimated");
 	else if (f->peer_count == 0)
-		snprintf(text, size, "no worker");
+		snprintf(text, size, "no worker is connected");
 	else if (active == 0)
-		snprintf(text, size, "no worker that responds and is not quarantined (%u are known)", f->peer_count);
+		snprintf(text, size, "no worker responds and is not quarantined (%u connected)", f->peer_count);
 	else if (j->class && !j->mixed && j->class->active == 0)
-		snprintf(text, size, "no worker with fingerprint %s (%u with others)", j->fingerprint, active);
+		snprintf(text, size, "no connected worker has fingerprint %s (%u have others)", j->fingerprint, active);
 	else if (verify_why(f, j, text, size) || doubt_why(f, j, text, size))
 		return NULL;
 	else if (share_is_limited(f, j) && share_unproven(f, j->owner))

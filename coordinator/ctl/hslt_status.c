@@ -183,7 +183,7 @@ static void print_doubt(const json_t *job)
 		       100 * number_of(job, "errorAbout"), text_of(job, "errorDoubt"));
 }
 
-/* Prints "error 3.2 % (3.0 - 3.5 %), target 2 %; halving it costs 12 min of CPU time, 6.0 min more; done in 31 min
+/* Prints "error 3.2 % (3.0 - 3.5 %), target 2 %; halving it takes 6.0 min more, 12 min of CPU time; done in 31 min
  * (25 min - 40 min)". */
 static void print_forecast(const json_t *job)
 {
@@ -199,7 +199,7 @@ static void print_forecast(const json_t *job)
 	if (json_is_object(half)) {
 		progress_duration(range_bound(json_object_get(half, "cpuSeconds"), "expected"), a, sizeof a);
 		progress_duration(range_bound(json_object_get(half, "wallSeconds"), "expected"), b, sizeof b);
-		printf("; halving it costs %s of CPU time, %s more", a, b);
+		printf("; halving it takes %s more, %s of CPU time", b, a);
 	}
 	if (json_is_object(eta)) {
 		progress_duration(range_bound(eta, "expected"), a, sizeof a);
@@ -210,12 +210,13 @@ static void print_forecast(const json_t *job)
 	printf("\n");
 }
 
-/* Prints what the job's priority means: "priority 5, of ann; 3 of 8 machines; j4 comes first; by its priority 2.7". */
+/* Prints what the job's priority means: "priority 5, of ann; 3 of 8 machines; j4 comes first; 2.7 due by its priority".
+ */
 static void print_share(const json_t *job)
 {
 	if (is_ended(job) || !json_is_number(json_object_get(job, "share")))
 		return;
-	printf("       priority %.0f%s%s; %s; by its priority %.3g\n", number_of(job, "priority"),
+	printf("       priority %.0f%s%s; %s; %.3g due by its priority\n", number_of(job, "priority"),
 	       *text_of(job, "owner") ? ", of " : "", text_of(job, "owner"), text_of(job, "place"),
 	       number_of(job, "share"));
 }
@@ -263,7 +264,7 @@ static void print_convergence(const json_t *job)
 	convergence_from_json(o, &a);
 	classes_from_json(json_object_get(job, "classes"), classes);
 	if (json_is_number(json_object_get(o, "rHatWorst")))
-		printf("       chains: %s; R-hat %.3g in the middle, %.3g in the worst of %u tiles\n",
+		printf("       chains: %s; R-hat %.3g in the median, %.3g in the worst of %u tiles\n",
 		       text_of(o, "verdict"), a.r_hat_median, a.r_hat_worst, a.tiles);
 	convergence_table(classes, number_of(job, "b"), &a, text, sizeof text);
 	fputs(text, stdout);

@@ -157,8 +157,9 @@ static void merge(struct jobs *jobs, const struct action *a, const struct incomi
 	if (!rc)
 		rollback_note(job, &a->key, at, in->result->maker);
 	if (rc == -ENOMEM) { /* merged by half, and not acknowledged */
-		log_event(LOG_STOP,
-			  "text=\"no memory to merge a result: to be started again, all goes on from the disk\"");
+		log_event(
+			LOG_STOP,
+			"text=\"no memory to merge a result: exiting; after a restart all jobs continue from the disk\"");
 		_exit(1);
 	}
 	job->overflowed = job->overflowed || rc == -ERANGE;

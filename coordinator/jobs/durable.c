@@ -181,7 +181,7 @@ int durable_ended(const struct jobs *jobs, uint64_t job, struct error *e)
 {
 	for (const struct ending *n = jobs->endings; n; n = n->next)
 		if (n->record.id == job)
-			return error_set(e, EIO, "the disk refuses it, and it is tried again");
+			return error_set(e, EIO, "its record cannot be written yet, and is tried again");
 	return 0;
 }
 
@@ -237,12 +237,13 @@ static int reserve_disk(struct jobs *jobs, struct live_job *job, const struct in
 	int rc;
 	do {
 		uint64_t first = room_first(jobs, job);
-		rc = first ? error_set(e, ENOSPC, "the disk has no room for it besides j%llu, which goes first",
+		rc = first ? error_set(e, ENOSPC,
+				       "the disk has no room for its results besides those of j%llu, which go first",
 				       (unsigned long long)first)
 		     : room_is_left(jobs, job, size)
 			     ? journal_reserve(job->journal, size + PINNED_ROOM, e)
 			     : error_set(e, ENOSPC,
-					 "No space left on the disk but what a checkpoint of its results needs");
+					 "the space left on the disk is needed for a checkpoint of its results");
 		if (!rc && job->canvas && in->batch->key.kind == LEASE_RENDER)
 			rc = canvas_reserve(job->canvas, in->batch, e);
 	} while (disk_is_full(rc) && room_make(jobs));

@@ -96,7 +96,7 @@ static int keep_damaged(struct jobs *jobs, struct live_job *job, struct error *e
 	if (rc)
 		return rc;
 	live_job_log(job, LOG_SPOOL_FAULT,
-		     "text=\"the job begins anew; what was merged of it stays in %s, as *.damaged\"", folder);
+		     "text=\"the job starts over; its damaged files are kept in %s as *.damaged\"", folder);
 	live_job_log(job, LOG_JOB_STATE, "state=anew");
 	return 0;
 }

@@ -148,7 +148,7 @@ static int not_known(const struct ledger_job *j, int rc, struct error *e)
 	if (rc != -EBADMSG && rc != -EINVAL)
 		return rc;
 	if (strcmp(j->version, HSLT_VERSION) == 0)
-		return error_prefix(e, -EBADMSG, "what it was submitted with");
+		return error_prefix(e, -EBADMSG, "its submission or plan");
 	return error_prefix(e, -EPROTO, "it was submitted to version %.40s of the coordinator, and this is %s",
 			    j->version, HSLT_VERSION);
 }

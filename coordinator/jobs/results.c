@@ -113,7 +113,7 @@ static void put_off(struct jobs *jobs, struct live_job *job, uint64_t peer, cons
 		ev.kind = EVENT_BATCH;
 	else if (w || !has_room(jobs, payload) || !live_job_put_off(job, peer, k, env, payload, false)) {
 		refuse(jobs, peer, k,
-		       w ? "another worker's result of this lease waits" : "no room for results that wait");
+		       w ? "another worker's result of this lease is waiting" : "no room for more waiting results");
 		return;
 	}
 	jobs_step(jobs, &ev);
@@ -145,7 +145,7 @@ static void fail_lease(struct jobs *jobs, uint64_t peer, const Farm__LeaseFailed
 	text_clean(text);
 	if (lease_key_from_wire(f->key, &ev.lease.key, &e) ||
 	    (f->bad_states && states_digest_from_wire(&f->states_digest, &states, &e))) {
-		jobs->peers.fault(jobs->peers.user, peer, "a lease cannot fail like this");
+		jobs->peers.fault(jobs->peers.user, peer, "an invalid key or digest of a failed lease");
 		return;
 	}
 	ev.job = ev.lease.key.job;
@@ -206,7 +206,7 @@ static void take_failure(struct jobs *jobs, uint64_t peer, struct envelope *env,
 		if (jobs->peers.name(jobs->peers.user, peer))
 			fail_lease(jobs, peer, m);
 	} else if (!has_room(jobs, payload) || !live_job_put_off(job, peer, &k, env, payload, checked)) {
-		refuse(jobs, peer, &k, "no room for results that wait");
+		refuse(jobs, peer, &k, "no room for more waiting results");
 	}
 }
 

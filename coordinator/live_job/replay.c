@@ -68,14 +68,14 @@ static int foreign_record_error(const struct replay *r, const char *what, size_t
 {
 	return error_set(
 		e, EPROTO,
-		"the journal of j%llu has %s of %zu bytes that mean nothing here: another coordinator wrote it",
+		"the journal of j%llu has %s of %zu bytes that this version cannot read: another version wrote it",
 		(unsigned long long)r->job->id, what, size);
 }
 
 /* Like foreign_record_error(), for estimates and counters, where e already says what is wrong. */
 static int strange_note(const struct replay *r, int rc, struct error *e)
 {
-	return rc == -EPROTO ? error_prefix(e, rc, "the journal of j%llu: another coordinator wrote it",
+	return rc == -EPROTO ? error_prefix(e, rc, "the journal of j%llu: another version wrote it",
 					    (unsigned long long)r->job->id)
 			     : rc;
 }
@@ -212,9 +212,9 @@ static void say_damage(const struct replay *r, const struct journal_found *found
 	}
 	live_job_log(
 		job, LOG_SPOOL_FAULT,
-		"damaged=%llu waiting=%zu text=\"the journal is damaged: %llu stored records are lost; computed again%s\"",
+		"damaged=%llu waiting=%zu text=\"the journal is damaged: %llu stored records are lost; leases to be computed again%s\"",
 		(unsigned long long)found->damaged, job->late_count, (unsigned long long)found->lost,
-		*text ? text : ": none any more");
+		*text ? text : ": none");
 }
 
 int replay_films(const struct spool *spool, struct live_job *job, struct replay_progress *p, struct error *e)

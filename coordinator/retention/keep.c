@@ -19,7 +19,7 @@ bool keep_bytes(const struct jobs *jobs, uint64_t job, uint64_t *bytes)
 	struct error e;
 	if (spool_film_bytes(jobs->spool, job, 1, bytes, &e) == 0)
 		return true;
-	log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s action=\"its films stay for now\"", (unsigned long long)job,
+	log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s action=\"its films are kept for now\"", (unsigned long long)job,
 		  log_quote(e.text).text);
 	return false;
 }

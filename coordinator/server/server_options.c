@@ -16,7 +16,7 @@ static const struct option_row rows[] = {
 	{"spool", 0, "DIR", "Folder for scene files, jobs and results", OPTION_TEXT(CONFIG, spool), .needed = true},
 	{"status-socket", 0, "PATH", "Unix socket for hslt-status", OPTION_TEXT(CONFIG, status_socket),
 	 .environment = "HSLT_STATUS_SOCKET"},
-	{"status-group", 0, "GROUP", "Group that may connect to it, besides this user (none)",
+	{"status-group", 0, "GROUP", "Group that may connect to the status socket, besides this user (none)",
 	 OPTION_TEXT(CONFIG, status_group)},
 	{"keep-partials", 0, "DIR", "Write each partial EXR tile to DIR as it is merged",
 	 OPTION_TEXT(CONFIG, keep_partials)},
@@ -85,8 +85,8 @@ const struct program server_program = {
 		    "hslt-coordinator --listen 0.0.0.0:7700 --tls ~/.hslt-ca/coordinator --spool /var/lib/hslt",
 	.details =
 		"The spool keeps the jobs' results; only one coordinator can use a spool at a time. Every event is "
-		"logged as a line on stderr. Under systemd it says when it is ready and feeds the watchdog, and a socket unit's Unix "
-		"socket is taken as the status socket.\nSizes are also written 500M, 20G or 2T, times 90s, 5m, 2h or 3d, and "
+		"logged as a line on stderr. Under systemd it reports when it is ready, notifies the watchdog, and uses a socket unit's "
+		"Unix socket as its status socket.\nSizes may also be written as 500M, 20G or 2T, times 90s, 5m, 2h or 3d, and "
 		"counts 1.5k, 2M or 1G.",
 	.exits = "0 stopped by SIGTERM or SIGINT, 1 failed, 2 usage",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},

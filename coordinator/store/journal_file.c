@@ -307,7 +307,7 @@ void journal_clear(const char *folder, uint64_t keep)
 	}
 	int rc = disk_list_end(&l, 0, &e);
 	if (rc && rc != -ENOENT)
-		log_event(LOG_SPOOL_FAULT, "text=%s action=\"journals of no more use may be left there\"",
+		log_event(LOG_SPOOL_FAULT, "text=%s action=\"some old journals may not have been deleted\"",
 			  log_quote(e.text).text);
 }
 

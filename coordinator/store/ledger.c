@@ -212,7 +212,7 @@ static int find_next(struct ledger *l, struct error *e)
 		skip(l, strtoull(text, NULL, 10) - 1);
 		mem_free(text);
 	} else if (rc == -EBADMSG) {
-		log_event(LOG_SPOOL_FAULT, "text=%s action=\"the next number follows from the jobs that are known\"",
+		log_event(LOG_SPOOL_FAULT, "text=%s action=\"the next id is derived from the known jobs\"",
 			  log_quote(e->text).text);
 	} else if (rc != -ENOENT) {
 		return rc;

@@ -206,7 +206,7 @@ int record_from_json(const char *text, size_t size, struct job_record *r, struct
 			json_is_integer(schema)
 				? error_set(
 					  e, EPROTO,
-					  "a record of version %lld, and this coordinator knows version %d: another one wrote it",
+					  "a record of version %lld, and this coordinator reads version %d: another release wrote it",
 					  (long long)json_integer_value(schema), SCHEMA)
 			: !o && json_error_code(&fault) == json_error_out_of_memory
 				? error_set(e, ENOMEM, "no memory for a record")

@@ -222,7 +222,7 @@ int spool_check_version(const char got[8], const char known[8], const char *path
 	if (memcmp(got + NAME, known + NAME, DIGITS) == 0)
 		return 0;
 	return error_set(e, EPROTO,
-			 "%s has version %.3s, and this coordinator knows version %.3s: another one wrote it", path,
+			 "%s has version %.3s, and this coordinator reads version %.3s: another release wrote it", path,
 			 got + NAME, known + NAME);
 }
 

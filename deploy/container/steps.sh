@@ -48,7 +48,7 @@ case "${1:-} $#" in
 "build 3") build "$2" "$3" ;;
 "install 2") install_in "$2" ;;
 *)
-	sed -n '2,6s/^# \{0,1\}//p' "$0" >&2
+	sed -n '3,/^set /s/^# \{0,1\}//p' "$0" >&2
 	exit 2
 	;;
 esac

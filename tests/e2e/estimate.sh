@@ -91,7 +91,7 @@ knows() {
 }
 until_true 20 knows || fail "the status does not say what the next halving costs"
 "$BIN/hslt-status" --json "$id" | grep -q '"etaRange":{"low":[0-9]' || fail "nor when it will be done"
-"$BIN/hslt-status" "$id" | grep -q 'error .* %), target 0.5 %; halving it costs .* done in' || fail "hslt-status: $("$BIN/hslt-status" "$id")"
+"$BIN/hslt-status" "$id" | grep -q 'error .* %), target 0.5 %; halving it takes .* done in' || fail "hslt-status: $("$BIN/hslt-status" "$id")"
 code 0 "$BIN/hslt-job" cancel "$id"
 code 4 "$BIN/hslt-submit" "$BOX" -o "$DIR/c.exr" --integrator path --size 40x40 --epoch 2 --spp 64 --target-error 0.5% --wait
 code 0 "$BIN/hslt-submit" "$BOX" -o "$DIR/d.exr" --integrator path --size 40x40 --epoch 2 --target-error 100% --wait

@@ -68,7 +68,7 @@ until_true 30 merged_more "$c" $((before + 5)) || fail "nothing of $c is merged"
 job list >"$DIR/list"
 grep -q "^$c .* [01] of 1 .*# by turns with\|^$c .* [01] of 1 [^#]*$" "$DIR/list" || fail "the list says of $c: $(cat "$DIR/list")"
 grep -q "^$d .*waits for $c of higher priority (7)\|^$d .*0 of 1 .*# $c comes first" "$DIR/list" || fail "the list says of $d: $(cat "$DIR/list")"
-"$BIN/hslt-status" "$c" | grep -q 'priority 7; [01] of 1 machine; by its priority 1' || fail "hslt-status says: $("$BIN/hslt-status" "$c")"
+"$BIN/hslt-status" "$c" | grep -q 'priority 7; [01] of 1 machine; 1 due by its priority' || fail "hslt-status says: $("$BIN/hslt-status" "$c")"
 job priority "$d" 50
 job release "$a"
 [ "$(value "$a" state)" != held ] || fail "$a is held still"

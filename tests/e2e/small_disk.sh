@@ -45,7 +45,7 @@ done
 waited=
 for id in $ids; do
 	until is_state "$id" done; do
-		waited="$waited$(for other in $ids; do value "$other" waiting; done | grep 'besides j' || :)"
+		waited="$waited$(for other in $ids; do value "$other" waiting; done | grep 'besides those of j' || :)"
 		[ $((looks = ${looks:-0} + 1)) -lt 300 ] || fail "$(for other in $ids; do echo "$other $(value "$other" state): $(value "$other" waiting)"; done)"
 		sleep 0.2
 	done

@@ -295,7 +295,7 @@ static void no_eta_without_leases(void **state)
 				   NULL,
 			   });
 	s = job_status_of(f, 14);
-	assert_string_equal(s.waiting, "no worker");
+	assert_string_equal(s.waiting, "no worker is connected");
 	near(s.eta, 96);
 	farm_free(f);
 }

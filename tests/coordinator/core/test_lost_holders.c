@@ -147,8 +147,8 @@ static void never_heard_again(void **state)
 		play_line(f, line);
 		snprintf(line, sizeof line, "[%d] w%d leaves -> %s", i, i,
 			 i < 8 ? "-"
-			       : "j1 is failed (failed: job: 8 of 8 workers that were lost in a row while they held "
-				 "bootstrap group 0 part 0 epoch 0; the last one: w8)");
+			       : "j1 is failed (failed: job: 8 workers in a row were lost while they held "
+				 "bootstrap group 0 part 0 epoch 0 (8 end the job); the last one: w8)");
 		play_line(f, line);
 	}
 	farm_free(f);

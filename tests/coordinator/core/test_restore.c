@@ -192,14 +192,15 @@ static void more_than_are_taken(void **state)
 			 "[%d] cancel j%d -> j%d cancelled, j%d is cancelled (cancelled: cancelled)%s", i, i, i, i,
 			 forgotten);
 		transcript_play(
-			f, (const char *const[]){
-				   "[0] submit -> rejected: the coordinator accepts no more jobs",
-				   "[0] restore asked j99 boot 0,0 -> rejected: the coordinator accepts no more jobs",
-				   line, NULL});
+			f,
+			(const char *const[]){
+				"[0] submit -> rejected: the coordinator has as many live jobs as it accepts",
+				"[0] restore asked j99 boot 0,0 -> rejected: the coordinator has as many live jobs as it accepts",
+				line, NULL});
 	}
 	transcript_play(f, (const char *const[]){
 				   "[40] submit -> j31 submitted, j31 is queued",
-				   "[41] submit -> rejected: the coordinator accepts no more jobs",
+				   "[41] submit -> rejected: the coordinator has as many live jobs as it accepts",
 				   NULL,
 			   });
 	farm_free(f);

@@ -204,7 +204,7 @@ static void a_job_is_pinned_to_a_fingerprint(void **state)
 				   "[0] submit groups=3 -> j1 submitted, j1 is queued",
 				   NULL,
 			   });
-	assert_string_equal(why_waiting(f, 1), "no worker");
+	assert_string_equal(why_waiting(f, 1), "no worker is connected");
 	transcript_play(f, (const char *const[]){
 				   "[0] w1 joins A threads=1 -> -",
 				   "[0] w2 joins B threads=1 -> -",
@@ -220,7 +220,7 @@ static void a_job_is_pinned_to_a_fingerprint(void **state)
 			   "[1] w1 leaves -> -",
 			   NULL,
 		   });
-	assert_string_equal(why_waiting(f, 1), "no worker with fingerprint A (1 with others)");
+	assert_string_equal(why_waiting(f, 1), "no connected worker has fingerprint A (1 have others)");
 	transcript_play(
 		f,
 		(const char *const[]){
@@ -260,7 +260,7 @@ static void nobody_is_trusted(void **state)
 				   "[30] tick -> -",
 				   NULL,
 			   });
-	assert_string_equal(why_waiting(f, 1), "no worker that responds and is not quarantined (1 are known)");
+	assert_string_equal(why_waiting(f, 1), "no worker responds and is not quarantined (1 connected)");
 	transcript_play(f, (const char *const[]){
 				   "[30] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
 				   "[31] w1 fails j1 g0 p0 boot no such file -> -",
@@ -286,11 +286,11 @@ static void limits_of_jobs_and_workers(void **state)
 		f,
 		(const char *const[]){
 			"[0] w1 joins A threads=1 -> -",
-			"[0] w2 joins A threads=1 -> rejected: the farm accepts no more workers",
+			"[0] w2 joins A threads=1 -> rejected: the farm has as many workers as it accepts",
 			"[0] submit groups=5 -> rejected: the plan has more leases in a round than the coordinator takes",
 			"[0] submit -> j7 submitted, j7 is queued",
 			"[0] submit -> j8 submitted, j8 is queued",
-			"[0] submit -> rejected: the coordinator accepts no more jobs",
+			"[0] submit -> rejected: the coordinator has as many live jobs as it accepts",
 			"[0] cancel j7 -> j7 cancelled, j7 is cancelled (cancelled: cancelled)",
 			"[1] submit -> j9 submitted, j9 is queued",
 			"[1] cancel j9 -> j9 cancelled, j9 is cancelled (cancelled: cancelled), j7 forgotten",

@@ -62,7 +62,7 @@ static void third_decides(void **state)
 		(const char *const[]){
 			START_ROUNDS,
 			"[2] w1 batch j1 g0 p0 e0 says x -> noted",
-			"[2] w2 batch j1 g0 p0 e0 says y -> noted: it differs from another worker's",
+			"[2] w2 batch j1 g0 p0 e0 says y -> noted: the result differs from another worker's",
 			"[2] w3 joins A threads=1 name=c -> -",
 			"[2] w3 wants 1 -> w3 gets j1 g0 p0 e0",
 			"[3] w3 batch j1 g0 p0 e0 says y -> merge, merged, #1 wrong result: j1 render group 0 part 0 epoch 0, j1 round 1, "
@@ -88,13 +88,13 @@ static void all_differ(void **state)
 	transcript((const char *const[]){
 		START,
 		"[1] w1 batch j1 g0 p0 boot says 1 -> noted",
-		"[1] w2 batch j1 g0 p0 boot says 2 -> noted: it differs from another worker's",
+		"[1] w2 batch j1 g0 p0 boot says 2 -> noted: the result differs from another worker's",
 		"[1] w3 joins A threads=1 name=c -> -",
 		"[1] w3 wants 1 -> w3 gets j1 g0 p0 boot",
-		"[1] w3 batch j1 g0 p0 boot says 3 -> noted: it differs from another worker's",
+		"[1] w3 batch j1 g0 p0 boot says 3 -> noted: the result differs from another worker's",
 		"[1] w4 joins A threads=1 name=d -> -",
 		"[1] w4 wants 1 -> w4 gets j1 g0 p0 boot",
-		"[1] w4 batch j1 g0 p0 boot says 4 -> noted: it differs from another worker's, "
+		"[1] w4 batch j1 g0 p0 boot says 4 -> noted: the result differs from another worker's, "
 		"j1 is failed (failed: no two of 4 workers agree on group 0 part 0 epoch 0: a, b, c, d)",
 		NULL,
 	});
@@ -110,7 +110,7 @@ static void one_worker_twice(void **state)
 				   "[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
 				   /* other work goes on, and it does not get the same again */
 				   "[1] w1 batch j1 g0 p0 boot says x -> noted, w1 gets j1 g1 p0 boot",
-				   "[1] w1 batch j1 g0 p0 boot says x -> repeat: it waits for another worker's",
+				   "[1] w1 batch j1 g0 p0 boot says x -> repeat: the result waits for another worker's",
 				   "[1] w1 batch j1 g1 p0 boot says x -> noted",
 				   NULL,
 			   });
@@ -126,8 +126,8 @@ static void one_worker_twice(void **state)
 			"[1] w2 wants 1 -> -",
 			"[1] w3 joins A threads=1 name=b home=c start=1 -> close w2",
 			"[1] w3 wants 1 -> -",
-			"[1] w3 batch j1 g0 p0 boot says x -> repeat: it waits for another worker's",
-			"[1] w3 batch j1 g0 p0 boot says y -> refused: it differs from what the same worker sent before",
+			"[1] w3 batch j1 g0 p0 boot says x -> repeat: the result waits for another worker's",
+			"[1] w3 batch j1 g0 p0 boot says y -> refused: the result differs from the same worker's earlier one",
 			/* of another certificate it is another one */
 			"[1] w4 joins A threads=1 certificate=d name=a -> -",
 			"[1] w4 wants 1 -> w4 gets j1 g0 p0 boot",
@@ -210,16 +210,16 @@ static void outvoted_three_times_is_quarantined(void **state)
 			"[0] w1 wants 1 -> w1 gets j1 g0 p0 boot",
 			"[0] w2 wants 1 -> -",
 			"[1] w3 batch j1 g0 p0 boot says 1 -> noted",
-			"[1] w1 batch j1 g0 p0 boot says x -> noted: it differs from another worker's, w2 gets j1 g0 p0 boot",
+			"[1] w1 batch j1 g0 p0 boot says x -> noted: the result differs from another worker's, w2 gets j1 g0 p0 boot",
 			"[1] w2 batch j1 g0 p0 boot says x -> merge, merged, "
 			"#3 wrong result: j1 bootstrap group 0 part 0 epoch 0, j1 prepare",
 			"[1] prepared j1 -> j1 is running, w3 gets j1 g0 p0 e0, w1 gets j1 g0 p0 e0",
 			"[2] w3 batch j1 g0 p0 e0 says 1 -> noted",
-			"[2] w1 batch j1 g0 p0 e0 says x -> noted: it differs from another worker's, w2 gets j1 g0 p0 e0",
+			"[2] w1 batch j1 g0 p0 e0 says x -> noted: the result differs from another worker's, w2 gets j1 g0 p0 e0",
 			"[2] w2 batch j1 g0 p0 e0 says x -> merge, merged, #3 wrong result: j1 render group 0 part 0 epoch 0, j1 round 1, "
 			"w3 gets j1 g0 p0 e1, w1 gets j1 g0 p0 e1",
 			"[3] w3 batch j1 g0 p0 e1 says 1 -> noted, w2 gets j1 g0 p0 e1", /* it straggles at w1 */
-			"[3] w1 batch j1 g0 p0 e1 says x -> noted: it differs from another worker's",
+			"[3] w1 batch j1 g0 p0 e1 says x -> noted: the result differs from another worker's",
 			"[3] w2 batch j1 g0 p0 e1 says x -> merge, merged, "
 			"#3 wrong result: j1 render group 0 part 0 epoch 1, #3 quarantined, j1 round 2, "
 			"w1 gets j1 g0 p0 e2, w2 gets j1 g0 p0 e2",

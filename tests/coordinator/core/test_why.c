@@ -16,7 +16,7 @@ static const struct {
 	const char *lines[LINES]; /* that lead there */
 	const char *why;	  /* of job 1 then; "": it does not wait */
 } states[] = {
-	{{"[0] submit -> j1 submitted, j1 is queued"}, "no worker"},
+	{{"[0] submit -> j1 submitted, j1 is queued"}, "no worker is connected"},
 	{{"[0] submit -> j1 submitted, j1 is queued", "[0] w1 joins A threads=1 -> -"}, "no worker asks for work"},
 	{{"[0] w1 joins A threads=1 -> -", "[0] w1 wants 1 -> -",
 	  "[0] submit groups=2 -> j1 submitted, j1 is queued, j1 is bootstrap, w1 gets j1 g0 p0 boot"},
@@ -25,7 +25,7 @@ static const struct {
 	  "[0] submit groups=2 -> j1 submitted, j1 is queued, j1 is bootstrap, w1 gets j1 g0 p0 boot",
 	  "[1] w1 batch j1 g0 p0 boot -> merge, merged, w1 gets j1 g1 p0 boot", "[1] w1 leaves -> -",
 	  "[2] w2 joins B threads=1 -> -", "[2] w2 wants 1 -> -"},
-	 "no worker with fingerprint A (1 with others)"},
+	 "no connected worker has fingerprint A (1 have others)"},
 	{{"[0] submit -> j1 submitted, j1 is queued", "[0] hold order j1 held by ann -> -"}, "held by ann"},
 	{{"[0] submit -> j1 submitted, j1 is queued", "[0] hold j1 no room -> -"}, "no room"},
 	{{"[0] submit groups=1 -> j1 submitted, j1 is queued", "[0] w1 joins A threads=1 -> -",
@@ -61,7 +61,7 @@ static const struct {
 	  "[33] w2 postpones j1 g2 p0 boot full -> -", "[33] w1 fails j1 g3 p0 boot sorry -> -"},
 	 "worker w2 has no room for its scene now: full"},
 	{{"[0] submit -> j1 submitted, j1 is queued", "[0] w1 joins A threads=1 -> -", "[30] tick -> -"},
-	 "no worker that responds and is not quarantined (1 are known)"},
+	 "no worker responds and is not quarantined (1 connected)"},
 	{{"[0] submit groups=2 verify=1 -> j1 submitted, j1 is queued", "[0] w1 joins A threads=1 name=a -> -",
 	  "[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
 	  "[1] w1 batch j1 g0 p0 boot says x -> noted, w1 gets j1 g1 p0 boot",
