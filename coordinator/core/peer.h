@@ -26,7 +26,7 @@ double peer_avoids_until(const struct peer *p, uint64_t job); /* end of its paus
 /* The time until which the worker gets no lease of the job, because it pauses with it or its memory is full with
  * another job's scene; -INFINITY: none. */
 double peer_pauses_until(const struct peer *p, const struct job *j);
-/* It returned its last lease of the job because its memory was full. */
+/* Whether the worker returned its last lease of the job because its memory was full. */
 bool peer_waits_for_room(const struct peer *p, uint64_t job);
 bool peer_lacks(const struct peer *p, uint64_t job); /* its last failure with the job was its own machine's fault */
 

@@ -158,7 +158,7 @@ static int check(struct jobs *jobs, const struct blob_hash *h, double seconds, s
 int files_check(struct jobs *jobs, const struct blob_hash *h, struct error *e)
 {
 	int rc = check(jobs, h, FILES_CHECKED, e);
-	/* only for files of live jobs: a worker may ask for any file, thousands of times a second. */
+	/* Only if a live job needs the file: a worker may ask for any file, thousands of times a second. */
 	if (rc == -ENOENT && blob_is_held(jobs->blobs, h))
 		look_at_all(jobs);
 	return rc;

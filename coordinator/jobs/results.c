@@ -82,7 +82,7 @@ static void take_result(struct jobs *jobs, uint64_t peer, const Farm__LeaseResul
 	ev.lease.valid = rc == 0;
 	ev.text = e.text;
 	struct incoming in = {.batch = &batch, .result = &stored, .payload = payload};
-	/* There is no room for it, in memory or on the disk. */
+	/* No room for the result, in memory or on the disk. */
 	if (rc == -ENOMEM || (job && ev.lease.valid && durable_reserve(jobs, job, &in, &e)))
 		refuse(jobs, peer, &ev.lease.key, e.text);
 	else

@@ -19,7 +19,7 @@ struct quota {	       /* 0: no limit */
 	uint64_t mutations;  /* mutations or samples of one job; if set, every job must have such a bound */
 };
 
-/* What the owner already uses. */
+/* The resources that the owner already uses. */
 struct quota_use {
 	uint64_t jobs, asset_bytes;
 };

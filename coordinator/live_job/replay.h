@@ -23,8 +23,11 @@ struct replay_progress {
 int replay_films(const struct spool *spool, struct live_job *job, struct replay_progress *p, struct error *e);
 
 /* Says whether a result can be merged now. */
-/* It is merged already. */
-enum replay_place { REPLAY_FITS, REPLAY_MERGED, REPLAY_LATE /* not yet: an earlier result is missing */ };
+enum replay_place {
+	REPLAY_FITS,   /* it can be merged now */
+	REPLAY_MERGED, /* it is merged already */
+	REPLAY_LATE    /* it cannot be merged yet: an earlier result is missing */
+};
 enum replay_place replay_place(const struct live_job *job, const struct lease_key *k);
 
 #endif

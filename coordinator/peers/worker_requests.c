@@ -125,7 +125,7 @@ void worker_requests_file_read(struct session *p, const struct blob_hash *h, con
 	const struct worker_request *a = STAILQ_FIRST(&p->requests);
 	if (!a || p->state != SESSION_WORKER)
 		return;
-	/* It is not checked again, however long the reading took. */
+	/* The file is not checked again, however long the reading took. */
 	if (a->blob && a->number == 0 && blob_hash_equal(&a->hash, h)) {
 		send_piece(p, a, refusal);
 		drop_first(p);
