@@ -72,9 +72,9 @@ static const struct program program = {
 		    "hslt-status --watch j12\n"
 		    "hslt-status --json | jq '.jobs[] | {id, state, progress}'",
 	.details =
-		"Of the jobs that have ended it lists the last 50. Long details, such as the effects that a scene "
-		"needs, are shown for live jobs, and for one that has ended if it is given as JOB. --json prints the "
-		"socket's objects, one per line; with JOB only that job's.",
+		"Lists live jobs, the last 50 jobs that have ended, and the workers. With JOB: that job with its details "
+		"and leases. --json prints the socket's objects, one per line, with the details of live jobs; with JOB "
+		"only that job's object.",
 	.exits = "0 done, 1 no such job, 2 usage, 75 coordinator not reachable",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 	.word = take_word,

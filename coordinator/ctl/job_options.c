@@ -27,13 +27,13 @@ static const struct option_row rows[] = {
 	{"coordinator", 'c', "HOST:PORT", "The coordinator", OPTION_TEXT(struct job_options, coordinator),
 	 .environment = "HSLT_COORDINATOR", .needed = true},
 	{"output", 'o', "FILE",
-	 "fetch: the output file; only an image is replaced (without it: into the current folder, under the last "
-	 "part of the name given to hslt-submit, never replacing a file); -: stdout",
+	 "fetch: the output file, replaced only if it is an image; -: stdout (without -o: a file in the current folder, "
+	 "named by the last part of the name given to hslt-submit; never replaces a file)",
 	 OPTION_OUTPUT(struct job_options, output)},
 	{"preview", 0, NULL,
-	 "fetch: the image so far, while the job runs; room.exr is previewed in room.preview.exr, also with -o room.exr",
+	 "fetch: the image so far, while the job runs; the preview of room.exr goes to room.preview.exr, even with -o room.exr",
 	 OPTION_FLAG(struct job_options, preview)},
-	{"json", 0, NULL, "list, workers: one JSON array", OPTION_FLAG(struct job_options, json)},
+	{"json", 0, NULL, "list, workers: print one JSON array", OPTION_FLAG(struct job_options, json)},
 	{"state", 0, "STATE", "(list: only jobs in this state)", OPTION_TEXT(struct job_options, state),
 	 .values = state_at},
 	{"spp", 0, "+N", "extend: additional samples per pixel", OPTION_COUNT(struct job_options, more_spp, 1, 1e15)},

@@ -106,7 +106,7 @@ void dispatch_prepare(struct jobs *jobs, struct live_job *job)
 	int rc = live_job_prepare(job, jobs_film_folder(jobs, &job->plan), &e);
 	if (rc && rc != -ENOMEM) {
 		if (!job->unprepared)
-			live_job_log(job, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"",
+			live_job_log(job, LOG_SPOOL_FAULT, "text=%s action=\"it will be tried again\"",
 				     log_quote(e.text).text);
 		job->unprepared = true;
 		job->try_again = jobs_now(jobs) + jobs->config.retry_seconds;

@@ -145,7 +145,7 @@ void durable_end_again(struct jobs *jobs, const struct job_record *r)
 	struct error e;
 	if (ledger_end(jobs->ledger, r, true, &e) == 0)
 		return;
-	log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s action=\"it is tried again\"", (unsigned long long)r->id,
+	log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s action=\"it will be tried again\"", (unsigned long long)r->id,
 		  log_quote(e.text).text);
 	end_later(jobs, r, true);
 }
@@ -157,7 +157,7 @@ int durable_end(struct jobs *jobs, struct live_job *job)
 		live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 	int rc = write_end(jobs, &job->record, keep_films(jobs, job, &job->record), &e);
 	if (rc)
-		live_job_log(job, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(e.text).text);
+		live_job_log(job, LOG_SPOOL_FAULT, "text=%s action=\"it will be tried again\"", log_quote(e.text).text);
 	if (rc && job->record.has_result) {
 		text_copy(job->record.why, sizeof job->record.why, e.text);
 		return rc;
@@ -479,7 +479,7 @@ static void mend_ledger(struct jobs *jobs)
 		return;
 	jobs->ledger_again = jobs_now(jobs) + jobs->config.retry_seconds;
 	if (ledger_mend(jobs->ledger, &e))
-		log_event(LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(e.text).text);
+		log_event(LOG_SPOOL_FAULT, "text=%s action=\"it will be tried again\"", log_quote(e.text).text);
 	spool_reserve(jobs->spool);
 }
 

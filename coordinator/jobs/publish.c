@@ -139,7 +139,7 @@ static void cannot_write(struct publishing *w)
 		room_make(w->jobs);
 	job->try_again = jobs_now(w->jobs) + w->jobs->config.retry_seconds;
 	if (strcmp(job->record.why, w->error.text) != 0)
-		live_job_log(job, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"",
+		live_job_log(job, LOG_SPOOL_FAULT, "text=%s action=\"it will be tried again\"",
 			     log_quote(w->error.text).text);
 	text_copy(job->record.why, sizeof job->record.why, w->error.text);
 }

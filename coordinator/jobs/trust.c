@@ -100,8 +100,8 @@ static const char empty[] = "{\"schema\": 1, \"workers\": []}";
 static int keep_damaged_note(struct jobs *jobs, const char *text, struct error *e)
 {
 	log_event(LOG_SPOOL_FAULT,
-		  "text=\"the note %s in jobs.db is no list of workers: it is kept as %s-damaged, and nobody in it is "
-		  "quarantined\"",
+		  "text=\"the note %s in jobs.db is no list of workers: it is kept as %s-damaged, and its workers "
+		  "are no longer quarantined\"",
 		  note, note);
 	int rc = ledger_set(jobs->ledger, "quarantined-damaged", text, e);
 	return rc ? rc : ledger_set(jobs->ledger, note, empty, e);
@@ -112,7 +112,8 @@ int trust_open(struct jobs *jobs, struct error *e)
 	char *text;
 	int rc = ledger_note(jobs->ledger, note, &text, e);
 	if (rc == -EBADMSG) {
-		log_event(LOG_SPOOL_FAULT, "text=%s action=\"nobody in it is quarantined\"", log_quote(e->text).text);
+		log_event(LOG_SPOOL_FAULT, "text=%s action=\"its workers are no longer quarantined\"",
+			  log_quote(e->text).text);
 		return ledger_set(jobs->ledger, note, empty, e);
 	}
 	if (rc == -ENOENT)
@@ -150,7 +151,7 @@ void trust_merged(struct live_job *job, const struct action *a)
 		}
 	struct live_job_credit *more = list_room(job->credits, job->credit_count, sizeof *more);
 	if (!more) {
-		live_job_log(job, LOG_SPOOL_FAULT, "text=\"no memory to remember who gave what\"");
+		live_job_log(job, LOG_SPOOL_FAULT, "text=\"no memory to count the unverified results of a worker\"");
 		return;
 	}
 	job->credits = more;

@@ -229,7 +229,7 @@ int replay_films(const struct spool *spool, struct live_job *job, struct replay_
 		return rc;
 	rc = journal_open(&job->journal, folder, job->id, generation, take_record, &r, &found, e);
 	if (rc == -ENOENT) { /* the batches in it can be computed again */
-		live_job_log(job, LOG_SPOOL_FAULT, "text=\"%s/journal.%llu is gone: what it held is computed again\"",
+		live_job_log(job, LOG_SPOOL_FAULT, "text=\"%s/journal.%llu is gone: its results are computed again\"",
 			     folder, (unsigned long long)generation);
 		rc = journal_create(&job->journal, folder, job->id, generation, e);
 	}

@@ -56,5 +56,5 @@ void ages_keep(const struct jobs *jobs)
 	now.seconds = ages_now(jobs);
 	age_clock_to_text(&now, text);
 	if (ledger_set(jobs->ledger, note, text, &e))
-		log_event(LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(e.text).text);
+		log_event(LOG_SPOOL_FAULT, "text=%s action=\"it will be tried again\"", log_quote(e.text).text);
 }

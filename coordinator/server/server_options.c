@@ -20,7 +20,7 @@ static const struct option_row rows[] = {
 	 OPTION_TEXT(CONFIG, status_group)},
 	{"keep-partials", 0, "DIR", "Write each partial EXR tile to DIR as it is merged",
 	 OPTION_TEXT(CONFIG, keep_partials)},
-	{"port-file", 0, "FILE", "Write the port that was bound to FILE", OPTION_TEXT(CONFIG, port_file)},
+	{"port-file", 0, "FILE", "Write the number of the port in use to FILE", OPTION_TEXT(CONFIG, port_file)},
 	{"heartbeat", 0, "SECONDS", "Interval at which workers must send something",
 	 OPTION_SECONDS(CONFIG, heartbeat_seconds, 0.05, 3600), .standard = "5"},
 	{"blobs", 0, "GB", "Limit of scene files in the spool; the least recently used that no job needs are deleted",
@@ -46,8 +46,8 @@ static const struct option_row rows[] = {
 	 "Limit of all files of finished jobs; films are deleted first, then results, oldest first; 0: none",
 	 OPTION_SIZE(CONFIG, clear_bytes, 0, 1e9, 1e9), .standard = "0"},
 	{"worker-bandwidth", 0, "MB/S",
-	 "Average rate at which one thread of a worker may send tiles, which bounds the epochs of new jobs "
-	 "from below (unlimited)",
+	 "Average rate at which one thread of a worker may send tiles, which sets a lower limit to the "
+	 "epochs of new jobs (unlimited)",
 	 OPTION_SIZE(CONFIG, worker_bandwidth, 1e-6, 1e6, 1e6)},
 	{"quota-jobs", 0, "N", "Maximum number of live jobs of one client", OPTION_COUNT(CONFIG, quota.jobs, 1, 1e9)},
 	{"quota-assets", 0, "MB", "Files of a client's live jobs in total, including uploads",

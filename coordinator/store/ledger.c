@@ -56,7 +56,8 @@ static int end_transaction(struct ledger *l, int rc, struct error *e)
 static void fall_behind(struct ledger *l, const struct error *e)
 {
 	l->behind = true;
-	log_event(LOG_SPOOL_FAULT, "file=%s text=%s action=\"it is tried again\"", names[1], log_quote(e->text).text);
+	log_event(LOG_SPOOL_FAULT, "file=%s text=%s action=\"it will be tried again\"", names[1],
+		  log_quote(e->text).text);
 }
 
 static void log_repair(const struct ledger_job *j, const char *what)
