@@ -146,7 +146,8 @@ static const struct program program = {
 		    "hslt-job cancel j12\n"
 		    "hslt-job log j12",
 	.details =
-		"list: all jobs; workers: those that are connected; cancel: end a job; fetch: download its image; log: print its log; hold: hand out no more of its work; "
+		"list: all jobs; workers: the connected workers; cancel: end a job; fetch: download its image; log: print its log; "
+		"hold: hand out no more of its work; "
 		"release: end the hold; priority: -100 to 100, higher first; extend: continue it with --spp, --mutations, --time "
 		"or --target-error.",
 	.exits = "0 done, 1 failed, 2 usage, 6 refused, 75 coordinator not reachable",
