@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What a sample contributes is collected in `now` and added to a cell's sums of x and x^2 when the sample ends, so that
- * the relative standard error sqrt(sum of x^2) / (sum of x) is that of samples, however often each lands in the cell.
- * When all are in, the sums become scales, of squares that are known well enough or of neighbourhoods.
+ * A sample's contributions are collected in `now` and added to the cells' sums of x and x^2 when the sample ends, so
+ * that the relative standard error sqrt(sum of x^2) / (sum of x) is that of samples, however many splats each has in a
+ * cell. When all samples have been added, the sums become scales, either of squares whose brightness is known well
+ * enough or of neighbourhoods.
  *
- * Lack of memory is an error of brightness_init and brightness_of_samples; nothing else fails. Where all is black the
- * scales are 0, and so is one that would not be finite.
+ * brightness_init and brightness_of_samples fail if out of memory; nothing else fails. Where everything is black the
+ * scales are 0, and so is a scale that would not be finite.
  */
 #include "worker/render/path/brightness.h"
 
@@ -15,12 +16,13 @@
 enum {
 	TICK_INTERVAL = 16, /* samples */
 	CELLS_MOST = 256,   /* along a side */
-	NEAR_LEAST = 2,	    /* cells on each side of one */
+	NEAR_LEAST = 2,	    /* radius of the smallest neighbourhood, in cells */
 	NEAR_MOST = 12,
 };
-/* Squared relative standard error up to which the brightness of a quarter and of a neighbourhood is used. */
+/* Limits on the squared relative standard error up to which the brightness of a quarter, or of a
+ * neighbourhood, counts as known. */
 static const double believed = 0.2, believed_near = 0.05;
-/* Share of the mean that is added in squares. */
+/* Fraction of the mean that is added in quadrature. */
 static const double least = 0.01;
 
 static void splat_on_map(struct splat_target *to, const struct splat *s, double weight)
@@ -105,7 +107,7 @@ double brightness_scale(const struct brightness *b, double x, double y)
 
 /* ---- blocks of cells */
 
-/* From the cell (x0, y0) to the one before (x1, y1). */
+/* The cells (x, y) with x0 <= x < x1 and y0 <= y < y1. */
 struct block {
 	uint32_t x0, y0, x1, y1;
 };
@@ -125,13 +127,13 @@ static struct sums sums_of(const struct brightness *b, struct block q)
 	return s;
 }
 
-/* The block's share of the film. */
+/* The fraction of the film that the block covers. */
 static double share_of(const struct brightness *b, struct block q)
 {
 	return (double)(q.x1 - q.x0) * (q.y1 - q.y0) / ((double)b->across * b->across);
 }
 
-/* The square of a sum, with the minimum for a block of that size. */
+/* Returns the square of the block's sum plus the square of its minimum, which is in proportion to its size. */
 static double squared_with_floor(const struct brightness *b, double all, struct sums s, struct block q)
 {
 	double floor = least * all * share_of(b, q);
@@ -141,7 +143,7 @@ static double squared_with_floor(const struct brightness *b, double all, struct 
 static double scale_of(const struct brightness *b, double all, double samples, struct sums s, struct block q)
 {
 	double scale = samples * share_of(b, q) / sqrt(squared_with_floor(b, all, s, q));
-	return isfinite(scale) ? scale : 0; /* fainter than squares of doubles can tell */
+	return isfinite(scale) ? scale : 0; /* fainter than squares of doubles can represent */
 }
 
 /* ---- known squares */
@@ -158,7 +160,7 @@ static bool is_known(const struct brightness *b, double all, struct block q)
 	return s.square <= believed * squared_with_floor(b, all, s, q);
 }
 
-/* At most eight levels deep. */
+/* Recursion is at most eight levels deep. */
 static void settle_square(struct brightness *b, double all, double samples, struct block q)
 {
 	bool quartered = q.x1 - q.x0 > 1;
@@ -184,7 +186,7 @@ void brightness_settle(struct brightness *b, uint64_t samples)
 
 /* ---- neighbourhoods */
 
-/* The square of that radius around a cell, cut off at the edges of the film. */
+/* Returns the square block of that radius around a cell, cut off at the edges of the film. */
 static struct block block_around(const struct brightness *b, uint32_t x, uint32_t y, uint32_t radius)
 {
 	return (struct block){x > radius ? x - radius : 0, y > radius ? y - radius : 0,

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The class of a path (common/film/path_class.h), the same whichever technique makes it: an inner vertex is smooth
- * where it scatters by a delta lobe, or by a BSDF whose mean roughness is below PATH_CLASS_ALPHA. Nothing allocates.
+ * The class of a path (common/film/path_class.h), which is the same whichever technique makes the path. An
+ * inner vertex is smooth if it scatters by a delta lobe, or by a BSDF whose mean roughness is below
+ * PATH_CLASS_ALPHA. Nothing allocates.
  */
 #ifndef WORKER_RENDER_PATH_CLASSES_H
 #define WORKER_RENDER_PATH_CLASSES_H
@@ -12,22 +13,23 @@
 
 unsigned path_class_whole(const struct full_path *x);
 
-/* Classes of all paths that one pair of sub-paths makes, and what these carry. */
+/* Collects the classes of all paths that one pair of sub-paths makes, and the light in each class. */
 struct classes {
-	/* Kinds of the parts that meet in a connection, the two that it joins included: the camera's first t vertices,
-	 * the light's first s. Joined ends scatter there by what is not delta. emitter: the camera's, where the last of
-	 * the t is an emitter that was hit and does not scatter, or in a medium that shines. */
+	/* Kinds of the two parts that meet in a connection, each including the joined vertex: camera[t] for the
+	 * camera's first t vertices, light[s] for the light's first s. A joined vertex scatters by a lobe that is not
+	 * delta. emitter[t] is for camera sub-paths that end at an emitter they hit, or in a medium that emits; that
+	 * last vertex does not scatter. */
 	unsigned char camera[PATH_MAX_EDGES + 3], emitter[PATH_MAX_EDGES + 3], light[PATH_MAX_EDGES + 3];
-	spectrum weights; /* X + Y + Z of a contribution */
+	spectrum weights; /* weights that turn a contribution into X + Y + Z */
 	struct path_sample *out;
 };
 
-/* Begins with c's sub-paths of these numbers of vertices. Empties out's classes. */
+/* Starts with c's sub-paths, which have these numbers of vertices. Clears out's classes. */
 void classes_begin(struct classes *k, const struct path_context *c, unsigned camera, unsigned light,
 		   struct path_sample *out);
 
-/* The class of the path that path_connect made of s vertices of c->light and t of c->camera. passed: how many surfaces
- * their joint passes. */
+/* Returns the class of the path that path_connect made of s vertices of c->light and t of c->camera. passed: the number
+ * of surfaces that their joint passes. */
 static inline unsigned classes_joined(const struct classes *k, unsigned s, unsigned t, unsigned passed)
 {
 	enum path_class_kind kind = (enum path_class_kind)(s > 0 ? k->camera[t] : k->emitter[t]);
@@ -36,14 +38,15 @@ static inline unsigned classes_joined(const struct classes *k, unsigned s, unsig
 	return path_class(s + t - 1 + passed, path_class_kind_join(kind, (enum path_class_kind)k->light[s]));
 }
 
-/* What was added until now did not reach the film. */
+/* Discards all classes that were added, because the sample did not reach the film. */
 static inline void classes_clear(struct path_sample *out)
 {
 	out->classes = 0;
 	memset(out->of_class, 0, sizeof out->of_class);
 }
 
-/* Technique s contributes l. Call right after path_connect, which leaves in c how many surfaces the joint passes. */
+/* Adds the contribution l of technique s. Call it right after path_connect, which leaves the number
+ * of passed surfaces in c. */
 static inline void classes_add(struct classes *k, const struct path_context *c, unsigned s, unsigned t, spectrum l)
 {
 	unsigned class = classes_joined(k, s, t, c->passed_count);

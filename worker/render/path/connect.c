@@ -1,30 +1,34 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * path_connect joins s vertices of the light sub-path with t of the camera's, weighs the path by the balance heuristic
- * over all techniques that could have made it, and splats what remains. Densities are carried as ratios of neighbouring
- * techniques, whose products stay near 1 where densities themselves leave the range of doubles.
+ * path_connect joins s vertices of the light sub-path to t of the camera's and weights the contribution by the balance
+ * heuristic over all techniques that could have made the path. Densities are carried as ratios between neighbouring
+ * techniques, whose products stay near 1 where the densities themselves leave the range of doubles.
  *
- * Most pairs of surfaces have little to bring, once weighted, but cost a ray and a weight like any other. Those that
- * bring less than path_context.faint are made with a probability q in proportion to what they bring, and count 1/q
- * times. Which of them follows by systematic sampling (Madow and Madow 1944): their q are put end to end from a random
- * place in [0, 1) on, and those within which a whole number falls are made. So each has its probability exactly, from
- * one random number for all, provided that no q depends on which others were made.
+ * Most connections between two surfaces contribute little once weighted, but cost a ray and a weight like any other.
+ * Those that contribute less than path_context.faint are made with a probability q in proportion to their contribution,
+ * and are then multiplied by 1/q. Systematic sampling decides which ones are made (Madow and Madow 1944): the intervals
+ * of length q are laid end to end, starting at a random position in [0, 1), and the connections whose intervals contain
+ * a whole number are made. So each has exactly its probability, from one random number for all, provided that no q
+ * depends on which other connections were made.
  *
- * A connection that is blocked, delta at an end, or below what doubles can weigh contributes nothing; none is an error.
+ * A connection contributes nothing if it is blocked, has a delta lobe at an end, or is too faint for doubles to weight;
+ * none of these is an error.
  */
 #include "worker/render/path/connect.h"
 
 #include "worker/render/path/media.h"
 #include "worker/render/path/visible.h"
 
-/* What every joint runs is compiled twice: with `plain` for worlds without an effect that joints ask about
- * (effects.joints), and for the others. It is short enough for the questions to cost several per cent. */
+/* The code that runs for every joint is compiled twice: with `plain` set for worlds without any effect that
+ * joints depend on (effects.joints), and once for all others. The code is so short that testing for the effects
+ * would cost several percent. */
 #define IN_BOTH static inline __attribute__((always_inline))
 
-/* Beyond this a weight is zero in double anyway; infinities would breed NaN. */
+/* Beyond this ratio a weight is zero in double anyway, and infinities would lead to NaN. */
 #define RATIO_LIMIT 1e200
 
-/* The ends that a technique joins scatter there by connection: their sub-path's delta flag says nothing. */
+/* Whether the path has a delta lobe at vertex i. At the two ends of the joint it scatters smoothly, so the delta flag
+ * of their sub-path does not apply there. */
 static bool is_delta(const struct joined_path *p, unsigned i)
 {
 	if (i + 1 == p->s || i == p->s + p->passed || i == 0 || i == p->edges)
@@ -38,8 +42,8 @@ static bool is_refracted(const struct joined_path *p)
 	return p->passed > 0 && path_is_refracted(p->v[p->s]);
 }
 
-/* Whether emitters are sampled for the path from the lens straight to this point of one. Where that is hardly denser
- * than the film's own samples, whose light there has no variance, it would only add some. */
+/* Whether points of emitters are joined straight to the lens for this pair. Where they are hardly denser than the
+ * film's own samples, whose estimate of directly visible light has no variance, the joints would only add variance. */
 static bool lens_joins(const struct path_context *c, const struct path_vertex *eye, const struct path_vertex *emitter)
 {
 	if (!c->joins_lens || emitter->kind == VERTEX_INFINITE)
@@ -48,7 +52,7 @@ static bool lens_joins(const struct path_context *c, const struct path_vertex *e
 	return path_pdf_toward(c, emitter, eye->x.p) >= PATH_LENS_DENSER * film;
 }
 
-/* The first vertex from x_i on that is not passed: what x_i-1 is joined to. */
+/* Returns the index of the first vertex from x_i on that is not passed: the vertex to which x_{i-1} is joined. */
 IN_BOTH unsigned behind_passed(const struct path_context *c, const struct joined_path *p, unsigned i, const bool plain)
 {
 	while (!plain && path_sees_through(c) && path_joint_passes(p, i))
@@ -56,7 +60,8 @@ IN_BOTH unsigned behind_passed(const struct path_context *c, const struct joined
 	return i;
 }
 
-/* For j > 0 and a vertex x_j that is specular: light that goes straight through it may be joined nonetheless. */
+/* For j > 0 and a specular vertex x_j: whether technique j can join x_{j-1} to the first vertex behind those that light
+ * passes straight through, starting at x_j. */
 static bool joins_through(const struct path_context *c, const struct joined_path *p, unsigned j)
 {
 	unsigned end = behind_passed(c, p, j, false);
@@ -78,7 +83,7 @@ IN_BOTH bool technique_exists(const struct path_context *c, const struct joined_
 	return !is_delta(p, j) || (!plain && path_sees_through(c) && joins_through(c, p, j));
 }
 
-/* Edge i, and its media at x_i-1 and at x_i. Where media scatter. */
+/* Edge i and its media at x_{i-1} (light) and at x_i (camera). Only where media scatter. */
 struct joined_edge {
 	const struct path_edge *edge;
 	uint32_t light, camera;
@@ -91,7 +96,8 @@ static struct joined_edge edge_of(const struct joined_path *p, unsigned i)
 	return (struct joined_edge){e, from_light ? e->before : e->medium, from_light ? e->medium : e->before};
 }
 
-/* What edge i contributes to the density of x_i (or, if back, of x_i-1) as generated from its other end. */
+/* Returns the factor that edge i contributes to the density of x_i (or, if back, of x_{i-1}) as
+ * generated from its other end. */
 IN_BOTH double edge_pdf(const struct path_context *c, const struct joined_path *p, unsigned i, bool back,
 			const bool plain)
 {
@@ -101,7 +107,7 @@ IN_BOTH double edge_pdf(const struct path_context *c, const struct joined_path *
 	return path_edge_pdf(c, e.edge, back ? e.light : e.camera, p->v[back ? i - 1 : i]);
 }
 
-/* Density of x_i as generated from the light, for i >= s. */
+/* Returns the density of x_i as generated from the light's side, for i >= s. */
 IN_BOTH double light_pdf(const struct path_context *c, const struct joined_path *p, unsigned i, const bool plain)
 {
 	unsigned s = p->s, passed = plain ? 0 : p->passed;
@@ -116,7 +122,7 @@ IN_BOTH double light_pdf(const struct path_context *c, const struct joined_path 
 	return path_pdf(c, prev, p->v[i - 1], p->v[i], TRANSPORT_IMPORTANCE) * edge_pdf(c, p, i, false, plain);
 }
 
-/* Density of x_i as generated from the camera, for i < s. */
+/* Returns the density of x_i as generated from the camera's side, for i < s. */
 IN_BOTH double camera_pdf(const struct path_context *c, const struct joined_path *p, unsigned i, const bool plain)
 {
 	unsigned s = p->s, k = p->edges;
@@ -129,8 +135,8 @@ IN_BOTH double camera_pdf(const struct path_context *c, const struct joined_path
 	return path_pdf(c, prev, p->v[i + 1], p->v[i], TRANSPORT_RADIANCE) * edge_pdf(c, p, i + 1, true, plain);
 }
 
-/* The density of joining x_first-1 to x_end, which passes x_first..x_end-1, over that of drawing those as their
- * sub-path did; 1 if there are none. */
+/* Returns the density of joining x_{first-1} to x_end, which passes x_first .. x_{end-1}, divided by that of drawing
+ * the passed vertices as their sub-path did; 1 if there are none. */
 IN_BOTH double over_drawn(const struct path_context *c, const struct joined_path *p, unsigned first, unsigned end,
 			  const bool plain)
 {
@@ -142,8 +148,8 @@ IN_BOTH double over_drawn(const struct path_context *c, const struct joined_path
 	return path_passed_ratio(p->v, first, end - 1, pdf);
 }
 
-/* For the technique that made the path: the density of drawing what its joint passes, from the light's side or the
- * camera's, over that of joining; 1 if it passes nothing. */
+/* For the technique that made the path: returns the density of drawing the vertices that its joint passes, from the
+ * light's or the camera's side, divided by that of joining; 1 if the joint passes nothing. */
 IN_BOTH double drawn_instead(const struct path_context *c, const struct joined_path *p, bool from_light,
 			     const bool plain)
 {
@@ -156,10 +162,10 @@ IN_BOTH double drawn_instead(const struct path_context *c, const struct joined_p
 				    : path_passed_ratio(p->v, p->s, p->s + p->passed - 1, pdf));
 }
 
-/* How technique 1 makes the path if it is refracted. */
+/* How technique 1 makes the path if its joint is refracted. */
 struct refracted_joint {
-	unsigned end; /* it joins x_0 to x_end; 0: it is not */
-	double ratio; /* its density over that of drawing x_1 .. x_end-1 as their sub-path did */
+	unsigned end; /* it joins x_0 to x_end; 0: it is not refracted */
+	double ratio; /* its density divided by that of drawing x_1 .. x_{end-1} as their sub-path did */
 };
 
 IN_BOTH struct refracted_joint refracted_joint_of(struct path_context *c, const struct joined_path *p, const bool plain)
@@ -179,9 +185,9 @@ IN_BOTH struct refracted_joint refracted_joint_of(struct path_context *c, const 
 	return r;
 }
 
-/* r is the density of technique j over that of technique s, computed as if j drew every vertex. In fact joints pass
- * vertices without drawing them. drawn_instead corrects r for the joint of s, once towards either side; over_drawn
- * corrects the ratio that is stored for the joint of j. */
+/* Computes path_technique_ratios. r is the density of technique j divided by that of technique s, computed as if j drew
+ * every vertex, although joints pass vertices without drawing them. drawn_instead corrects r for the joint of s, once
+ * for each direction; over_drawn corrects each stored ratio for the joint of j. */
 IN_BOTH void technique_ratios(struct path_context *c, const struct joined_path *p, unsigned max_s, double *ratio,
 			      const bool plain)
 {
@@ -189,7 +195,8 @@ IN_BOTH void technique_ratios(struct path_context *c, const struct joined_path *
 	unsigned s = p->s, k = p->edges, last = max_s < k ? max_s : k, joint_end = plain ? s : s + p->passed;
 	for (unsigned j = 0; j <= k; j++)
 		ratio[j] = 0;
-	/* Technique 1 draws x_0 as seen from what it is joined to, the longer ones as light sub-paths do. */
+	/* Technique 1 draws x_0 as seen from the vertex to which it is joined; longer light
+	 * sub-paths draw it independently. */
 	double toward = 1, point = 1;
 	const struct refracted_joint refracted = refracted_joint_of(c, p, plain);
 	const bool first_exists = refracted.end || technique_exists(c, p, 1, plain);
@@ -211,7 +218,7 @@ IN_BOTH void technique_ratios(struct path_context *c, const struct joined_path *
 	}
 	bool beyond = r >= RATIO_LIMIT;
 	r = first * drawn_instead(c, p, false, plain);
-	double r_end = r; /* r at x_end, the nearest vertex behind x_j that is not passed */
+	double r_end = r; /* r at x_end, the nearest vertex on the camera's side of x_j that is not passed */
 	double r_refracted = 0;
 	for (unsigned j = s, end = s; j > 0 && r_end > 0 && r < RATIO_LIMIT; j--) {
 		r *= camera_pdf(c, p, j - 1, plain) / p->v[j - 1]->pdf;
@@ -256,7 +263,7 @@ void path_technique_ratios(struct path_context *c, const struct joined_path *p, 
 IN_BOTH double balance_weight(struct path_context *c, const struct joined_path *p, unsigned max_s, const bool plain)
 {
 	double ratio[PATH_MAX_EDGES + 2], sum = 0;
-	/* The first technique that only samples with a light sub-path have. */
+	/* The first technique that needs a light sub-path. */
 	unsigned with_light = behind_passed(c, p, 1, plain) == p->edges ? 1 : 2;
 	if (plain)
 		plain_ratios(c, p, max_s, ratio);
@@ -304,13 +311,13 @@ static bool disperses(const struct path_context *c, const struct joined_path *p)
 	return any;
 }
 
-/* Whether edge i is in the medium that its end has, for a sub-path that comes from there. */
+/* Whether the edge lies in the medium that a sub-path from the light (or the camera) expects at its start. */
 static bool edge_is_in(const struct joined_edge *e, uint32_t medium, bool from_light)
 {
 	return e->edge->fits && medium == (from_light ? e->light : e->camera);
 }
 
-/* Whether a sub-path from the camera is in the media in which the light's edges were made. */
+/* Whether a sub-path from the camera would be in the same media along the edges that the light's sub-path made. */
 static bool camera_agrees(const struct path_context *c, const struct joined_path *p)
 {
 	double unused;
@@ -350,7 +357,7 @@ static __attribute__((noinline)) spectrum weighted_with_effects(struct path_cont
 	return path_collapse(spectrum_scale(balance_weight(c, p, max_s, false), l), disperses(c, p));
 }
 
-/* The end of every contribution. joint: of edge s, where media scatter and s > 0. */
+/* Weights the contribution l of technique s. joint: edge s, where media scatter and s > 0. */
 static spectrum weighted(struct path_context *c, const struct path_vertex *light, unsigned s, unsigned t,
 			 unsigned max_s, const struct path_edge *joint, spectrum l)
 {
@@ -372,7 +379,8 @@ static spectrum hit_emitter(struct path_context *c, unsigned t, unsigned max_s)
 	return spectrum_is_zero(l) ? l : weighted(c, NULL, 0, t, max_s, NULL, l);
 }
 
-/* The transmittance of the light sub-path's edges before its vertex s - 1, which was reached through `medium`. */
+/* Returns the transmittance of the light sub-path's edges before its vertex s - 1, which the camera's side
+ * reached through `medium`. */
 static spectrum absorption_of_light(const struct path_context *c, unsigned s, uint32_t medium)
 {
 	spectrum t = spectrum_of(1);
@@ -384,7 +392,8 @@ static spectrum absorption_of_light(const struct path_context *c, unsigned s, ui
 	return t;
 }
 
-/* What media that only absorb leave of light on its way to z through y, vertex s - 1 of the light's sub-path. */
+/* Returns the transmittance of absorbing media along the way to z from the emitter, through y, vertex s - 1
+ * of the light's sub-path. */
 static spectrum absorption_towards(const struct path_context *c, const struct path_vertex *z, vec3 to_light,
 				   const struct path_vertex *y, unsigned s)
 {
@@ -403,7 +412,8 @@ static inline spectrum after_absorption(const struct path_context *c, const stru
 	return only_absorbs(c) ? spectrum_mul(l, absorption_towards(c, z, to_light, y, s)) : l;
 }
 
-/* Whether z and y see each other; where media scatter, the edge between them and what is left of l. */
+/* Whether z and y see each other. Where media scatter, also fills in the edge between them and multiplies
+ * *l by its transmittance. */
 static bool is_seen(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
 		    struct path_edge *joint, spectrum *l)
 {
@@ -437,8 +447,9 @@ static __attribute__((noinline)) spectrum seen_with_effects(struct path_context 
 	return after_absorption(c, &c->passed[c->passed_count - 1], to_light, y, s, l);
 }
 
-/* What is left of l on its way from y, vertex s - 1 of the light's sub-path, to the camera's vertex t - 1, directly or
- * through surfaces; zero: they do not see each other. direct: l after what media absorb of it if nothing is passed. */
+/* Returns the part of l that reaches the camera's vertex t - 1 from y, vertex s - 1 of the light's sub-path,
+ * directly or through surfaces; zero if they do not see each other. direct: l after absorption by media for a
+ * joint that passes nothing. */
 static inline spectrum if_visible(struct path_context *c, const struct path_vertex *y, unsigned s, unsigned t,
 				  vec3 to_light, spectrum l, spectrum direct, struct path_edge *joint)
 {
@@ -448,8 +459,8 @@ static inline spectrum if_visible(struct path_context *c, const struct path_vert
 	return is_open ? l : spectrum_of(0);
 }
 
-/* The contribution of the refracted path from y, drawn with this density, to the camera's vertex t - 1; zero: none was
- * found. */
+/* Returns the contribution of the refracted path from y, drawn with density pdf, to the camera's vertex t - 1; zero
+ * if there is no such path. */
 static spectrum refracted(struct path_context *c, const struct path_vertex *y, unsigned t, double pdf)
 {
 	const struct path_vertex *z = &c->camera[t - 1];
@@ -488,7 +499,8 @@ static spectrum join_emitter(struct path_context *c, unsigned t, unsigned max_s)
 	return spectrum_is_zero(l) ? l : weighted(c, &y, 1, t, max_s, &joint, l);
 }
 
-/* The unit direction from the lens to y, where the film sees it, and the film point's density per area there. */
+/* Projects y on the film as seen from the lens. Sets the film point, the unit direction d to y, and *jac, the film's
+ * density per area at y. Returns false if the film does not see y. */
 static bool project(const struct path_context *c, const struct path_vertex *y, double film[2], vec3 *d, double *jac)
 {
 	const struct path_vertex *eye = &c->camera[0];
@@ -504,7 +516,7 @@ static bool project(const struct path_context *c, const struct path_vertex *y, d
 	return true;
 }
 
-/* s vertices from `light` on with the lens, of what the last of them sends there. */
+/* Joins the s vertices from `light` on to the lens. l is the contribution without visibility and absorption. */
 static spectrum join_lens(struct path_context *c, const struct path_vertex *light, unsigned s, unsigned max_s, vec3 d,
 			  spectrum l)
 {
@@ -525,7 +537,7 @@ static spectrum join_camera(struct path_context *c, unsigned s, unsigned max_s, 
 	return join_lens(c, c->light, s, max_s, d, spectrum_scale(jac, l));
 }
 
-/* Connects a point of an emitter to the lens: few points of the film, or none, hit a small or distant emitter. */
+/* Joins a point of an emitter to the lens: few film samples, or none, hit a small or distant emitter. */
 static spectrum join_emitter_to_lens(struct path_context *c, unsigned max_s, double film[2])
 {
 	struct path_vertex y;
@@ -540,10 +552,10 @@ static spectrum join_emitter_to_lens(struct path_context *c, unsigned max_s, dou
 	return join_lens(c, &y, 1, max_s, d, l);
 }
 
-/* How often a connection that brings l counts: once, or, if it is faint, 1 / q times in a share q of all cases and
- * otherwise 0 times, which saves its rays. Its weight, on which q should depend, is not known yet; light_every / edges
- * stands for it, as if all techniques were alike. So what is made brings at most `edges` times `faint`, whatever its
- * weight turns out to be. */
+/* Returns the factor by which a connection with contribution l counts: 1, or, if it is faint, 1 / q with probability q
+ * and otherwise 0, which saves its rays. q should depend on the weight of the connection, but that is not known yet;
+ * light_every / edges stands for it, as if all techniques had the same weight. So the contribution of a faint
+ * connection that is made is at most `edges` times `faint`, whatever its weight turns out to be. */
 static double times_made(struct path_context *c, unsigned edges, spectrum l)
 {
 	double brings = spectrum_mean(l) * ((c->light_every > 1 ? c->light_every : 1) / (double)edges);
@@ -562,7 +574,7 @@ static spectrum join_surfaces(struct path_context *c, unsigned s, unsigned t, un
 	if (!(distance2 > 0))
 		return spectrum_of(0);
 	spectrum l = spectrum_mul(y->beta, path_scatter(c, y, vec3_neg(to_light), y->to_prev));
-	if (spectrum_is_zero(l)) /* the other side of an opaque surface, most often */
+	if (spectrum_is_zero(l)) /* usually because z lies behind an opaque surface at y */
 		return l;
 	l = spectrum_mul(l, spectrum_mul(z->beta, path_scatter(c, z, z->to_prev, to_light)));
 	l = spectrum_scale(path_geometry_term(z, y, to_light, distance2), l);

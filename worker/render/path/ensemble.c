@@ -3,12 +3,12 @@
  * The paths that a pair of sub-paths makes, as candidates with their contributions (see ensemble.h).
  *
  * ensemble_draw draws the two sub-paths and connects them by every technique (s, t), s vertices from the light and t
- * from the camera; a candidate's intensity is that of the contribution weighted by multiple importance sampling (Veach
- * 1997). Where lengths are limited by chance it is divided by survival(s) survival(t), survival(n) = min(1, (5/n)^2).
- * ensemble_choose takes candidate i with probability intensity_i / total. ensemble_around draws a technique of the
- * given path x with probability p_s(x) / sum_j p_j(x), splits x there and continues both parts at random; x itself
- * contributes f(x) / sum_j p_j(x). Nothing is reported as an error: paths without a contribution are left out, and
- * ensemble_choose returns false where no candidate is left.
+ * from the camera. The intensity of a candidate is that of its contribution, weighted by multiple importance sampling
+ * (Veach 1997) and, where lengths are limited at random, divided by survival(s) survival(t), with survival(n) = min(1,
+ * (5/n)^2). ensemble_choose takes candidate i with probability intensity_i / total. ensemble_around draws a technique
+ * of the given path x with probability p_s(x) / sum_j p_j(x), splits x there and continues both parts at random; x
+ * itself contributes f(x) / sum_j p_j(x). Nothing is reported as an error: paths without a contribution are left out,
+ * and ensemble_choose returns false where no candidate is left.
  */
 #include "worker/render/path/ensemble.h"
 
@@ -16,12 +16,14 @@
 #include "worker/render/path/full_path_density.h"
 #include "worker/render/path/media.h"
 
-/* A sub-path has these vertices for sure, and n > 5 or more with probability (5/n)^2: 10 on average where nothing ends
- * it. A fixed probability of going on would make the weights of long paths grow as fast as light dies away, or faster
- * between mirrors and in fibres, where it hardly does: rare samples would hold most of the light. */
+/* A sub-path has at least this many vertices, and n > 5 or more with probability (5/n)^2: at most 10 on average
+ * where nothing else ends it. With a fixed probability of continuing, the weights of long paths would grow as
+ * fast as their light decays, or faster between mirrors and in fibres, where it hardly decays: rare samples
+ * would hold most of the light. */
 enum { SURE_VERTICES = 5 };
 
-/* Draws a number of vertices from `least` to `most`: n or more with probability survival(n) / survival(least). */
+/* Draws a number of vertices from max(least, SURE_VERTICES) to `most`: n or more with probability
+ * survival(n) / survival(least). */
 static unsigned draw_vertices(double u, unsigned least, unsigned most)
 {
 	unsigned from = least > SURE_VERTICES ? least : SURE_VERTICES;
@@ -42,17 +44,17 @@ struct ensemble_lengths ensemble_all_lengths(const struct path_context *c)
 	return (struct ensemble_lengths){c->max_depth + 1, c->max_depth, false};
 }
 
-/* Probability that a sub-path may have n vertices. */
+/* The probability that a sub-path may have n vertices or more. */
 static double survival(unsigned n)
 {
 	return n > SURE_VERTICES ? (double)(SURE_VERTICES * SURE_VERTICES) / ((double)n * n) : 1;
 }
 
-/* What joining s vertices of the light's sub-path to t of the camera's contributes. */
+/* Returns the contribution of joining s vertices of the light's sub-path to t of the camera's. */
 static double contribution(struct path_context *c, unsigned s, unsigned t)
 {
 	double film[2];
-	struct path_sample one; /* its many splats are not read: nothing sets them */
+	struct path_sample one; /* its large array of splats stays uninitialised */
 	one.count = 0;
 	one.intensity = 0;
 	spectrum l = path_connect(c, s, t, PATH_MAX_EDGES, film);
@@ -61,7 +63,8 @@ static double contribution(struct path_context *c, unsigned s, unsigned t)
 	return one.intensity;
 }
 
-/* known: a candidate whose contribution is known already, NULL: none. */
+/* Computes the candidates of two sub-paths with these numbers of vertices. capped: lengths were limited at random.
+ * known: NULL, or a candidate whose contribution is already known. */
 static void gather_candidates(struct path_context *c, unsigned camera, unsigned light, bool capped,
 			      const struct candidate *known, struct ensemble *out)
 {
@@ -105,7 +108,8 @@ bool ensemble_choose(struct path_context *c, const struct ensemble *e, double u,
 	return full_path_from_subpaths(c, e->of[i].s, e->of[i].passed, e->of[i].edges, x);
 }
 
-/* Contribution over density of going on from beta across edge e to a vertex of density pdf, by scattering f at `at`. */
+/* Returns the throughput at the end of edge e: beta, the throughput at its start, times the scattering f at v[at],
+ * times the geometry term, divided by the density pdf. */
 static spectrum extend_weight(const struct path_context *c, const struct full_path *x, spectrum beta, spectrum f,
 			      unsigned at, unsigned e, double pdf)
 {
@@ -125,7 +129,7 @@ static void keep_numbers(struct sampler *s, enum sampler_side side, unsigned ver
 		v->next_event[i] = u[DIM_NEXT_EVENT + i];
 }
 
-/* x_k .. x_{k-t+1} as the camera's sub-path; t >= 2. The wavelengths are those of x. */
+/* Makes x_k .. x_{k-t+1} the camera's sub-path; t >= 2. The wavelengths are those of x. */
 static void put_camera(struct path_context *c, struct sampler *s, struct full_path *x, unsigned t)
 {
 	unsigned k = x->edges;
@@ -153,7 +157,7 @@ static void put_camera(struct path_context *c, struct sampler *s, struct full_pa
 	v[t - 1].delta = false;
 }
 
-/* x_i as reached from x_i-1. */
+/* Turns the edge of x_i, which refers to x_{i+1} in a whole path, into the one that comes from x_{i-1}. */
 static void turn_edge(const struct full_path *x, unsigned i, struct path_vertex *v)
 {
 	v->to_prev = vec3_neg(x->edge[i - 1].w);
@@ -162,7 +166,7 @@ static void turn_edge(const struct full_path *x, unsigned i, struct path_vertex 
 	v->edge.before = x->v[i - 1].edge.medium;
 }
 
-/* x_0 .. x_{s-1} as the light's sub-path; s >= 2. */
+/* Makes x_0 .. x_{s-1} the light's sub-path; s >= 2. */
 static void put_light(struct path_context *c, struct sampler *s_numbers, struct full_path *x, unsigned s)
 {
 	struct path_vertex *v = c->light;
@@ -180,8 +184,8 @@ static void put_light(struct path_context *c, struct sampler *s_numbers, struct 
 	v[s - 1].delta = false;
 }
 
-/* Random numbers whose first block is the one of path x: the camera's with its wavelength and point of the aperture,
- * the light's with its time. The other blocks come from `under`. */
+/* A sampler whose first blocks are those of path x: the camera's has x's wavelength and point of the aperture, the
+ * light's has x's time. All other numbers come from `under`. */
 struct pinned_sampler {
 	struct sampler base;
 	struct sampler *under;
@@ -216,7 +220,7 @@ static unsigned walk_camera(struct path_context *c, struct sampler *s, const str
 	return path_walk_camera(c, &pinned.base, most, film);
 }
 
-/* x_0 was drawn as an emitter's point; a sub-path that met it stands on the surface. */
+/* Turns an emitter's point into a vertex on the surface, as if a sub-path had hit it. Returns false if it cannot. */
 static bool stands_on_surface(const struct path_context *c, struct path_vertex *v)
 {
 	if (v->kind == VERTEX_INFINITE)

@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * All paths that one pair of sub-paths makes, each with its contribution by the balance heuristic: what bdpt averages,
- * seen as candidates of which one can be drawn in proportion to its contribution.
+ * All paths that one pair of sub-paths makes, each with its contribution weighted by the balance
+ * heuristic. bdpt averages these contributions; here the paths are candidates, one of which can be drawn
+ * in proportion to its contribution.
  *
- * Sub-paths have n > 5 or more vertices with probability (5 / n)^2; contributions are divided by it, so that their
- * expected sum stays the integral. That a path x is among the candidates of a random pair can be turned round:
- * ensemble_around draws a pair as it would be had x been drawn from it. One thread; nothing allocates.
+ * A sub-path has n or more vertices, for n > 5, with probability (5 / n)^2; contributions are divided by this
+ * probability, so that their expected sum stays the integral. The relation "path x is a candidate of a random pair" can
+ * be inverted: ensemble_around draws a pair with the distribution that it has given that x was drawn from it. One
+ * thread; nothing allocates.
  */
 #ifndef WORKER_RENDER_PATH_ENSEMBLE_H
 #define WORKER_RENDER_PATH_ENSEMBLE_H
@@ -14,7 +16,9 @@
 
 struct candidate {
 	double intensity;
-	unsigned s, passed, edges; /* passed: vertices that the joint passes (transparent.h); `edges` counts theirs */
+	/* Passed: number of vertices that the joint passes (transparent.h) or at which it is refracted;
+	 * `edges` includes theirs. */
+	unsigned s, passed, edges;
 };
 
 struct ensemble {
@@ -24,22 +28,24 @@ struct ensemble {
 };
 
 struct ensemble_lengths {
-	unsigned camera, light; /* vertices that the sub-paths may have */
-	bool capped;		/* by chance; else they are as long as they come */
+	unsigned camera, light; /* maximum numbers of vertices of the sub-paths */
+	bool capped;		/* the maxima were drawn at random; otherwise they are the depth limits */
 };
 
-/* Lengths from two numbers in [0,1), at least `camera` and `light`. */
+/* Draws maximum lengths from two numbers in [0,1); they are at least `camera` and `light`. */
 struct ensemble_lengths ensemble_lengths_of(const struct path_context *c, const double u[2], unsigned camera,
 					    unsigned light);
 struct ensemble_lengths ensemble_all_lengths(const struct path_context *c);
 
 /* Draws a pair of sub-paths into c and gathers its candidates. */
 void ensemble_draw(struct path_context *c, struct sampler *s, const struct ensemble_lengths *n, struct ensemble *out);
-/* A pair among whose candidates x is. u: three numbers in [0,1), for the technique and the lengths. */
+/* Draws a pair of sub-paths that has x among its candidates. u: three numbers in [0,1), for the
+ * technique and the lengths. */
 void ensemble_around(struct path_context *c, struct sampler *s, struct full_path *x, const double u[3],
 		     struct ensemble *out);
 
-/* The candidate that u in [0,1) chooses, as a path; only right after ensemble_draw. false: there is none. */
+/* Builds the path of the candidate that u in [0,1) chooses. Must directly follow ensemble_draw or ensemble_around.
+ * Returns false if there is no candidate or its path cannot be built. */
 bool ensemble_choose(struct path_context *c, const struct ensemble *e, double u, struct full_path *x);
 
 #endif

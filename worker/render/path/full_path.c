@@ -1,10 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Made of sub-paths by full_path_from_subpaths; then f, f_h and densities are products over vertices, with logarithms
- * kept apart so that long chains of narrow lobes neither over- nor underflow. What a mutation changed is taken over
- * vertex by vertex, and caches of what it touched are forgotten.
+ * Whole paths as states of Markov chains.
  *
- * A vertex whose sides, mode and materials contradict each other has f = 0; nothing fails.
+ * full_path_from_subpaths builds a path from two sub-paths. The scattering factors f and f_h of its vertices are
+ * computed on first use and cached; products over the vertices keep their exponents apart, so that long chains of
+ * narrow lobes neither over- nor underflow. A mutation copies the vertices that it changes (full_path_copy) and
+ * invalidates the caches of what it touched (full_path_forget).
+ *
+ * A vertex whose sides, mode and materials contradict each other has f = 0. Functions that build or check a path return
+ * false for one that does not exist or is black; nothing else fails.
  */
 #include "worker/render/path/full_path.h"
 
@@ -14,11 +18,12 @@
 
 #include <string.h>
 
-/* Products are brought back to a largest factor near 1 when they leave this range. */
+/* A product is rescaled so that its largest lane is near 1 when that leaves this range. */
 #define PRODUCT_HIGH 0x1p256
 #define PRODUCT_LOW 0x1p-256
 
-/* Lobes go down to where doubles end: both factors have to be near 1 for their product to be one. */
+/* Scales s by a power of two if it leaves the range, and returns the exponent taken out. The values of lobes reach down
+ * to the smallest doubles, so both factors of a product have to be rescaled before they are multiplied. */
 static int bring_near_one(spectrum *s)
 {
 	double m = spectrum_max(*s);
@@ -38,7 +43,7 @@ void product_mul(struct product *p, spectrum f)
 	p->exponent += bring_near_one(&p->v);
 }
 
-/* Some vertex disperses: the path carries its hero wavelength alone. */
+/* Whether some vertex disperses light, so that the path only carries its hero wavelength. */
 static bool full_path_is_dispersed(const struct full_path *x)
 {
 	for (unsigned j = 1; j < x->edges; j++)
@@ -168,7 +173,7 @@ double full_path_specular_miss(const struct full_path *x, unsigned j)
 	return vec3_length(vec3_sub(wi, frame_to_local(&x->v[j].x.sh, vec3_neg(x->edge[j - 1].w))));
 }
 
-/* The bits of first..last that lie in word i of a set. */
+/* Returns the mask of the vertices first..last that lie in word i of a set. */
 static uint64_t bits(unsigned i, unsigned first, unsigned last)
 {
 	unsigned begin = 64 * i, end = begin + 63;
@@ -177,7 +182,7 @@ static uint64_t bits(unsigned i, unsigned first, unsigned last)
 	return (~(uint64_t)0 >> (last < end ? end - last : 0)) & (~(uint64_t)0 << (first > begin ? first - begin : 0));
 }
 
-/* first..last of `to` as in `from`. */
+/* Copies the entries first..last from `from` to `to`. */
 static void take_range(struct vertex_set *to, const struct vertex_set *from, unsigned first, unsigned last)
 {
 	for (unsigned i = first / 64; i <= last / 64; i++) {
@@ -219,7 +224,7 @@ void full_path_copy(struct full_path *to, const struct full_path *from, unsigned
 		to->v[edge].edge = from->v[edge].edge;
 	}
 	memcpy(&to->edge[edge], &from->edge[edge], (edge_end - edge) * sizeof to->edge[0]);
-	/* Neighbours scatter along the edges that came with the vertices. */
+	/* Copies the caches of the neighbours, too: they scatter along the edges that were copied. */
 	unsigned last_cached = last < from->edges ? last + 1 : last;
 	n = last_cached - edge + 1;
 	memcpy(&to->f[edge], &from->f[edge], n * sizeof to->f[0]);
@@ -257,7 +262,7 @@ bool full_path_project(const struct path_context *c, struct full_path *x)
 	vec3 d = vec3_neg(e->w);
 	double distance = sqrt(e->distance2);
 	if (x->v[x->edges - 1].kind == VERTEX_INFINITE) {
-		/* What lies at infinity is seen between the clipping planes. */
+		/* An emitter at infinity is seen between the clipping planes. */
 		double t_min, t_max;
 		camera_clip(camera, d, &t_min, &t_max);
 		distance = 0.5 * (t_min + t_max);
@@ -267,7 +272,8 @@ bool full_path_project(const struct path_context *c, struct full_path *x)
 	return film_window_holds(&c->window, x->film);
 }
 
-/* Vertex i of the path from vertex `from` of a sub-path; its scattering there still holds when `left` says so. */
+/* Copies a sub-path's vertex to vertex i of the path. Keeps `mode` and `delta` only if `left`: the path leaves the
+ * vertex in the way its sub-path did. */
 static void take_vertex(struct full_path *x, unsigned i, const struct path_vertex *from, bool left)
 {
 	x->v[i] = *from;
@@ -277,7 +283,7 @@ static void take_vertex(struct full_path *x, unsigned i, const struct path_verte
 	}
 }
 
-/* The emitter's point, drawn or hit, as the path's first vertex. */
+/* Copies the emitter's point, drawn or hit, to the path's first vertex. */
 static void take_emitter(struct full_path *x, const struct path_vertex *from)
 {
 	take_vertex(x, 0, from, false);
@@ -315,7 +321,7 @@ unsigned full_path_joint_vertices(const struct path_context *c, const struct ful
 bool full_path_joins(const struct path_context *c, const struct full_path *x, unsigned s)
 {
 	unsigned passed = full_path_passed(c, x, s), end = s + passed;
-	if (s == 1 && end == x->edges) /* the lens with the emitter: only samples do */
+	if (s == 1 && end == x->edges) /* only samples join emitters to the lens */
 		return false;
 	return passed <= PATH_PASSED_MOST && !(s > 1 && x->v[s - 1].delta) && !(end < x->edges && x->v[end].delta);
 }
@@ -353,7 +359,7 @@ bool full_path_finish(struct path_context *c, struct full_path *x)
 	return true;
 }
 
-/* Nothing lies between the vertices that the joint is made of. */
+/* Whether nothing lies between the vertices of the joint. */
 static bool joint_is_open(struct path_context *c, struct full_path *x, unsigned s, unsigned passed)
 {
 	for (unsigned e = s - 1; e < s + passed; e++)
@@ -362,8 +368,8 @@ static bool joint_is_open(struct path_context *c, struct full_path *x, unsigned 
 	return true;
 }
 
-/* Puts the vertices of the joint between y and z, the camera's last vertex, into x. false: it has another number of
- * them. */
+/* Traces the joint between y and z, the camera's last vertex, and copies its vertices to x. Returns false if it has not
+ * exactly `passed` vertices. */
 static bool take_passed(struct path_context *c, const struct path_vertex *z, bool from_lens,
 			const struct path_vertex *y, unsigned s, unsigned passed, struct full_path *x)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* The contribution of a whole path and the densities of all techniques that could have made it: the explicit products,
- * in logarithms, that proposals in half vector space never multiply out. */
+ * in logarithms. Proposals in half vector space cancel most of these factors and never compute them. */
 #include "worker/render/path/full_path_density.h"
 
 #include "worker/render/path/measure.h"
@@ -15,7 +15,7 @@ double full_path_log_f(const struct path_context *c, struct full_path *x)
 	for (unsigned j = 1; j < k; j++) {
 		product_mul(&p, full_path_f(c, x, j));
 		const struct path_vertex *v = &x->v[j];
-		/* Measured in the direction towards the light, projected on the geometric normal. */
+		/* The measure is that of the direction towards the light, projected on the geometric normal. */
 		if (!v->delta && v->kind != VERTEX_MEDIUM)
 			log_geometry +=
 				log(full_path_cosine_to_light(x, j) / fabs(vec3_dot(v->x.ng, x->edge[j - 1].w)));
@@ -31,7 +31,8 @@ double full_path_log_f(const struct path_context *c, struct full_path *x)
 	return product_log_intensity(c, x, &p) + log_geometry;
 }
 
-/* Densities around a specular vertex: of v[j - 1] from the camera's side and v[j + 1] from the light's. */
+/* Sets the densities generated at the specular vertex v[j]: *to_light of v[j - 1] from the camera's side and *to_camera
+ * of v[j + 1] from the light's side. */
 static void delta_densities(const struct full_path *x, unsigned j, double *to_light, double *to_camera)
 {
 	const struct path_vertex *v = &x->v[j];
@@ -53,8 +54,9 @@ static void delta_densities(const struct full_path *x, unsigned j, double *to_li
 			     : 0;
 }
 
-/* The density of the event that ends edge e, or the probability of none: of v[e] as made from the camera's side, of v[e
- * + 1] as made from the light's. */
+/* Multiplies the densities of both ends of each edge by the density of an event at that end, or the
+ * probability that the edge has none: pdf of v[e] as generated from the camera's side, pdf_rev of v[e + 1] as
+ * generated from the light's side. */
 static void multiply_by_media(const struct path_context *c, struct path_vertex *v, unsigned edges)
 {
 	for (unsigned e = 0; e < edges; e++) {
@@ -93,8 +95,8 @@ static void fill_densities(struct path_context *c, struct full_path *x)
 		v[0].pdf = 0;
 }
 
-/* The density of technique 1 where it is refracted, over that of the camera's vertices; -INFINITY: it does not make x.
- */
+/* Returns the logarithm of the density with which technique 1 makes x by a refracted joint; -INFINITY if it does not.
+ * from_camera[i]: log density of v[i .. k] from the camera's side. */
 static double log_refracted(struct path_context *c, const struct full_path *x, const double *from_camera)
 {
 	const struct path_vertex *v[FULL_PATH_MAX_VERTICES];
@@ -118,12 +120,12 @@ void full_path_log_techniques(struct path_context *c, struct full_path *x, doubl
 	const struct path_vertex *v = x->v;
 	fill_densities(c, x);
 	unsigned most = full_path_most_light(c, x);
-	double from_camera[FULL_PATH_MAX_VERTICES]; /* of v[s .. k], from the camera's side */
+	double from_camera[FULL_PATH_MAX_VERTICES]; /* log density of v[s .. k] from the camera's side */
 	from_camera[k] = 0;
 	for (unsigned s = k; s > 0; s--)
 		from_camera[s - 1] = from_camera[s] + log(v[s - 1].pdf);
 	log_pdf[0] = from_camera[0];
-	double light = 0; /* of v[0 .. s - 1] from the light's */
+	double light = 0; /* log density of v[0 .. s - 1] from the light's side */
 	for (unsigned s = 1; s <= k; s++) {
 		light += log(v[s - 1].pdf_rev);
 		log_pdf[s] = s == 1 ? log_refracted(c, x, from_camera) : -INFINITY;

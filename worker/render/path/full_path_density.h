@@ -5,11 +5,12 @@
 
 #include "worker/render/path/full_path.h"
 
-/* log f of the path in the measure of path.h, from the products of its geometry terms; -INFINITY: black. */
+/* Returns log f of the path in the measure of path.h, from the product of its geometry terms; -INFINITY if it is
+ * black. */
 double full_path_log_f(const struct path_context *c, struct full_path *x);
 
-/* Fills pdf and pdf_rev of all vertices, then log of the density with which technique s makes this path, s = 0..edges;
- * -INFINITY where it cannot. */
+/* Fills in pdf and pdf_rev of all vertices and sets log_pdf[s] to the logarithm of the density with which technique s
+ * makes this path, s = 0..edges; -INFINITY where it cannot. */
 void full_path_log_techniques(struct path_context *c, struct full_path *x, double *log_pdf);
 
 #endif

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Bidirectional path tracing (Veach 1997, ch. 10): every way of joining a light with a camera sub-path, by the balance
- * heuristic. One light sub-path a camera sub-path; those that are joined to the pinhole land anywhere on the film.
- * In bdpt8 only one in eight camera sub-paths has a light sub-path, and what needs one counts eight times (the
- * multi-sample model of Veach 1997, sec. 9.2.1): nearly as cheap as `path` where that finds most of the light, without
- * its fireflies.
+ * Bidirectional path tracing (Veach 1997, ch. 10): light and camera sub-paths are joined by every technique, weighted
+ * by the balance heuristic. There is one light sub-path per camera sub-path; its joints to the pinhole land anywhere on
+ * the film. In bdpt8 only one in eight camera sub-paths has a light sub-path, and the techniques that need one count
+ * eight times (the multi-sample model of Veach 1997, sec. 9.2.1). This is nearly as cheap as `path` where that finds
+ * most of the light, without its fireflies.
  */
 #include "worker/render/path/integrate_bdpt.h"
 
@@ -13,24 +13,25 @@
 #include "worker/render/path/volume_emission.h"
 #include "worker/render/path/integrator.h"
 
-/* Connections that bring less than this share of the light that the camera's sub-path finds alone are faint. In closed
- * rooms 0.1 saves a quarter of the time and adds 1 % to the relMSE, 0.3 hardly saves more and adds 5 %; elsewhere
- * neither changes anything (tests/bench/choices.md, "Faint connections"). */
+/* Connections that contribute less than this fraction of the light that the camera's sub-path finds alone are faint. In
+ * closed rooms 0.1 saves a quarter of the time and adds 1 % to the relMSE, 0.3 hardly saves more and adds 5 %;
+ * elsewhere neither changes anything (tests/bench/choices.md, "Faint connections"). */
 static const double faint_share = 0.1;
 
-/* Exactly one of so many consecutive samples of a pixel, where these are low-discrepancy. */
+/* Whether this sample has a light sub-path. With a low-discrepancy sampler this is exactly one of light_every
+ * consecutive samples of a pixel. */
 static bool has_light(const struct path_context *c, struct sampler *s)
 {
 	return c->light_every <= 1 || s->block(s, SIDE_CAMERA, 0)[DIM_HAS_LIGHT] * c->light_every < 1;
 }
 
-/* What the film gets of l. */
+/* Returns the part of l that the film gets. */
 static spectrum share_for_film(struct path_context *c, unsigned j, unsigned t, const double film[2], spectrum l)
 {
 	return c->split && !spectrum_is_zero(l) ? c->split->keep(c->split, c, j, t, film, l) : l;
 }
 
-/* Technique j of paths whose camera sub-path has t vertices. */
+/* Returns the contribution of technique j with t vertices of the camera's sub-path; zero if it is invalid. */
 static inline spectrum join(struct path_context *c, unsigned j, unsigned t, struct classes *classes)
 {
 	double film[2];
@@ -44,8 +45,8 @@ static inline spectrum join(struct path_context *c, unsigned j, unsigned t, stru
 	return l;
 }
 
-/* The film gets what each vertex of the light sub-path sends to the lens. Instead of its first vertex, a point of an
- * emitter is drawn for the lens, with the same numbers. */
+/* Joins each vertex of the light sub-path to the lens. Instead of its first vertex, a point of an emitter is drawn for
+ * the lens, with the same numbers. */
 static void join_light_to_lens(struct path_context *c, struct sampler *s, unsigned light, struct classes *classes,
 			       struct path_sample *out)
 {
@@ -65,8 +66,9 @@ static void join_light_to_lens(struct path_context *c, struct sampler *s, unsign
 	}
 }
 
-/* Light found by the camera sub-path alone is what connections are measured against: it does not depend on which of
- * them are made. Where it finds none, all are, and for the weights from which chains begin (makes_all). */
+/* Returns the contribution below which connections are faint, relative to `found`, the light that the camera sub-path
+ * finds alone, which does not depend on which connections are made. 0, so that all are made, where it finds none, and
+ * for the samples that seed chains (makes_all). */
 static double faint_beside(const struct path_context *c, spectrum found)
 {
 	return c->roulette > 0 && !c->makes_all ? faint_share * spectrum_mean(found) : 0;

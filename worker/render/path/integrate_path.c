@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The path tracer: a camera sub-path, at each vertex next event estimation and the emitter met by chance, weighted
- * against each other by the balance heuristic (Veach 1997, sec. 9.2.4). The reference for all other integrators.
+ * The path tracer: at each vertex of a camera sub-path, next event estimation and the emitter that the sub-path
+ * hits are weighted against each other by the balance heuristic (Veach 1997, sec. 9.2.4). It is the reference
+ * for all other integrators.
  */
 #include "worker/render/path/integrate_path.h"
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The path tracer's evaluation, for integrators that build on it. */
+/* The evaluation function of the path tracer, for integrators that build on it. */
 #ifndef WORKER_RENDER_PATH_INTEGRATE_PATH_H
 #define WORKER_RENDER_PATH_INTEGRATE_PATH_H
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Integrators as table entries: one file and one line in integrator_list.h each. An integrator turns one point of the
- * space of random numbers into a contribution f / p over the whole film window (docs/design.md, rules 2); whether
- * independent points are averaged or a Markov chain walks among them is the caller's.
+ * Integrators as table entries: each has one file and one line in integrator_list.h. An integrator turns one point of
+ * the space of random numbers into a contribution f / p over the whole film window (docs/design.md, rules 2). Whether
+ * independent points are averaged or a Markov chain walks among them is up to the caller.
  */
 #ifndef WORKER_RENDER_PATH_INTEGRATOR_H
 #define WORKER_RENDER_PATH_INTEGRATOR_H
@@ -11,15 +11,16 @@
 #include "worker/render/path/path.h"
 
 struct integrator {
-	struct render_integrator face; /* name, kind, depth that its state holds */
-	enum rng_stream stream;	       /* of its own samples */
+	struct render_integrator face; /* properties that all programs know */
+	enum rng_stream stream;	       /* random number stream of its samples */
 	path_tracer *evaluate;
-	uint32_t light_every;	       /* of path_context, for its samples */
-	bool redistributes;	       /* what is too bright for a sample goes to chains: chain/redistribution.h */
-	const struct chain_ops *chain; /* worker/render/chain/chain.h; NULL: averages independent points */
+	uint32_t light_every; /* path_context.light_every for its samples */
+	/* Contributions that are too bright for one sample are spread by chains: chain/redistribution.h. */
+	bool redistributes;
+	const struct chain_ops *chain; /* worker/render/chain/chain.h; NULL: averages independent samples */
 };
 
-extern const struct integrator *const integrator_registry[]; /* ends with NULL */
-const struct integrator *integrator_find(const char *name);  /* NULL: none */
+extern const struct integrator *const integrator_registry[]; /* terminated by NULL */
+const struct integrator *integrator_find(const char *name);  /* returns NULL if there is none */
 
 #endif

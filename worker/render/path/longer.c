@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Path tracing of long paths only, in stretches of as many vertices as a sub-path holds: the last vertices of one
- * stretch are the first of the next, with random numbers of its own. A technique with at most one vertex of the light's
- * looks at the camera's last three, so little else has to be carried over: whether a vertex that is gone dispersed the
- * light, and vertex 1, since roulette compares with its throughput. Roulette lets a path live as long as it loses
- * nothing, so that the share of a bright mirror room is estimated by many paths of like weight.
+ * Path tracing of long paths only, in stretches of as many vertices as a sub-path can hold: the last vertices of one
+ * stretch are the first of the next, which has its own random numbers. A technique with at most one light vertex looks
+ * at the camera's last three vertices, so little else has to be carried over: whether a removed vertex dispersed the
+ * light, and vertex 1, because roulette compares with its throughput. Roulette never ends a path that loses no light,
+ * so that the energy in a bright mirror room is estimated by many paths of similar weight.
  */
 #include "worker/render/path/longer.h"
 
@@ -15,7 +15,8 @@
 
 enum { FULL = PATH_MAX_EDGES + 1, CARRIED = 3, CARRIED_END = 2 + CARRIED };
 
-/* The paths that end at the camera sub-path's vertices first - 1 ... n - 1; `before` of their edges are not in it. */
+/* Sums the paths that end at the camera sub-path's vertices first - 1 ... n - 1. `before` counts their edges that are
+ * no longer in the sub-path. */
 static spectrum gather_light(struct path_context *c, unsigned first, unsigned n, unsigned before, uint32_t least,
 			     uint32_t most, double film[2])
 {
@@ -45,7 +46,7 @@ double longer_paths(struct path_context *c, uint64_t seed, uint64_t index, uint3
 	struct sampler_random s;
 	c->roulette = 1;
 	c->one_way = true;
-	c->opaque = true; /* surfaces that a connection passes would make its path longer than was asked for */
+	c->opaque = true; /* a passed surface would make the path longer than was asked for */
 	sampler_random_init(&s, seed, RNG_BEYOND, index, 0);
 	unsigned n = path_walk_camera(c, &s.base, most, film);
 	spectrum sum = gather_light(c, first, n, before, least, longest, film);

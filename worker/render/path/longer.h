@@ -1,17 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The energy of paths that are longer than an integrator simulates, so that an image can say how much of it is missing.
+ * The energy of paths that are longer than an integrator simulates, so that an image can state
+ * how much of it is missing.
  */
 #ifndef WORKER_RENDER_PATH_LONGER_H
 #define WORKER_RENDER_PATH_LONGER_H
 
 #include "worker/render/path/path.h"
 
-enum { LONGER_EDGES = 4096 }; /* stands for no limit */
+enum { LONGER_EDGES = 4096 }; /* taken as unlimited */
 
-/* One sample of the energy, as path_sample.intensity, in paths of more than c->max_depth, at least c->min_depth and at
- * most `longest` edges; its random numbers are those of the stream RNG_BEYOND with this index. c is left as it was
- * but for its sub-paths and counters; `scratch` is overwritten. Does not allocate. */
+/* Returns one sample of the energy, measured as path_sample.intensity, in paths of more than c->max_depth, at least
+ * c->min_depth and at most `longest` edges. Its random numbers are those of the stream RNG_BEYOND with this index. c is
+ * restored except for its sub-paths and counters; `scratch` is overwritten. Does not allocate. */
 double longer_paths(struct path_context *c, uint64_t seed, uint64_t index, uint32_t longest,
 		    struct path_sample *scratch);
 

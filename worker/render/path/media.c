@@ -1,18 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Edges through media that scatter are walked from one face of `null` on the ray to the next: walk_on adds up optical
- * depths, walk_through enters the medium behind the face. path_extend_in_media ends where the depth at one
- * wavelength reaches the one that was drawn, or at anything else than such a face; path_see_in_media at the other
- * vertex.
+ * Edges through scattering media are walked from one face of `null` on the ray to the next: walk_on accumulates
+ * optical depths, walk_through enters the medium behind the face. path_extend_in_media ends where the depth at
+ * one wavelength reaches the depth that was drawn, or at the first hit that is not such a face; path_see_in_media
+ * ends at the other vertex.
  *
- * Faces whose shapes state no medium are passed like all others. After PATH_FACES_MOST of them, as between faces that
- * coincide, a ray counts as lost, and two vertices do not see each other.
+ * Faces whose shapes state no medium are passed like all others. After PATH_FACES_MOST faces, as can happen between
+ * faces that coincide, a ray counts as a miss and two vertices do not see each other.
  */
 #include "worker/render/path/media.h"
 
 #include "worker/render/path/visible.h"
 
-/* The medium on the side of `away` of a shape that states one, or any; false: it states none. */
+/* Sets *medium to the medium on the side of `away` if the shape at x states media. Returns false if it states none. */
 static bool side_of(const struct world *w, const struct surface_point *x, vec3 away, uint32_t *medium)
 {
 	return world_medium_of_side(&w->parts[x->prim.shape], vec3_dot(x->ng, away) > 0, medium);
@@ -64,14 +64,17 @@ spectrum path_absorb_share(const struct path_context *c, const struct path_verte
 	return to->beta;
 }
 
-/* A ray on its way. */
+/* The state of a ray on its way through media. */
 struct walk {
-	struct path_edge *edge;		/* medium: where the ray is; free: unused until the end */
-	vec3 d;				/* its direction */
-	spectrum all, events;		/* optical depths so far: of all media, of those that scatter */
-	struct medium_lanes lanes;	/* of the medium where the ray is, if there is one */
-	bool scatters;			/* that medium does */
-	const struct medium *shines;	/* that medium, if it emits and emission is wanted */
+	/* `medium` is the medium where the ray is; `free` is set at the end. */
+	struct path_edge *edge;
+	vec3 d; /* direction of the ray */
+	/* Optical depths so far: of all media, and of those that scatter. */
+	spectrum all, events;
+	struct medium_lanes lanes; /* coefficients of the medium where the ray is, if any */
+	bool scatters;		   /* the medium where the ray is scatters */
+	/* The medium where the ray is, if it emits and emission is wanted; otherwise NULL. */
+	const struct medium *shines;
 	struct path_emission *emission; /* NULL: emission is not wanted */
 	const struct wavelengths *wl;
 };
@@ -111,27 +114,28 @@ static void walk_add(struct walk *k, spectrum depth)
 	k->events = k->scatters ? spectrum_add(k->events, depth) : k->events;
 }
 
-/* On from t0 to t1 behind o. */
+/* Adds the optical depth between t0 and t1 on the ray from o. */
 static void walk_on(struct walk *k, vec3 o, double t0, double t1)
 {
 	if (k->edge->medium)
 		walk_add(k, medium_depth(&k->lanes, &(struct grid_ray){o, k->d, t0, t1}));
 }
 
-/* What reaches the start of a segment of constant emission l per length. */
+/* Returns the light that reaches the start of a segment of that length with constant emission l per length. */
 static spectrum even_emission(const struct medium_lanes *m, spectrum l, double length)
 {
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
 		double sigma = m->sigma_t[0].v[i];
-		if (l.v[i] > 0) /* not 0 times infinity */
+		if (l.v[i] > 0) /* avoids 0 times infinity */
 			l.v[i] *= sigma > 0 ? -expm1(-sigma * length) / sigma : length;
 	}
 	return l;
 }
 
-/* Adds what the medium emits between t0 and t1 along the ray, a segment that the edge crosses entirely. Without events
- * and in a homogeneous medium it is known in closed form; otherwise it is estimated at one point. The edge gets this
- * far with a probability, the mean over the wavelengths of what events leave, so the light is divided by it. */
+/* Adds the light that the medium emits between t0 and t1 along the ray, a segment that the edge crosses entirely.
+ * Without events and in a homogeneous medium it is known in closed form; otherwise it is estimated at one point. The
+ * light is divided by the probability that the edge gets this far, which is the mean over the wavelengths of
+ * exp(-depth) of the media that scatter. */
 static void walk_shine(struct walk *k, vec3 o, double t0, double t1)
 {
 	const struct emission *g = &k->shines->emission;
@@ -150,7 +154,8 @@ static void walk_shine(struct walk *k, vec3 o, double t0, double t1)
 	k->emission->sum = spectrum_add(k->emission->sum, l);
 }
 
-/* The same, but no further than the event where the depth at one wavelength is `depth`; INFINITY: no event. */
+/* Like walk_on(), but stops at the event where the depth at wavelength `lane` reaches `depth`, and adds emission.
+ * Returns the distance of the event; INFINITY if there is none before t1. depth = INFINITY: no events. */
 static double walk_to_event(struct walk *k, vec3 o, double t0, double t1, int lane, double depth)
 {
 	spectrum passed;
@@ -168,7 +173,7 @@ static double walk_to_event(struct walk *k, vec3 o, double t0, double t1, int la
 	return t;
 }
 
-/* Through a face of `null` at x. */
+/* Passes through a face of `null` at x. */
 static void walk_through(const struct path_context *c, struct walk *k, const struct surface_point *x)
 {
 	uint32_t near, far;
@@ -197,7 +202,7 @@ void path_stop_in_medium(struct path_vertex *to, const struct path_vertex *from,
 	to->x = (struct surface_point){.p = vec3_madd(from->x.p, distance, d), .prim = prim_none_at(from->x.prim.time)};
 }
 
-/* To the event where the depth at one wavelength is `depth`; INFINITY: to none. */
+/* Traces to the event where the depth at wavelength `lane` reaches `depth`; INFINITY: no events. */
 static bool extend(struct path_context *c, const struct path_vertex *at, vec3 d, double t_min, double t_max, int lane,
 		   double depth, struct path_emission *emission, struct path_vertex *to, spectrum *left)
 {

@@ -1,28 +1,30 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A path of merging is y_0 .. y_{s-1}, z, x_{s+1} .. x_k: a light sub-path that landed at y_s, within a radius r of z,
- * where the camera's sub-path met its first rough surface; z stands for y_s. It brings
+ * A path made by merging is y_0 .. y_{s-1}, z, x_{s+1} .. x_k: a light sub-path hit a surface at y_s, within a radius r
+ * of z, where the camera's sub-path met its first rough surface; z takes the place of y_s. Its contribution to the mean
+ * of the camera's samples is
  *
- *     f / (p_light(y_0 .. y_s) p_camera(z .. x_k)) / (pi r^2 photons)
+ *     f / (p_light(y_0 .. y_s) p_camera(z .. x_k)) / (pi r^2 photons),
  *
- * to the mean of the camera's samples, p_light(y_0 .. y_s) p_camera(z .. x_k) being the product of the densities of
- * both sub-paths, in which z counts twice. Technique j of bdpt (path.h) has density p_j over that product of
+ * where p_light(y_0 .. y_s) p_camera(z .. x_k) is the product of the densities of both sub-paths, which contains z
+ * twice. The density p_j of technique j of bdpt (path.h), divided by that product, is q_j:
  *
  *     q_{s+1} = 1 / p_camera(z),  q_s = 1 / p_light(y_s),  q_{j+1} / q_j = p_light(x_j) / p_camera(x_j),
  *
- * 0 where one of the vertices that it joins is specular. So a sample of bdpt that finds that path brings the product of
- * both sub-paths' throughputs over the sum of all q, one of `path` over q_0 + q_1. Terms of the light's sub-path alone
- * are summed up when the photon is stored.
+ * or 0 where one of the vertices that it joins is specular. So a sample of bdpt that finds the path contributes the
+ * product of both sub-paths' throughputs divided by the sum of all q, and one of `path` the product divided by q_0 +
+ * q_1. The terms of the light's sub-path alone are summed when the photon is stored.
  *
- * Photons behind an edge or on another surface are told by their normals and their distance from z's plane. A surface
- * that bends within r blurs, and so does a shadow's edge: of a sum over all samples little is lost.
+ * Photons behind an edge or on another surface are recognised by their normals and their distance from z's plane.
+ * Surfaces that bend within r and edges of shadows are blurred, but little is lost from a sum over all samples.
  *
- * Where media scatter, events are vertices of the light's sub-path like others, and the densities of the edges are
- * those of path/media.h; that both sub-paths agree about the media is assumed. Where they only absorb, what they do to
- * a photon's light is not counted: only the path that it will belong to says which media it was in.
+ * Where media scatter, events are ordinary vertices of the light's sub-path, and the densities of the edges are those
+ * of path/media.h; both sub-paths are assumed to agree about the media. Where media only absorb, the absorption of a
+ * photon's light is not counted, because only the complete path says which media it was in.
  *
- * merging_photons fails without memory, and follows fewer light sub-paths than asked if there is no room for more
- * photons; m->paths counts them. A camera's sub-path without a rough surface has no place to merge (false).
+ * merging_photons fails if out of memory. It traces fewer light sub-paths than asked if there is no room for more
+ * photons; m->paths counts those that were traced. A camera sub-path without a rough surface has no place to merge
+ * (merging_walk returns false).
  */
 #include "worker/render/path/merging.h"
 
@@ -32,13 +34,13 @@
 #include "worker/render/path/measure.h"
 #include "worker/render/path/media.h"
 
-enum { PHOTONS = 4 /* places for so many a path */, TICKS = 16 };
+enum { PHOTONS = 4 /* room for this many photons per path */, TICKS = 16 };
 
-/* A photon's disk is as wide as this many samples of the camera. */
+/* A photon's disk covers as much of the film as this many samples of the camera. */
 static const double samples_wide = 16;
 static const double same_normal = 0.9, same_plane = 0.25;
 
-/* Random numbers but for the wavelength and the time. */
+/* A sampler with the wavelength and the time pinned. */
 struct pinned_numbers {
 	struct sampler_random random;
 	double wavelength, time;
@@ -72,15 +74,15 @@ static bool is_rough(const struct path_vertex *v)
 
 static double intensity_of(struct path_context *c, spectrum l)
 {
-	struct path_sample one; /* its many splats are not read: nothing sets them */
+	struct path_sample one; /* its large array of splats stays uninitialised */
 	one.count = 0;
 	one.intensity = 0;
 	path_splat(c, &one, 0, 0, l);
 	return one.intensity;
 }
 
-/* What an edge that a sub-path drew contributes to the density of `before`, its beginning, as generated from its end.
- */
+/* Returns the factor that media on a sub-path's edge contribute to the density of `before`, the vertex where the edge
+ * begins, as generated from its end. */
 static double edge_rev(const struct path_context *c, const struct path_edge *e, const struct path_vertex *before)
 {
 	return EFFECT_IS_ON(c->w, scattering) ? path_edge_pdf(c, e, e->before, before) : 1;
@@ -93,14 +95,16 @@ static bool is_passed(const struct path_context *c, const struct path_vertex *v)
 	return path_sees_through(c) && path_is_passed(v);
 }
 
-/* The density of a joint that passes v[first .. end - 1] over that of drawing them; 1 if there are none. */
+/* Returns the density of a joint that passes v[first .. end - 1] divided by that of drawing them; 1 if there are
+ * none. */
 static double over_drawn(const struct path_vertex *v, unsigned first, unsigned end)
 {
 	return first == end ? 1 : path_passed_ratio_in(v, first, end - 1, true);
 }
 
-/* For the photon y[s]: technique 1, refracted at y[1] .. *end - 1, over the density of drawing those as the light did;
- * 0: there is none. How the camera sees the photon is not known yet: from above. */
+/* For the photon y[s]: returns the density of technique 1, refracted at y[1] .. y[*end - 1], divided by that of drawing
+ * these vertices as the light's sub-path did; 0 if there is no such technique. The direction to the camera is not known
+ * yet, so the normal of the side that was hit stands for it. */
 static double refracted_over_drawn(struct path_context *c, unsigned s, unsigned *end)
 {
 	const struct path_vertex *v[PATH_MAX_EDGES + 2], *y = c->light;
@@ -115,13 +119,13 @@ static double refracted_over_drawn(struct path_context *c, unsigned s, unsigned 
 	return *end && (*end == s || !y[*end].delta) ? path_refracted_over_drawn(c, v, *end) : 0;
 }
 
-/* Fills in the sums of struct photon. The techniques by which densities are divided need not exist. */
+/* Fills in the sums of struct photon. The techniques by whose densities they are divided need not exist. */
 static void sum_fewer(struct path_context *c, unsigned s, struct photon *out)
 {
 	const struct path_vertex *y = c->light;
 	unsigned refracted_end = 0;
 	double ratio = 1, ratio_end = 1, ratio_refracted = 1, refracted = refracted_over_drawn(c, s, &refracted_end);
-	for (unsigned j = s - 1, end = s; j > 0; j--) { /* joins y[j - 1] to y[end] */
+	for (unsigned j = s - 1, end = s; j > 0; j--) { /* technique j joins y[j - 1] to y[end] */
 		if (!is_passed(c, &y[j])) {
 			ratio_end = ratio;
 			end = j;
@@ -188,7 +192,7 @@ int merging_photons(struct merging *m, struct path_context *c, uint64_t seed, ui
 		if (m->paths % TICKS == 0)
 			tick();
 		sampler_init(&s, m, seed, step, m->paths);
-		path_walk_camera(c, &s.random.base, 1, film); /* sets the wavelengths and the time */
+		path_walk_camera(c, &s.random.base, 1, film); /* sets the wavelengths and the time of c */
 		unsigned n = path_walk_light(c, &s.random.base, c->max_depth);
 		for (unsigned i = 2; i < n; i++)
 			if (is_rough(&c->light[i]))
@@ -234,12 +238,12 @@ bool merging_walk(const struct merging *m, struct path_context *c, uint64_t seed
 	return true;
 }
 
-/* The sum of q over the techniques with more than s light vertices. y: the photon's vertex before z. */
+/* Returns the sum of q over the techniques with more than s light vertices. y: the photon's predecessor. */
 static double sum_more(const struct path_context *c, const struct path_vertex *y, unsigned t)
 {
 	const struct path_vertex *v = c->camera, *z = &v[t];
 	double q = 1 / z->pdf, sum = 0;
-	for (unsigned i = t; i > 0; i--) { /* joins v[i], of the light, to v[i - 1], of the camera */
+	for (unsigned i = t; i > 0; i--) { /* joins v[i], made from the light, to v[i - 1], made from the camera */
 		const struct path_vertex *next = &v[i - 1];
 		unsigned end = i - 1;
 		while (end > 0 && is_passed(c, &v[end]))
@@ -265,7 +269,7 @@ bool merged_of(struct path_context *c, const struct photon *p, unsigned t, struc
 		return false;
 	spectrum l = spectrum_mul(spectrum_mul(z->beta, p->beta), path_scatter(c, z, z->to_prev, to_light));
 	out->brings = intensity_of(c, l);
-	/* q_{s-1}, be there such a technique or not */
+	/* q_{s-1}, whether or not such a technique exists */
 	double q = path_pdf(c, z - 1, z, &y, TRANSPORT_RADIANCE) * p->edge_rev / (p->pdf * p->prev.pdf),
 	       joined = (p->prev.delta ? 0 : 1) + p->fewer_through;
 	out->bdpt = out->brings / (q * p->fewer + joined / p->pdf + sum_more(c, &y, t));

@@ -17,8 +17,8 @@
 #include <float.h>
 #include <string.h>
 
-/* Fainter contributions are black: their parts, such as those of path classes, could be denormal and would not add up.
- */
+/* Fainter contributions are taken as black: their parts, such as those of path classes, could be denormal, so that they
+ * would not add up to the whole. */
 #define FAINTEST (DBL_MIN / DBL_EPSILON)
 
 struct film_window film_window_of(const struct plan *p)
@@ -61,7 +61,8 @@ spectrum path_scatter(const struct path_context *c, const struct path_vertex *v,
 	return spectrum_scale(fabs(wi.z) / fabs(vec3_dot(v->x.ng, to_light)), f);
 }
 
-/* As a path that comes from `from` samples it: one from the light never turns a normal. */
+/* Returns the surface point with which a sub-path that comes from `from` samples v. A sub-path from the
+ * light never turns a normal. */
 static const struct surface_point *sampled_at(const struct path_vertex *v, vec3 from, enum transport transport,
 					      struct surface_point *turned)
 {
@@ -112,7 +113,8 @@ double path_pdf(const struct path_context *c, const struct path_vertex *prev, co
 	return next->kind == VERTEX_INFINITE ? solid : solid * path_jac_solid_from_vertex(next, omega, distance2);
 }
 
-/* Traces to the next vertex; u in [0,1) is used where media scatter. *left: the transmittance. */
+/* Traces to the next vertex. u in [0,1) draws the distance where media scatter; *left is then set to the
+ * transmittance. */
 static bool go_on(struct path_context *c, const struct path_vertex *at, vec3 d, double t_min, double t_max, double u,
 		  struct path_vertex *to, spectrum *left)
 {
@@ -120,8 +122,8 @@ static bool go_on(struct path_context *c, const struct path_vertex *at, vec3 d, 
 					      : path_extend(c, at, d, t_min, t_max, to);
 }
 
-/* The same for edge e of the camera's sub-path, whose throughput is beta there, where media shine. Keeps what they emit
- * on the way. */
+/* Like go_on(), but for edge e of the camera's sub-path where media emit; beta is the throughput at its start. Stores
+ * the light that is emitted along the edge in c->emission. */
 static bool go_on_shining(struct path_context *c, struct sampler *s, unsigned e, spectrum beta, vec3 d, double t_min,
 			  double t_max, double u, spectrum *left)
 {
@@ -133,12 +135,13 @@ static bool go_on_shining(struct path_context *c, struct sampler *s, unsigned e,
 	return met;
 }
 
-/* How a sub-path leaves a vertex by its BSDF. */
+/* How a sub-path leaves a vertex by its BSDF or phase function. */
 struct departure {
 	vec3 wi;
 	spectrum beta;
-	double pdf, pdf_rev; /* solid angle; the probability of the lobe where delta */
-	double eta;	     /* index on wi's side over the one on the side the path came from */
+	/* Densities per solid angle; for a delta lobe, the probability of choosing it. */
+	double pdf, pdf_rev;
+	double eta; /* refractive index on wi's side divided by that on the side of to_prev */
 	unsigned mode;
 	bool delta;
 };
@@ -209,8 +212,9 @@ static bool sample_departure(const struct path_context *c, const struct path_ver
 	return true;
 }
 
-/* Density per area of `to`, reached from `at`; solid as chosen there. For a delta lobe `solid` is a probability, and
- * per_solid what makes it a density: see path_delta_per_solid. */
+/* Returns the density of `to` (per area, per solid angle at infinity), reached from `at` by a direction of density
+ * `solid` per solid angle. For a delta lobe, `solid` is a probability and per_solid turns it into a density: see
+ * path_delta_per_solid. Otherwise per_solid is 1. */
 static double reach_pdf(const struct path_context *c, const struct path_vertex *at, const struct path_vertex *to,
 			double solid, double per_solid)
 {
@@ -240,8 +244,8 @@ static bool survives(const struct path_context *c, unsigned scatterings, double 
 	return true;
 }
 
-/* From vertex n - 1 of a sub-path to the next one, where there are media. *left: the transmittance of those that
- * scatter. */
+/* Traces from vertex n - 1 of a sub-path to the next vertex, in a world with media. Sets *left to the transmittance of
+ * the edge where media scatter, otherwise to 1. */
 static __attribute__((noinline)) bool go_on_in_media(struct path_context *c, struct sampler *s, enum sampler_side side,
 						     unsigned n, const struct departure *out, double u, spectrum *left)
 {
@@ -252,7 +256,7 @@ static __attribute__((noinline)) bool go_on_in_media(struct path_context *c, str
 		       : go_on(c, &v[n - 1], out->wi, 0, INFINITY, u, &v[n], left);
 }
 
-/* What they make of the throughput and the densities there. */
+/* Applies the media along the last edge to the throughput and the densities of its ends. */
 static __attribute__((noinline)) void heed_media(struct path_context *c, enum sampler_side side, unsigned n, vec3 wi,
 						 spectrum left)
 {
@@ -265,8 +269,8 @@ static __attribute__((noinline)) void heed_media(struct path_context *c, enum sa
 	}
 }
 
-/* Extends v[0..n) up to `max` vertices by scattering; v[n-1] is not at infinity. start: beta to which roulette
- * compares. */
+/* Extends v[0..n) up to `max` vertices by scattering and returns the new number of vertices; v[n-1] is not at infinity.
+ * Roulette compares the throughput with `start`. */
 static unsigned scatter_on(struct path_context *c, struct sampler *s, enum sampler_side side, struct path_vertex *v,
 			   unsigned n, unsigned max, double start)
 {
@@ -307,8 +311,9 @@ static unsigned scatter_on(struct path_context *c, struct sampler *s, enum sampl
 	}
 }
 
-/* The sub-paths' time, for u in [0,1). A rolling shutter exposes each line for a fraction of the time, the first line
- * from the beginning and the last until the end; points beyond the film's edge belong to the nearest line. */
+/* Returns the time of both sub-paths, for u in [0,1). A rolling shutter exposes each line for a fraction of
+ * the time, the first line from the beginning and the last until the end; points beyond the film's edge
+ * belong to the nearest line. */
 static double time_of(const struct world *w, const double film[2], double u)
 {
 	const struct scene_settings *s = &w->settings;
@@ -361,7 +366,8 @@ unsigned path_walk_camera(struct path_context *c, struct sampler *s, unsigned ma
 	return scatter_on(c, s, SIDE_CAMERA, v, 2, max_vertices, area);
 }
 
-/* The first step of light from infinity: through a disk as wide as the world, across the direction. */
+/* The first step of a light sub-path that starts at infinity: it passes through a disk as wide as the world,
+ * perpendicular to the direction. */
 static bool leave_infinity(struct path_context *c, struct path_vertex *v, const double u[2], double distance,
 			   spectrum *left)
 {
@@ -441,7 +447,8 @@ unsigned path_walk_on(struct path_context *c, struct sampler *s, enum sampler_si
 	return scatter_on(c, s, side, v, n, max_vertices, spectrum_max(v[1].beta));
 }
 
-/* All lanes are +0 or positive and finite, without a comparison that a NaN would trap. */
+/* Whether all lanes are +0 or positive and finite, without a comparison that would trap on NaN.
+ * *zero: all lanes are +0. */
 static bool is_plain(const spectrum *l, bool *zero)
 {
 	const uint64_t exponent_one = UINT64_C(1) << 52;

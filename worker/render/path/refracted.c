@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Refracted connections: which are tried, what they carry, and which paths of other techniques they make, too. The walk
- * itself is path_context.refract's (halfvec/refract.c).
+ * Refracted connections: which are tried, what they contribute, and which paths of other techniques they could have
+ * made. path_context.refract performs the walk itself (halfvec/refract.c).
  *
  * path_refract_to asks for the refracted path between z and y and fills in its vertices as a camera sub-path would
- * have. It fails where the straight line meets nothing that refracts, where the walk does not arrive, or where a lobe
- * at one of its vertices carries nothing.
+ * have. It fails where the straight line meets nothing that refracts, where the walk does not converge, or where a lobe
+ * at one of the vertices has weight zero.
  */
 #include "worker/render/path/refracted.h"
 
@@ -13,10 +13,11 @@
 #include "worker/render/path/next_event.h"
 #include "worker/render/path/path.h"
 
-/* Connections are refracted where emitters are drawn so many times as densely as a sub-path from z, going straight,
- * would find them. */
+/* Connections are refracted where points on emitters are drawn at least this many times as densely as a sub-path that
+ * goes straight on from z would find them. */
 static const double denser = 8;
-/* Two walks end at the same path if each vertex lies this near, relative to its distance from the one before. */
+/* Two walks end at the same path if corresponding vertices are closer than this times the length of the preceding
+ * edge. */
 static const double same_place = 1e-5;
 
 bool path_tries_to_refract(const struct path_context *c, const struct path_vertex *before, const struct path_vertex *z,
@@ -51,7 +52,7 @@ double path_refracted_ratio(const struct path_vertex *const *v, unsigned count, 
 	return ratio;
 }
 
-/* Whether the vertices of the walk are those of v[count] .. v[1]. */
+/* Whether the walk's vertices are v[count] .. v[1]. */
 static bool is_same_path(const struct path_refraction *r, const struct path_vertex *const *v, unsigned count)
 {
 	if (r->count != count)
@@ -70,7 +71,7 @@ static bool is_equal(vec3 a, vec3 b)
 	return a.x == b.x && a.y == b.y && a.z == b.z;
 }
 
-/* NULL: there is none. */
+/* Returns the refracted path between z and y, from the cache if it is the one computed last; NULL if there is none. */
 static const struct path_refraction *look_up(struct path_context *c, const struct path_vertex *z,
 					     const struct path_vertex *y)
 {
@@ -122,7 +123,8 @@ double path_refracted_over_drawn(struct path_context *c, const struct path_verte
 	return path_refracted_ratio(v, end - 1, log_transfer, pdf);
 }
 
-/* The weight of the lobe at v, which goes on to `next`; zero: none, or the shading normal disagrees. */
+/* Returns the weight of the specular lobe at v, which continues to `next`; zero if there is no such lobe or the shading
+ * normal disagrees about a side. */
 static spectrum lobe(const struct path_context *c, const struct path_vertex *v, const struct path_vertex *next)
 {
 	double unused;

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Where a path's random choices come from. Each vertex of each sub-path owns a block of eight numbers in [0,1), so that
- * a choice keeps its number when an earlier vertex changes (Kelemen et al. 2002 mutate exactly these numbers). Asking
- * twice for the same block gives the same numbers. A pointer stays valid until the next call for the same side.
+ * The source of a path's random numbers. Each vertex of each sub-path owns a block of eight numbers in [0,1), so
+ * that a choice keeps its number when an earlier vertex changes (Kelemen et al. 2002 mutate exactly these
+ * numbers). Asking twice for the same block gives the same numbers. A returned pointer stays valid until the
+ * next call for the same side.
  */
 #ifndef WORKER_RENDER_PATH_SAMPLER_H
 #define WORKER_RENDER_PATH_SAMPLER_H
@@ -12,12 +13,13 @@
 enum sampler_side { SIDE_CAMERA, SIDE_LIGHT, SAMPLER_SIDES };
 enum { SAMPLER_BLOCK = 8 };
 
-/* What the numbers of a block are for. Block 0 of the camera: film x, y, wavelength, point of the aperture, whether
- * there is a light sub-path (path_context.light_every), which faint connections are made (path_context.faint). Block 0
- * of the light: point, direction and choice of the emitter, and the time of both sub-paths. All others: a vertex. The
- * distance is that to the next vertex, where media scatter. Block e - 1 of the light also has the place on edge e of
- * the camera's sub-path where media shine. What is used together lies in one half of the block: low-discrepancy
- * samplers (sobol.h) stratify the four numbers of a half together. */
+/* The uses of the numbers in a block. Block 0 of the camera: film x and y, wavelength, distance to the first event in a
+ * medium, point of the aperture, whether there is a light sub-path (path_context.light_every), and which faint
+ * connections are made (path_context.faint). Block 0 of the light: point, direction and choice of the emitter, and the
+ * time of both sub-paths. All other blocks: one vertex, including the distance to the next vertex where media scatter.
+ * Block e - 1 of the light also holds the position on edge e of the camera's sub-path at which the emission of media is
+ * evaluated. Numbers that are used together lie in the same half of the block: low-discrepancy samplers (sobol.h)
+ * stratify the four numbers of a half jointly. */
 enum { DIM_FILM_X = 0, DIM_FILM_Y = 1, DIM_WAVELENGTH = 2, DIM_CAMERA_DISTANCE = 3 };
 enum { DIM_APERTURE_U = 4, DIM_APERTURE_V = 5, DIM_HAS_LIGHT = 6, DIM_FAINT = 7 };
 enum { DIM_EMITTER_POINT = 0, DIM_EMITTER_DIRECTION = 2, DIM_EMITTER_CHOICE = 4, DIM_TIME = 5, DIM_EMISSION = 6 };
@@ -37,13 +39,13 @@ struct sampler_random {
 void sampler_random_init(struct sampler_random *s, uint64_t seed, enum rng_stream stream, uint64_t index,
 			 uint64_t step);
 
-/* The number of a block's first half among all halves of a sample; the second half's is one more. */
+/* Returns the index of a block's first half among all halves of a sample; the second half has the next index. */
 static inline uint64_t sampler_half(enum sampler_side side, unsigned vertex)
 {
 	return ((uint64_t)vertex * SAMPLER_SIDES + (uint64_t)side) * 2;
 }
 
-/* The eight numbers of one block from the counter-based generator. */
+/* Fills `out` with the eight numbers of one block, from the counter-based generator. */
 void sampler_fill(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, enum sampler_side side,
 		  unsigned vertex, double out[SAMPLER_BLOCK]);
 

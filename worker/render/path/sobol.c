@@ -3,16 +3,16 @@
 
 enum { DIMENSIONS = 4 };
 
-/* All sums (exclusive or) of four columns. */
+/* All 16 combinations of four columns by exclusive or. */
 #define NIBBLE(a, b, c, d)                                                                                     \
 	{                                                                                                      \
 		0, (a), (b), (a) ^ (b), (c), (a) ^ (c), (b) ^ (c), (a) ^ (b) ^ (c), (d), (a) ^ (d), (b) ^ (d), \
 			(a) ^ (b) ^ (d), (c) ^ (d), (a) ^ (c) ^ (d), (b) ^ (c) ^ (d), (a) ^ (b) ^ (c) ^ (d)    \
 	}
 
-/* The generator matrices by columns, least significant bit first, two dimensions in a word: the direction numbers, bits
- * reversed, from the primitive polynomials and initial numbers of Joe and Kuo 2008 (new-joe-kuo-6), dimensions 1 to 4.
- */
+/* The generator matrices by columns, least significant bit first, two dimensions in a word. These are the
+ * direction numbers, bits reversed, from the primitive polynomials and initial numbers of Joe and Kuo 2008
+ * (new-joe-kuo-6), dimensions 1 to 4. */
 static const uint64_t first_two[8][16] = {
 	NIBBLE(UINT64_C(0x0000000100000001), UINT64_C(0x0000000300000002), UINT64_C(0x0000000500000004),
 	       UINT64_C(0x0000000f00000008)),
@@ -50,7 +50,7 @@ static const uint64_t last_two[8][16] = {
 	       UINT64_C(0xc900a00aaaaa00a3)),
 };
 
-/* The bits of both halves of a word in reversed order, and the halves exchanged. */
+/* Reverses the bits of both halves of a word and exchanges the halves. */
 static uint64_t reverse(uint64_t x)
 {
 	x = __builtin_bswap64(x);
@@ -59,8 +59,9 @@ static uint64_t reverse(uint64_t x)
 	return (x & UINT64_C(0x5555555555555555)) << 1 | (x >> 1 & UINT64_C(0x5555555555555555));
 }
 
-/* A permutation in which each bit depends on the bits below it only (Laine and Karras 2011, with the constants of
- * Burley 2020): a nested uniform scramble of the number with these bits in reversed order. */
+/* A permutation of the 32-bit numbers in which each bit depends only on itself and the bits below (Laine and
+ * Karras 2011, with the constants of Burley 2020). On a number whose bits are in reversed order it is a
+ * nested uniform scramble. */
 static uint32_t permute(uint32_t x, uint32_t seed)
 {
 	x += seed;
@@ -70,7 +71,7 @@ static uint32_t permute(uint32_t x, uint32_t seed)
 	return x ^ x * 0x8d22f6e6;
 }
 
-/* 64 well mixed bits of a counter (the finalizer of MurmurHash3). */
+/* Returns 64 well mixed bits of a counter (the finalizer of MurmurHash3). */
 static uint64_t mix(uint64_t x)
 {
 	x = (x ^ x >> 33) * UINT64_C(0xff51afd7ed558ccd);
@@ -78,7 +79,7 @@ static uint64_t mix(uint64_t x)
 	return x ^ x >> 33;
 }
 
-/* Two dimensions of a point, scrambled, with independent bits below the 32 that stratify. */
+/* Scrambles two dimensions of a point and adds independent bits below the 32 that are stratified. */
 static void scramble(uint64_t reversed, uint64_t seeds, uint64_t tail, double out[2])
 {
 	uint64_t low = permute((uint32_t)reversed, (uint32_t)seeds),
@@ -88,7 +89,7 @@ static void scramble(uint64_t reversed, uint64_t seeds, uint64_t tail, double ou
 	out[1] = (double)((x & 0xffffffff) << 16 | (tail >> 16 & 0xffff)) * 0x1p-48;
 }
 
-/* The four numbers of one half of a block. */
+/* Computes the four numbers of one half of a block. */
 static void fill(const struct sampler_sobol *s, uint64_t half, double out[DIMENSIONS])
 {
 	uint64_t hash[4], point[2] = {0, 0};

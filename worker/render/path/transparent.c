@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * path_see_through follows the ray from z to y from one surface to the next, as long as each has a straight lobe. It
- * ends when nothing is left between the last surface and y. An opaque surface blocks the view, and so do more than
- * PATH_PASSED_MOST surfaces, which bounds the work: paths through more are left to sub-paths that pass the surfaces one
- * by one. Past the very edge of a surface, a ray may get by that is blocked when the ends are tested (geom/accel.h: by
- * rounding): then it goes on to the surface on which y lies, and that blocks it, too.
+ * path_see_through follows the ray from z to y from one surface to the next, as long as each has a straight lobe, and
+ * ends when nothing lies between the last surface and y. An opaque surface blocks the view. So do more than
+ * PATH_PASSED_MOST surfaces, which bounds the work; paths through more surfaces are left to sub-paths that pass them
+ * one by one. At the very edge of a surface, rounding (geom/accel.h) may let a ray pass although the test of the two
+ * ends reports it as blocked; the ray then reaches the surface on which y lies, which blocks it.
  */
 #include "worker/render/path/transparent.h"
 
@@ -12,11 +12,12 @@
 #include "worker/render/path/path.h"
 #include "worker/render/path/visible.h"
 
-/* A hit this near to the end of a ray, relative to its length, is its end: far more than double rounds. */
+/* A hit this close to the end of a ray, relative to its length, is the end itself: far more than
+ * the rounding of doubles. */
 static const double same_point = 0x1p-24;
 
-/* The share of light that goes straight through v, which a ray along d met. If there is any, v is made a vertex that
- * the path leaves straight on. */
+/* Returns the share of light that goes straight through v, which a ray along d met. If there is any, v becomes a vertex
+ * that the path leaves straight on. */
 static spectrum pass_straight(const struct path_context *c, struct path_vertex *v, vec3 d)
 {
 	if (!bsdf_is_passed(v->bsdf) || !path_meets(d, v))
@@ -26,7 +27,7 @@ static spectrum pass_straight(const struct path_context *c, struct path_vertex *
 	return path_delta_share(c, v);
 }
 
-/* False where densities of v, as reached from there along d, would be 0 or infinite. */
+/* Whether v, as reached from `from` along d, has a density that is neither 0 nor infinite. */
 static bool are_apart(const struct path_vertex *from, const struct path_vertex *v, vec3 d)
 {
 	double distance2;
@@ -34,7 +35,7 @@ static bool are_apart(const struct path_vertex *from, const struct path_vertex *
 	return distance2 > 0 && fabs(vec3_dot(v->x.ng, d)) > 0;
 }
 
-/* Whether v lies before y and is not y itself, met by a ray to it. whole: squared distance from where that began. */
+/* Whether v, met by a ray to y, lies before y and is not y itself. whole: squared length of the ray. */
 static bool is_before(const struct path_vertex *v, const struct path_vertex *y, double whole)
 {
 	double distance2;
@@ -84,7 +85,7 @@ double path_pdf_passed(const struct path_context *c, const struct path_vertex *a
 		return 0;
 	struct bsdf_point p = world_bsdf_point(&at->x, &c->wl, transport);
 	double chance = path_delta_chance(at->bsdf, &p, frame_to_local(&at->x.sh, vec3_neg(omega)), at->mode);
-	/* Straight on, both of path_delta_per_solid are the cosine. */
+	/* Straight on, both results of path_delta_per_solid are the cosine. */
 	double lobe = chance * fabs(vec3_dot(at->x.ng, omega));
 	return next->kind == VERTEX_INFINITE ? lobe : lobe * path_jac_solid_from_vertex(next, omega, distance2);
 }

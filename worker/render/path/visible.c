@@ -6,8 +6,8 @@ static struct ray_end end_of(const struct path_vertex *v)
 	return (struct ray_end){v->x.p, v->kind == VERTEX_CAMERA ? (vec3){0, 0, 0} : v->x.ng, v->x.prim};
 }
 
-/* What is in front of the near plane hides nothing: an orthographic camera may have half a room there. A b behind the
- * far plane is refused by camera_project. */
+/* Whether the camera sees b. Surfaces in front of the near plane hide nothing: an orthographic camera may have half a
+ * room there. camera_project rejects a b behind the far plane. */
 static bool seen_by_camera(const struct path_context *c, const struct path_vertex *eye, const struct path_vertex *b)
 {
 	struct camera room;
