@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Building: triangles, spheres and curves become Embree geometries, with filters where a hit must be checked in double;
- * large triangles of a scene of mixed scales are a user geometry that is intersected in double. Tracing: the ray enters
- * the scene's box in double, Embree proposes hits in float, the filter decides, and the caller computes the hit again
- * (surface.h).
+ * Tracing rays with Embree, with hits decided in double.
  *
- * Only building can fail: out of memory, and errors that Embree reports. Rays never fail; a ray that is not finite hits
- * nothing.
+ * To build, triangles, spheres and curves become Embree geometries, with filters where a hit must be checked in double;
+ * large triangles of a scene of mixed scales become a user geometry that is intersected in double. To trace, the ray
+ * enters the scene's box in double, Embree proposes hits in float, the filter accepts or rejects them, and the caller
+ * computes the hit again (surface.h).
+ *
+ * Only building can fail: out of memory, or with an error that Embree reports. Tracing
+ * never returns an error; a ray that is not finite is a fault (worker/render/math/fptrap.h).
  */
 #include "worker/render/geom/accel.h"
 
@@ -25,15 +27,16 @@ struct accel {
 	struct sphere_prim *spheres;
 	struct accel_shape *shapes;
 	const struct coincidence *coincidence;
-	struct wide_prims *wide;    /* one per shape */
-	struct curve_prims *curves; /* one per shape */
+	struct wide_prims *wide;    /* one entry per shape */
+	struct curve_prims *curves; /* one entry per shape */
 	struct instances instances;
 	atomic_size_t bytes, peak;
 	vec3 low, high;
-	double size;	     /* sum of the sides */
-	double reach;	     /* the error bound of Embree's floats, see below */
-	double off, off_far; /* the same before the size of the scene is known: off + off_far |p| at p */
-	double detail;	     /* in a scene of mixed scales: the extent of its smallest shape; otherwise 0 */
+	double size;  /* sum of the sides of the bounding box */
+	double reach; /* error bound of Embree's floats, see rounding_reach */
+	/* The same bound before the size of the scene is known: off + off_far |p| at p. */
+	double off, off_far;
+	double detail; /* in a scene of mixed scales, the extent of its smallest shape; otherwise 0 */
 };
 
 static bool memory_monitor(void *user, ssize_t bytes, bool post)
@@ -42,12 +45,12 @@ static bool memory_monitor(void *user, ssize_t bytes, bool post)
 	struct accel *a = user;
 	size_t now = atomic_fetch_add(&a->bytes, (size_t)bytes) + (size_t)bytes;
 	if (now > atomic_load(&a->peak))
-		atomic_store(&a->peak, now); /* one thread builds */
+		atomic_store(&a->peak, now); /* no race: only one thread builds */
 	return true;
 }
 
-/* Both ends are so high over the triangle's plane that not even Embree's float normal of a tiny distant triangle can
- * be wrong about the side: for most hits this avoids loading the vertices. */
+/* Whether both ends are so high over the triangle's plane that not even Embree's float normal of a tiny distant
+ * triangle can be wrong about their sides. For most hits this avoids loading the vertices. */
 static bool clearly_crosses(const struct query *q, const struct RTCHit *hit, const struct RTCRay *ray)
 {
 	vec3 n = {(double)hit->Ng_x, (double)hit->Ng_y, (double)hit->Ng_z};
@@ -55,7 +58,7 @@ static bool clearly_crosses(const struct query *q, const struct RTCHit *hit, con
 	return fabs(vec3_dot(n, q->d)) * nearer > 0x1p10 * q->reach * triangle_norm1(n);
 }
 
-/* Intersected in double, by a user geometry (wide_root). */
+/* Whether a triangle is intersected in double by a user geometry instead (solved.c). */
 static bool is_wide(const struct query *q, const struct accel_shape *s, uint32_t prim)
 {
 	return isfinite(q->wide_from) && (double)triangle_extent(s->position, s->index[prim]) >= q->wide_from;
@@ -78,7 +81,7 @@ static void filter_triangle(const struct RTCFilterFunctionNArguments *args)
 		args->valid[0] = 0;
 }
 
-/* The final hit is one of those that pass here: prefetch its vertices while Embree continues. */
+/* The final hit is one of those that pass this filter, so it prefetches its vertices while Embree continues. */
 static void filter_closest(const struct RTCFilterFunctionNArguments *args)
 {
 	const struct RTCHit *hit = (const struct RTCHit *)(const void *)args->hit;
@@ -101,7 +104,7 @@ static int attach_triangles(struct accel *a, struct accel_shape *s, uint32_t id)
 	return 0;
 }
 
-/* Primitives of our own. */
+/* Attaches primitives that we intersect ourselves. */
 static int attach_own(struct accel *a, uint32_t id, uint32_t count, void *data, const struct embree_ops *ops)
 {
 	RTCGeometry g = rtcNewGeometry(a->device, RTC_GEOMETRY_TYPE_USER);
@@ -129,8 +132,8 @@ static int attach_curves(struct accel *a, const struct accel_shape *s, uint32_t 
 	return attach_own(a, id, s->curves->count, &a->curves[id], &solved_curves);
 }
 
-/* The shape's triangles with an extent of at least `least`, as a user geometry with a number after those of the
- * shapes. */
+/* Attaches the shape's triangles with an extent of at least `least`, as a user geometry whose ID
+ * follows those of the shapes. */
 static int attach_wide(struct accel *a, uint32_t shape_count, uint32_t id, double least)
 {
 	struct wide_prims *w = &a->wide[id];
@@ -154,7 +157,7 @@ static int attach_wide(struct accel *a, uint32_t shape_count, uint32_t id, doubl
 	return attach_own(a, shape_count + id, w->count, w, &solved_triangles);
 }
 
-/* The same instruction set on all machines that have it, so that mixed farms agree on bits. */
+/* Embree uses AVX2 on all machines that have it, so that all workers of a mixed farm get the same bits. */
 static bool has_avx2(void)
 {
 #if defined(__x86_64__)
@@ -181,16 +184,16 @@ static int embree_failure(RTCDevice device, struct error *e)
 			 (int)code);
 }
 
-/* The error bound of a float point and of Embree's robust test, for vertices anywhere in the scene: half a unit in
- * the last place of each coordinate for the point, as much again for the differences, times four. */
+/* Returns the error bound of a float point and of Embree's robust test, for vertices anywhere in the box: half a unit
+ * in the last place of each coordinate for the point, as much again for the differences, times four. */
 static double rounding_reach(vec3 low, vec3 high)
 {
 	vec3 m = {fmax(fabs(low.x), fabs(high.x)), fmax(fabs(low.y), fabs(high.y)), fmax(fabs(low.z), fabs(high.z))};
 	return 0x1p-21 * fmax(m.x, fmax(m.y, m.z));
 }
 
-/* A scene has mixed scales if its smallest shape is so much smaller than the scene that float errors exceed a
- * thousandth of that shape. Triangles that are so much larger than the smallest shape are intersected in double. */
+/* A scene has mixed scales if its smallest shape is so small that float errors of the scene exceed a thousandth of it.
+ * Triangles that exceed the smallest shape by this factor are intersected in double. */
 #define MIXED 0x1p11
 
 static double extent_of(const struct accel_shape *s)
@@ -217,7 +220,7 @@ static double extent_of(const struct accel_shape *s)
 	return (double)most;
 }
 
-/* rounding_reach of a shape. */
+/* Returns rounding_reach of a shape's bounding box. */
 static double reach_of(const struct accel_shape *s)
 {
 	double reach = 0;
@@ -238,7 +241,7 @@ static double reach_of(const struct accel_shape *s)
 	return reach;
 }
 
-/* Whether scales are mixed, and the error bound of floats before anything is built. */
+/* Determines whether the scales are mixed, and the error bound of floats before anything is built. */
 static void find_detail(struct accel *a, const struct accel_shape *shapes, uint32_t count)
 {
 	double least = INFINITY, reach = 0;
@@ -247,12 +250,12 @@ static void find_detail(struct accel *a, const struct accel_shape *shapes, uint3
 		reach = fmax(reach, reach_of(&shapes[i]));
 	}
 	a->detail = MIXED * least < 0x1p21 * reach ? least : 0;
-	/* The same as reach_at. */
+	/* the bound of reach_at */
 	a->off = a->detail == 0 ? reach : 0x1p-21 * MIXED * a->detail + 0x1p-26 * reach;
 	a->off_far = a->detail == 0 ? 0 : 0x1p-21;
 }
 
-/* A sphere is hidden entirely or not at all. */
+/* A sphere is either hidden entirely or not at all. */
 static int attach_shape(struct accel *a, uint32_t count, uint32_t id)
 {
 	if (accel_is_instance(&a->shapes[id]))
@@ -267,7 +270,7 @@ static int attach_shape(struct accel *a, uint32_t count, uint32_t id)
 	return rc || a->detail == 0 ? rc : attach_wide(a, count, id, MIXED * a->detail);
 }
 
-/* Its number follows those of the shapes and of their user geometries. */
+/* The ID of the geometry follows those of the shapes and of their user geometries. */
 static int attach_instances(struct accel *a, uint32_t count)
 {
 	struct instances *s = &a->instances;
@@ -365,8 +368,8 @@ size_t accel_peak_bytes(const struct accel *a)
 	return atomic_load(&a->peak);
 }
 
-/* Rays from far outside enter the scene's box in double, so Embree's floats never have to represent the distance. In
- * units of |d|. */
+/* Rays from far outside enter the scene's box in double, so that Embree's floats never have to represent the distance.
+ * Returns the distance to the box in units of |d|. */
 static double entry_distance(const struct accel *a, vec3 o, vec3 d)
 {
 	double size = a->size;
@@ -384,8 +387,8 @@ static double entry_distance(const struct accel *a, vec3 o, vec3 d)
 	return enter;
 }
 
-/* rounding_reach of a ray at p. With mixed scales it depends on p, not on the scene: on the triangles that Embree
- * intersects, and on the rounding of p itself on a triangle as large as the scene. */
+/* Returns the float error bound of a ray at p. With mixed scales it does not depend on the size of the scene but on p,
+ * on the triangles that Embree intersects, and on the rounding of p itself on a triangle as large as the scene. */
 static double reach_at(const struct accel *a, vec3 p)
 {
 	if (a->detail == 0)
@@ -393,8 +396,9 @@ static double reach_at(const struct accel *a, vec3 p)
 	return 0x1p-21 * (triangle_norm_max(p) + MIXED * a->detail) + 0x1p-50 * a->size;
 }
 
-/* The float ray from o + t0 d deviates in proportion to its distance from the origin, which is too much for objects
- * much closer to the origin: there a new ray starts. In units of d. */
+/* Returns where the part of the ray that starts at o + t0 d ends, in units of d. A float ray deviates in
+ * proportion to the distance of its start from the origin, which is too much for objects much closer to the
+ * origin: a new ray starts there. */
 static double part_end(const struct accel *a, vec3 o, vec3 d, double t0, double t_max)
 {
 	if (a->detail == 0)
@@ -407,13 +411,14 @@ static double part_end(const struct accel *a, vec3 o, vec3 d, double t0, double 
 	return fmin(t0 + to_nearest - sqrt(left2 / d2), t_max);
 }
 
-/* Lifted to the side that d leaves for. */
+/* Lifts p off its surface, to the side into which d leaves. */
 static vec3 lift_off_surface(const struct accel *a, vec3 p, vec3 ng, vec3 d)
 {
 	return vec3_madd(p, copysign(reach_at(a, p), vec3_dot(ng, d)), ng);
 }
 
-/* Embree aborts on rays beyond about 1.8e18 (FLT_LARGE). NaN fails this test, too. */
+/* Traps if the ray is not finite or so long (about 1.8e18, FLT_LARGE) that Embree would abort. NaN fails the test,
+ * too. */
 static void check_ray(const struct RTCRay *r)
 {
 	float sum = fabsf(r->org_x) + fabsf(r->org_y) + fabsf(r->org_z) + fabsf(r->dir_x) + fabsf(r->dir_y) +
@@ -436,7 +441,7 @@ static struct query query_of(const struct accel *a, vec3 o, vec3 d)
 			      .nearest_far = -1};
 }
 
-/* The point is on a surface where another one is present. */
+/* Whether the end is on a surface at a point where another surface hides it. */
 static bool is_hidden(const struct accel *a, const struct ray_end *end)
 {
 	if (!a->coincidence || end->prim.shape == PRIM_NONE.shape)
@@ -445,15 +450,15 @@ static bool is_hidden(const struct accel *a, const struct ray_end *end)
 	return there.shape != end->prim.shape || there.prim != end->prim.prim;
 }
 
-/* Embree's ray for the part from t0 to t1 runs beside the true one, and starts earlier and ends later by the error
- * bound of floats: beside, so that a grazing ray does not slip past the edge of the triangle that it leaves and that
- * is filtered; earlier and later, so that nothing near the ends is lost. The callbacks reject what the true ray does
- * not hit in double between the ends. */
+/* Fills in Embree's ray for the part from t0 to t1. It runs beside the true ray, and starts earlier and ends later by
+ * the error bound of floats: beside, so that a grazing ray does not slip past the edge of the triangle that it leaves,
+ * which is filtered out; earlier and later, so that nothing near the ends is lost. The callbacks reject, in double,
+ * everything that the true ray does not hit between its ends. */
 static void fill_ray(const struct accel *a, struct RTCRay *ray, struct query *q, double t_min, vec3 o, vec3 d,
 		     double t0, double t1)
 {
 	q->reach = reach_at(a, vec3_madd(q->o, t0, q->d));
-	/* A shorter segment has no float representation as a ray. */
+	/* A shorter segment cannot be represented as a float ray. */
 	double unit = q->segment ? fmax(vec3_length(q->d), q->reach * 0x1p-20) : 1;
 	q->before = q->reach * q->low / unit;
 	q->back = q->before - t0;
@@ -527,7 +532,7 @@ static bool occluded(const struct accel *a, struct query *q, vec3 o, vec3 d, dou
 
 bool accel_occluded(const struct accel *a, const struct ray_end *from, const struct ray_end *to)
 {
-	/* Floats are more precise the nearer to the origin a ray starts. */
+	/* Trace from the end nearer to the origin, where floats are more precise. */
 	if (a->detail > 0 && triangle_norm_max(to->p) < triangle_norm_max(from->p)) {
 		const struct ray_end *other = from;
 		from = to;

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Decides which of coinciding primitives is present, and whether two coincide. For the latter, their planes must have
- * one direction, which rejects most pairs; then one triangle is projected onto the other: they coincide if the corners
- * of the resulting polygon are no farther from the other's plane than the rounding of both triangles' vertices, floats
- * by 2^-24 of each coordinate, and if the polygon is wider than a few such roundings. The corners decide for all of it,
- * because both are planes.
+ * Tests whether two primitives coincide, and decides which of several coinciding primitives is present.
+ *
+ * Two triangles can only coincide if their planes have the same direction, which rejects most pairs. Then one triangle
+ * is clipped against the other as seen along the normal of the latter. They coincide if the corners of the resulting
+ * polygon are no farther from the other's plane than the rounding of both triangles' vertices (floats: 2^-24 of each
+ * coordinate), and if the polygon is wider than a few such roundings. The corners decide for the whole polygon because
+ * both triangles are plane.
  */
 #include "worker/render/geom/coincide.h"
 
@@ -12,14 +14,14 @@
 
 #include <float.h>
 
-enum { CORNERS = 9 }; /* three corners, and one more per cut */
+enum { CORNERS = 9 }; /* three corners and at most one more per cut, with room to spare */
 
 struct polygon {
 	vec3 p[CORNERS];
 	unsigned n;
 };
 
-/* The part with side.(p - at) >= 0. */
+/* Keeps the part of the polygon with side.(p - at) >= 0. */
 static void cut_polygon(struct polygon *a, vec3 at, vec3 side)
 {
 	struct polygon out = {.n = 0};
@@ -39,7 +41,7 @@ static double largest(double a, double b, double c)
 	return fmax(fabs(a), fmax(fabs(b), fabs(c)));
 }
 
-/* How far the rounding of its vertices can move a triangle along n. */
+/* Returns how far the rounding of its vertices can move a triangle along n. */
 static double rounded_along(const struct triangle *t, vec3 n)
 {
 	return t->rounding * (fabs(n.x) * largest(t->v[0].x, t->v[1].x, t->v[2].x) +
@@ -55,9 +57,10 @@ static double largest_coordinate(const struct triangle *t)
 	return far;
 }
 
-/* Whether the overlap is more than rounding: wider than about eight roundings of its own coordinates to float, and than
- * the error of the cuts that made it, which is in double but relative to the triangles' corners, up to `cuts` away. The
- * latter counts where triangles share a corner at the origin: roundings of coordinates there are nearly 0. */
+/* Whether the overlap is more than rounding. It must be wider than about eight roundings of its own coordinates to
+ * float, and than the error of the cuts that made it, which is that of doubles, but relative to the triangles' corners,
+ * whose coordinates are at most `cuts`. The latter matters for triangles that share a corner at the origin, where the
+ * roundings of the overlap's own coordinates are almost 0. */
 static bool has_width(const struct polygon *a, vec3 n, double cuts)
 {
 	double area2 = 0, around = 0, far = 0x1p-27 * cuts;
@@ -75,12 +78,12 @@ struct coincide_facing coincide_facing_of(const struct triangle *t)
 	double length = vec3_length(t->n);
 	if (!(length >= DBL_MIN))
 		return (struct coincide_facing){.altitude = 0};
-	/* More than along any direction, and for the rounding of n. */
+	/* An upper bound of rounded_along for any direction, with room for the rounding of n. */
 	return (struct coincide_facing){vec3_scale(1 / length, t->n), triangle_altitude(t),
 					2 * t->rounding * largest_coordinate(t)};
 }
 
-/* Whether rounding accounts for the angle between their planes. */
+/* Whether rounding can account for the angle between the planes. */
 static bool have_one_direction(const struct triangle *a, const struct triangle *b, double rounded)
 {
 	double across = vec3_length(vec3_cross(a->n, b->n)), lengths = vec3_length(a->n) * vec3_length(b->n);
@@ -98,7 +101,7 @@ bool coincide_triangles(const struct triangle *a, const struct triangle *b, doub
 		vec3 from = b->v[i], to = b->v[(i + 1) % 3];
 		cut_polygon(&over, from, vec3_cross(n, vec3_sub(to, from)));
 	}
-	/* Twice the rounding error, for the earlier roundings in double and for the sums here. */
+	/* Twice the rounding error, to allow for earlier roundings in double and for the sums here. */
 	double within = 2 * rounded;
 	for (unsigned i = 0; i < over.n; i++)
 		if (!(fabs(vec3_dot(n, vec3_sub(over.p[i], b->v[0]))) <= within))
@@ -120,7 +123,7 @@ bool coincide_spheres(const struct accel_shape *a, const struct accel_shape *b)
 	return triangle_norm1(between) + fabs(a->radius - b->radius) <= within;
 }
 
-/* As seen along n. */
+/* Whether a triangle covers the point p, as seen along n. */
 static bool is_covered_by(const struct accel_shape *s, uint32_t prim, vec3 p, vec3 n)
 {
 	const struct triangle t = accel_triangle(s, prim, 0);
@@ -142,7 +145,7 @@ static const struct coincide_pair *find_first(const struct coincidence *c, struc
 	return low;
 }
 
-/* One that hides it there; false: none. */
+/* Finds a primitive that hides `prim` at p. Returns false if there is none. */
 static bool find_hiding(const struct coincidence *c, const struct accel_shape *shapes, struct prim_ref prim, vec3 p,
 			struct prim_ref *by)
 {
@@ -162,7 +165,8 @@ static bool find_hiding(const struct coincidence *c, const struct accel_shape *s
 struct prim_ref coincide_there(const struct coincidence *c, const struct accel_shape *shapes, struct prim_ref prim,
 			       vec3 p)
 {
-	/* What hides it may be hidden itself; ranks end the recursion. */
+	/* The primitive that hides it may be hidden itself. The loop ends because each step leads to an earlier
+	 * one in the order of ranks. */
 	while (c && prim.shape != PRIM_NONE.shape && c->first[prim.shape] < c->first[prim.shape + 1] &&
 	       find_hiding(c, shapes, prim, p, &prim))
 		;

@@ -1,20 +1,21 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The search of coincide.h. Boxes are divided in halves, with primitives across the middle in both, until a part holds
- * one shape that does not emit (nothing to find) or few primitives, or cannot be divided further; what is left is
- * compared pairwise, in the order of ranks. A triangle that is entirely hidden hides nothing itself, so a stack of
- * equal ones does not cost quadratic time.
+ * The search for coinciding surfaces (coincide.h). Boxes are divided in halves, with primitives across the middle in
+ * both, until a part holds a single shape that does not emit (so there is nothing to find) or few primitives, or cannot
+ * be divided further; then its primitives are compared pairwise, in the order of ranks. A triangle that is entirely
+ * hidden hides nothing itself, so a stack of equal triangles does not cost quadratic time.
  *
- * An instance of a mesh is one item until a cut would divide it or nothing else is left to divide; then it is replaced
- * by those triangles of its flat parts that meet the box around the others. Most instances are alone by then, or have
- * none, and cost nothing.
+ * An instance of a mesh is a single item until a cut would divide it or nothing else is left to divide; then it is
+ * replaced by those triangles of its flat parts that meet the box around the other items. Most instances are alone by
+ * then, or have no such triangles, and cost nothing.
  *
- * A small mesh that does not emit is one item, too, but a cut does not divide it: it goes to both halves, each with
- * that part of it which is there, as its spine (coincide_spine.h) tells. Where no cut separates it from others, those
- * triangles take its place that are near another and as steep.
+ * A small mesh that does not emit is a single item, too, but a cut does not divide it: it goes to each half
+ * that contains a part of it, as its spine (coincide_spine.h) tells. Where no cut separates it from other
+ * items, it is replaced by its triangles that are near another item and parallel to the latter's triangles, as
+ * far as the spines can tell.
  *
- * The search is bounded in steps and in pairs. Where a bound ends it, the result holds what was found so far and is
- * marked `incomplete`, which the user is told. -ENOMEM.
+ * The search is bounded in steps and in pairs. If it reaches a bound, the result holds what was found so far and is
+ * marked `incomplete`, which the user is told. It fails with -ENOMEM if out of memory.
  */
 #include "worker/render/geom/coincide_find.h"
 
@@ -27,28 +28,27 @@
 
 #include <stdlib.h>
 
-#define WHOLE UINT32_MAX /* as the primitive: an entire instance or small mesh */
+#define WHOLE UINT32_MAX /* as the primitive number: an entire instance or small mesh */
 enum { INSTANCED_MAX = 1 << 22 };
-enum { SMALL = 2048 }; /* triangles */
+enum { SMALL = 2048 }; /* most triangles of a small mesh */
 enum { FEW = 12, MOST_CUTS = 64, SAMPLE = 129, OTHERS = 32, MANY = 16 * OTHERS };
 
 struct search {
 	const struct accel_shape *shapes;
 	struct coincide_pair *pairs;
 	size_t pair_count, pair_room, pair_limit;
-	uint64_t work, limit; /* primitives put into parts, and pairs compared */
+	uint64_t work, limit; /* number of primitives put into parts, plus pairs compared */
 	bool incomplete;
-	double low[3], high[3]; /* the box that is being looked into */
-	struct spine *spines;	/* one per shape, of the small meshes; NULL: there are none */
-	struct flat_parts
-		*flat; /* one per shape, that of the first shape sharing the mesh; NULL: there are no instances */
+	double low[3], high[3];	 /* the box that is currently searched */
+	struct spine *spines;	 /* of the small meshes, by shape; NULL: there are none */
+	struct flat_parts *flat; /* of each mesh, at its first shape; NULL: there are no instances */
 };
 
 struct member {
 	struct prim_ref prim;
 	double low[3], high[3];
-	struct spine_part part;	       /* of a small mesh */
-	struct coincide_facing facing; /* known in compare_part only */
+	struct spine_part part;	       /* for a small mesh */
+	struct coincide_facing facing; /* only set in compare_part */
 };
 
 static bool is_small(const struct accel_shape *s)
@@ -76,7 +76,7 @@ static void extent_of_instance(const struct accel_shape *s, uint32_t prim, unsig
 	*high = fmax(u, fmax(v, w)) + margin;
 }
 
-/* Within the box that is being looked into. */
+/* The extent of the part of a small mesh within the box that is currently searched. */
 static void extent_of_small(const struct search *f, uint32_t shape, struct spine_part part, unsigned axis, double *low,
 			    double *high)
 {
@@ -85,7 +85,7 @@ static void extent_of_small(const struct search *f, uint32_t shape, struct spine
 	*high = fmin(*high, f->high[axis]);
 }
 
-/* The box's extent along an axis, slightly enlarged so that rounded coordinates meet. */
+/* The extent of an item's box along an axis, slightly enlarged so that boxes with rounded coordinates meet. */
 static void extent(const struct search *f, struct prim_ref p, unsigned axis, double *low, double *high)
 {
 	const struct accel_shape *s = &f->shapes[p.shape];
@@ -126,7 +126,7 @@ static struct member member_of(const struct search *f, struct prim_ref p)
 	return m;
 }
 
-/* Finds the cut with the smallest halves, judged by a sample; false: they are hardly smaller than the whole. */
+/* Finds the cut with the smallest halves, judged by a sample. Returns false if they are hardly smaller than the box. */
 static bool choose_cut(const struct search *f, const struct prim_ref *items, size_t n, unsigned *axis, double *at)
 {
 	struct member m[SAMPLE];
@@ -153,8 +153,8 @@ static bool choose_cut(const struct search *f, const struct prim_ref *items, siz
 			*at = cut;
 		}
 	}
-	/* To separate meshes saves comparing their triangles. Few others can as well be compared: cutting them must at
-	 * least pay for that. */
+	/* Separating meshes saves comparing their triangles, so a cut may gain less. A few other items could as well be
+	 * compared, so a cut must save at least as much as that costs. */
 	if (2 * small > count)
 		return least < SIZE_MAX && least * 4 <= count * 7;
 	return least < SIZE_MAX && (n < MANY ? least * 5 <= count * 7 : least * 3 <= count * 5);
@@ -165,7 +165,7 @@ static bool is_emitter(const struct search *f, struct prim_ref p)
 	return f->shapes[p.shape].rank == SURFACE_SHINES;
 }
 
-/* Whether all are of one shape that does not emit. */
+/* Whether all items belong to one shape that does not emit. */
 static bool nothing_to_find(const struct search *f, const struct prim_ref *items, size_t n)
 {
 	for (size_t i = 1; i < n; i++)
@@ -214,7 +214,7 @@ static bool may_meet(const struct search *f, const struct member *a, const struc
 	return true;
 }
 
-/* Compares each with those before it, which have lower ranks, that are not entirely hidden. */
+/* Compares each primitive with those before it, which have lower ranks, that are not entirely hidden. */
 static int compare_all(struct search *f, struct member *m, size_t n)
 {
 	size_t kept = 0;
@@ -259,7 +259,7 @@ static int compare_part(struct search *f, const struct prim_ref *items, size_t n
 	return rc;
 }
 
-/* The shape that most of them belong to, if more than half do: by majority vote. */
+/* Returns the shape to which most of the items belong, if more than half do (majority vote). */
 static uint32_t commonest(const struct prim_ref *items, size_t n)
 {
 	uint32_t shape = items[0].shape;
@@ -272,8 +272,8 @@ static uint32_t commonest(const struct prim_ref *items, size_t n)
 	return shape;
 }
 
-/* Keeps only those primitives of a large mesh that meet the box of one of the few others: most of a statue does not
- * touch its room. Returns how many are left, at the front. */
+/* Keeps only those primitives of the commonest shape that meet the box of one of the few others: most of a statue does
+ * not touch its room. Returns the number of items that remain, which are at the front. */
 static size_t leave_out(const struct search *f, struct prim_ref *items, size_t n)
 {
 	struct member others[OTHERS];
@@ -300,14 +300,14 @@ static size_t leave_out(const struct search *f, struct prim_ref *items, size_t n
 
 static int look_into(struct search *f, struct prim_ref *items, size_t n, unsigned cuts);
 
-/* Where to cut; `is` false: nowhere. */
+/* A cut; `is` is false if there is none. */
 struct cut {
 	bool is;
 	unsigned axis;
 	double at;
 };
 
-/* Instances across the cut are expanded; if there is none, every instance and small mesh is. */
+/* Whether an item is replaced by its triangles: an instance across the cut; without a cut, all instances and meshes. */
 static bool is_divided(const struct search *f, struct prim_ref p, const struct cut *c)
 {
 	double low, high;
@@ -324,7 +324,7 @@ static const struct flat_parts *flat_of(const struct search *f, uint32_t instanc
 	return &f->flat[f->shapes[instance].place->first];
 }
 
-/* Room for all items with the triangles of the expanded instances; 0: none is expanded. */
+/* Returns the room needed for all items and the triangles of those that are replaced; 0 if none is. */
 static size_t room_divided(const struct search *f, const struct prim_ref *items, size_t n, const struct cut *c)
 {
 	size_t room = n;
@@ -338,7 +338,7 @@ static size_t room_divided(const struct search *f, const struct prim_ref *items,
 	return any ? room : 0;
 }
 
-/* The box around all items but one; if there are many items, all of space. */
+/* Returns the box around all items but one; if there are many items, all of space. */
 static struct member box_of_others(const struct search *f, const struct prim_ref *items, size_t n, size_t without)
 {
 	double edge = n > MANY ? INFINITY : -INFINITY;
@@ -355,7 +355,7 @@ static struct member box_of_others(const struct search *f, const struct prim_ref
 	return box;
 }
 
-/* Appends the triangles of its flat parts that meet the box. */
+/* Appends those triangles of an instance's flat parts that meet the box. Returns their number. */
 static size_t divide(struct search *f, uint32_t shape, const struct member *box, struct prim_ref *out)
 {
 	size_t count = 0;
@@ -371,7 +371,7 @@ static size_t divide(struct search *f, uint32_t shape, const struct member *box,
 	return count;
 }
 
-/* What of the items is near the small mesh, at most OTHERS of them; more: OTHERS + 1. */
+/* Finds the items near the small mesh, at most OTHERS of them. Returns their number; OTHERS + 1 if there are more. */
 static size_t find_near(struct search *f, const struct prim_ref *items, size_t n, const struct member *m,
 			struct member *others)
 {
@@ -390,9 +390,9 @@ static size_t find_near(struct search *f, const struct prim_ref *items, size_t n
 	return count;
 }
 
-/* What is near a small mesh, and by how much its triangles may lean to be like those of each. */
+/* The items near a small mesh, and how much its triangles may lean to be parallel to theirs (spine_lean_at_most). */
 struct near {
-	size_t count; /* OTHERS + 1: more */
+	size_t count; /* OTHERS + 1: there are more */
 	struct member others[OTHERS];
 	double lean[OTHERS];
 };
@@ -422,7 +422,7 @@ static void find_leans(const struct search *f, uint32_t shape, struct near *near
 			near->lean[i] = spine_lean_at_most(&f->spines[near->others[i].prim.shape], &f->spines[shape]);
 }
 
-/* Whether the triangle belongs into the box that is being looked into, where there is too much to compare it with. */
+/* Whether the triangle meets the searched box. Used where there are too many items to compare it with. */
 static bool is_in_box(const struct search *f, struct prim_ref p)
 {
 	const struct member m = member_of(f, p);
@@ -432,7 +432,7 @@ static bool is_in_box(const struct search *f, struct prim_ref p)
 	return true;
 }
 
-/* Appends the triangles of the small mesh, of these items, that are near another item. */
+/* Appends those triangles of a small mesh, one of the items, that are near another item. Returns their number. */
 static size_t divide_small(struct search *f, const struct prim_ref *items, size_t n, uint32_t shape,
 			   struct prim_ref *out)
 {
@@ -473,7 +473,7 @@ static size_t divide_all(struct search *f, const struct prim_ref *items, size_t 
 	return count;
 }
 
-/* The half is the box that is being looked into. */
+/* Whether an item meets the half that is the box currently searched. */
 static bool is_in_half(const struct search *f, struct prim_ref p, bool upper, const struct cut *c)
 {
 	double low, high;
@@ -506,7 +506,7 @@ static int look_into_halves(struct search *f, const struct prim_ref *items, size
 	return rc;
 }
 
-/* items: sorted by rank; overwritten. */
+/* Searches the items, which are sorted by rank and are overwritten. cuts: how many more cuts are allowed. */
 static int look_into(struct search *f, struct prim_ref *items, size_t n, unsigned cuts)
 {
 	struct cut c = {.is = false};
@@ -532,7 +532,7 @@ static int look_into(struct search *f, struct prim_ref *items, size_t n, unsigne
 	return rc;
 }
 
-/* All primitives by rank; instances and small meshes as single items. */
+/* Lists all primitives by rank, instances and small meshes as single items. Returns their number; items may be NULL. */
 static size_t list_primitives(const struct accel_shape *shapes, uint32_t count, struct prim_ref *items)
 {
 	size_t n = 0;
@@ -548,7 +548,7 @@ static size_t list_primitives(const struct accel_shape *shapes, uint32_t count, 
 	return n;
 }
 
-/* The flat parts of shared meshes; *moved: the total number of these triangles over all instances. */
+/* Finds the flat parts of shared meshes. *moved: the number of their triangles over all instances that do not move. */
 static int find_flat_parts(struct search *f, uint32_t count, size_t *moved)
 {
 	*moved = 0;
@@ -566,7 +566,7 @@ static int find_flat_parts(struct search *f, uint32_t count, size_t *moved)
 	return 0;
 }
 
-/* *triangles: the total number in small meshes. */
+/* Computes the spines of small meshes. *triangles: the total number of triangles in them. */
 static int find_spines(struct search *f, uint32_t count, size_t *triangles)
 {
 	*triangles = 0;
@@ -590,8 +590,8 @@ static int find(struct search *f, uint32_t count, size_t n)
 	struct prim_ref *items = rc ? NULL : mem_alloc(n, sizeof *items);
 	if (!items)
 		return -ENOMEM;
-	/* Enough for complete sorting and for each primitive to meet dozens of others; not for all triangles of very
-	 * many instances. */
+	/* The limits suffice for complete sorting and for each primitive to meet dozens of others, but not for all
+	 * triangles of a huge number of instances. */
 	size_t all = n + small, most = moved < INSTANCED_MAX ? moved : INSTANCED_MAX;
 	f->limit = 128 * (uint64_t)all + (1u << 25) + 16 * (uint64_t)most;
 	f->pair_limit = 4 * all + (1u << 16) + most;

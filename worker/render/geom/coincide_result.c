@@ -25,7 +25,7 @@ static int compare_shapes(const void *x, const void *y)
 	return a->by < b->by ? -1 : a->by > b->by;
 }
 
-/* Pairs across a cut were found more than once. */
+/* Sorts the pairs and removes duplicates: pairs across a cut were found more than once. Returns the number left. */
 static size_t unique_pairs(struct coincide_pair *p, size_t n)
 {
 	size_t kept = 0;

@@ -5,8 +5,8 @@
 
 #include <float.h>
 
-/* The direction in which the points of the mesh lie the farthest apart, in squares: power iteration, which needs few
- * steps where it matters, in long thin meshes; in others any direction will do. */
+/* Returns the direction of the largest variance of the mesh's vertices, by power iteration. Few steps suffice where it
+ * matters, in long thin meshes; in other meshes any direction will do. */
 static vec3 main_direction(const struct accel_shape *s, vec3 center, vec3 start)
 {
 	double c[6] = {0};
@@ -41,7 +41,7 @@ static vec3 box_middle(const struct spine *s)
 	return (vec3){s->low[0] / 2 + s->high[0] / 2, s->low[1] / 2 + s->high[1] / 2, s->low[2] / 2 + s->high[2] / 2};
 }
 
-/* The segment along s->direction around all vertices, and its radius. */
+/* Computes the segment along s->direction that covers all vertices, and its radius. */
 static void lay_segment(struct spine *s, const struct accel_shape *mesh, vec3 center)
 {
 	double first = INFINITY, last = -INFINITY;
@@ -81,7 +81,8 @@ struct spine spine_of(const struct accel_shape *mesh)
 	for (uint32_t i = 0; i < mesh->vertex_count; i++)
 		add_to_box(&s, triangle_vertex(mesh->position, i));
 	vec3 center = box_middle(&s), start = {s.high[0] - s.low[0], s.high[1] - s.low[1], s.high[2] - s.low[2]};
-	/* Along no diagonal of the box exactly, each of which may be at a right angle to what is looked for. */
+	/* The start is not exactly along a diagonal of the box, since that could be perpendicular to
+	 * the direction looked for. */
 	start = vec3_add(start, (vec3){0.37 * start.y, -0.41 * start.z, 0.43 * start.x});
 	double length = vec3_length(start), far = largest_coordinate(&s);
 	if (length >= DBL_MIN)
@@ -106,7 +107,7 @@ bool spine_clip(const struct spine *s, const double low[3], const double high[3]
 		       most = high[k] + s->radius;
 		if (s->high[k] < low[k] || s->low[k] > high[k])
 			return false;
-		/* Along this axis it does not get beyond the box, or by no more than the margin in its radius. */
+		/* Along this axis the segment does not leave the box, or by no more than the margin in its radius. */
 		if (fmin(at, at + d) >= least && fmax(at, at + d) <= most)
 			continue;
 		if (!(fabs(d) > 0x1p-24 * s->radius)) {
@@ -134,14 +135,14 @@ static double clamped(double t)
 	return fmin(fmax(t, 0), 1);
 }
 
-/* The least squared distance of two segments. */
+/* Returns the least squared distance of two segments. */
 static double least_distance2(vec3 p, vec3 d, vec3 q, vec3 e)
 {
 	vec3 r = vec3_sub(p, q);
 	double a = vec3_dot(d, d), b = vec3_dot(d, e), c = vec3_dot(e, e), f = vec3_dot(d, r), g = vec3_dot(e, r),
 	       slope = a * c - b * b, least = INFINITY;
-	/* Where the lines are the nearest; and the nearest point to each end, which alone counts where these lie
-	 * outside or the lines are parallel. */
+	/* The point where the lines are nearest, then the nearest point to each end. Only the latter count where the
+	 * former lies outside the segments or the lines are parallel. */
 	const double ends[5][2] = {
 		{slope > 0 ? clamped((b * g - c * f) / slope) : 0, NAN}, {0, NAN}, {1, NAN}, {NAN, 0}, {NAN, 1}};
 	for (int i = 0; i < 5; i++) {

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A thick segment around a small mesh, by which the search for coinciding surfaces (coincide_find.c) tells without
- * looking at triangles that two meshes lie apart: the box of a long thin one that lies askew holds mostly nothing.
+ * A thick segment around a small mesh. With it, the search for coinciding surfaces (coincide_find.c) can tell
+ * that two meshes are apart without looking at their triangles: the bounding box of a long thin mesh that
+ * lies askew is mostly empty.
  *
  * Lengths are those of the rescaled world. Pure; any thread; nothing fails or allocates.
  */
@@ -12,13 +13,15 @@
 #include "worker/render/geom/triangle.h"
 
 struct spine {
-	vec3 from, along; /* the segment from + t along, t in [0,1] */
-	double radius;	  /* everything is within it of the segment, with a margin for rounded coordinates */
+	vec3 from, along; /* the segment is from + t along, for t in [0,1] */
+	/* The whole mesh is within this distance of the segment, including a margin for rounded coordinates. */
+	double radius;
 	double low[3], high[3];
-	vec3 direction; /* of unit length; 0 if all is one point */
+	vec3 direction; /* unit direction of the segment; 0 if the mesh is a single point */
 	double lean;	/* the largest |n.direction| of the triangles' unit normals n */
-	double rounded; /* how far the rounding of vertices can move one of the triangles */
-	double height;	/* the smallest altitude of the triangles */
+	/* The distance by which the rounding of vertices can move a triangle. */
+	double rounded;
+	double height; /* smallest altitude of any triangle */
 };
 
 /* A part of the segment: t in [first, last]. */
@@ -28,17 +31,18 @@ struct spine_part {
 
 struct spine spine_of(const struct accel_shape *mesh);
 
-/* The part that holds everything of the mesh in the box; false: the mesh is not in it. */
+/* Sets *part to the part of the segment around everything that the mesh has in the box. Returns false if
+ * the mesh is not in the box. */
 bool spine_clip(const struct spine *s, const double low[3], const double high[3], struct spine_part *part);
 
-/* The extent of that part of the mesh along an axis. */
+/* Sets the extent of that part of the mesh along an axis. */
 void spine_extent(const struct spine *s, struct spine_part part, unsigned axis, double *low, double *high);
 
 /* Whether these parts of two meshes may have a point in common. */
 bool spines_meet(const struct spine *a, struct spine_part part, const struct spine *b, struct spine_part other);
 
-/* For triangles of `from`: the largest |n.s->direction| at which one with the unit normal n may have the direction of a
- * triangle of s; coincide_triangles is false beyond. At most 2. */
+/* For a triangle of `from` with unit normal n: returns the largest |n . s->direction| at which the triangle may be
+ * parallel to a triangle of s. If it is larger, coincide_triangles is false for all triangles of s. At most 2. */
 double spine_lean_at_most(const struct spine *s, const struct spine *from);
 
 #endif

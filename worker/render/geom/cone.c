@@ -1,13 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * With y along the axis and x away from it, the side is where cos x + sin y = r0, and the double cone where
+ * Intersections of lines with round cones.
  *
- *   F = cos^2 x^2 - (r0 - y sin)^2 = 0,
+ * With y along the axis and x away from it, the side is where cos x + sin y = r0, and the double cone is where
  *
- * a quadratic A t^2 + 2 B t + C along a line. It is solved around the point of the line that is nearest to the cone, so
- * that a ray from far away cancels nothing but what its origin lacks, and then around the middle of both roots, where
- * the discriminant is the product of two small heights (as Haines et al. 2019, Ray Tracing Gems ch. 7, do for spheres).
- * The side ends at the circles in which it touches the spheres, at y = r0 sin and length + r1 sin.
+ *       F = cos^2 x^2 - (r0 - y sin)^2 = 0,
+ *
+ * a quadratic A t^2 + 2 B t + C along a line. It is solved around the point of the line that is nearest to the
+ * cone, so that for a ray from far away nothing cancels except digits that its origin does not have, and then
+ * around the middle of both roots, where the discriminant is the product of two small heights (as Haines et al.
+ * 2019, Ray Tracing Gems ch. 7, do for spheres). The side ends at the circles in which it touches the spheres, at y
+ * = r0 sin and length + r1 sin.
  *
  * Nothing fails: points and radii of any finite size give numbers, and where there is no side, cos is 0.
  */
@@ -35,7 +38,7 @@ struct quadratic {
 	double a, b, c; /* a t^2 + 2 b t + c */
 };
 
-/* q: from p0. */
+/* The quadratic of the double cone along a line; q: origin of the line relative to p0. */
 static struct quadratic side_along(const struct cone *c, vec3 q, vec3 d)
 {
 	double y = vec3_dot(q, c->axis), dy = vec3_dot(d, c->axis), cos2 = c->cos * c->cos;
@@ -62,7 +65,7 @@ static bool side_roots(const struct cone *c, vec3 o, vec3 d, double root[2])
 	double d2 = vec3_dot(d, d), shift = -vec3_dot(to_middle, d) / d2, size = c->length + c->r0 + c->r1;
 	vec3 q = vec3_madd(from, shift, d);
 	struct quadratic f = side_along(c, q, d);
-	/* Not for a line nearly along the surface: the middle of its two roots may be anywhere. */
+	/* Not for a line nearly parallel to the surface: the middle of its two roots may be anywhere. */
 	if (f.a > 0 && fabs(f.b) * sqrt(d2) <= 4 * size * f.a) {
 		double more = -f.b / f.a;
 		shift += more;
@@ -130,7 +133,7 @@ bool cone_has(const struct cone *c, enum cone_part part, vec3 p, double slack)
 		return c->sin > -1 && y <= first + slack;
 	case CONE_END:
 		return c->sin < 1 && y >= last - slack;
-	default: /* not the other half of the double cone */
+	default: /* excludes the other half of the double cone */
 		return c->cos > 0 && y >= first - slack && y <= last + slack && y * c->sin <= c->r0;
 	}
 }
@@ -139,7 +142,7 @@ double cone_distance(const struct cone *c, vec3 p, bool open_start, bool open_en
 {
 	vec3 q = vec3_sub(p, c->p0);
 	double y = vec3_dot(q, c->axis), x = vec3_length(vec3_madd(q, -y, c->axis));
-	double slope = c->cos * y - c->sin * x; /* cos times where the normal through p meets the axis */
+	double slope = c->cos * y - c->sin * x; /* cos times the y at which the normal through p meets the axis */
 	if (c->cos > 0 ? slope <= 0 : c->sin > 0)
 		return open_start ? INFINITY : vec3_length(q) - c->r0;
 	if (c->cos > 0 ? slope >= c->cos * c->length : true)

@@ -1,9 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A ray meets a primitive where it meets the sphere or cone of a part, in the part, and not inside a neighbour. In
- * double both of the last are uncertain by rounding: each part reaches a little beyond its border, and what is inside
- * by less than that is not hidden. So at a joint the parts of two cones overlap in a strip, at distances of the order
- * of that rounding; a ray from a point there is on both, and both roots are divided out.
+ * Rays and points on curves.
+ *
+ * A ray meets a primitive where it meets the sphere or cone of a part, if the point is in that part and not inside
+ * a neighbour. In double, both conditions are uncertain by rounding: each part is therefore extended a little
+ * beyond its border, and a point inside a neighbour by less than that is not hidden. So at a joint the parts of
+ * two cones overlap in a strip as wide as that rounding; a ray from a point in the strip is on both parts, and
+ * both roots are divided out.
  *
  * Nothing fails.
  */
@@ -11,7 +14,7 @@
 
 #include "worker/render/geom/triangle.h"
 
-/* Bounds errors of a dozen operations on coordinates of that sum. */
+/* Bounds the errors of a dozen operations, relative to the sum of the coordinates. */
 #define ROUNDING 0x1p-44
 enum { NEIGHBOURS = 32 };
 
@@ -67,7 +70,7 @@ static bool is_inside(const struct curves *c, uint32_t prim, const struct cone *
 	return cone_distance(k, p, is_open_at(c, prim, CURVE_BEGINS), is_open_at(c, prim, CURVE_ENDS)) < -slack;
 }
 
-/* Whether p, of this primitive, lies inside one that follows (step 1) or precedes it (step -1). */
+/* Whether p, on this primitive, lies inside a primitive that follows (step 1) or precedes it (step -1). */
 static bool hidden_along(const struct curves *c, uint32_t prim, double radius, vec3 p, double slack, int step)
 {
 	double gap = 0;
@@ -110,8 +113,8 @@ static void add(struct meeting *m, enum cone_part part, int root, double t)
 		m->at[m->count++] = (struct curve_crossing){t, part, root};
 }
 
-/* Which of the parts p is on, as one bit each. on: the primitive that it was computed on, which it is on whatever the
- * rounding. */
+/* Returns the parts on which p is, one bit each. on: the primitive on which p was computed; if it is this one, p is on
+ * at least the nearest part, whatever the rounding. */
 static unsigned parts_at(const struct meeting *m, vec3 p, uint32_t on)
 {
 	unsigned parts = 0, nearest = 0;
@@ -152,8 +155,8 @@ static void find_candidates(struct meeting *m)
 	}
 }
 
-/* Whether the ray's line passes the axis' line at more than the larger radius. Most of the boxes that a ray enters are
- * left here. */
+/* Whether the ray's line passes the line of the axis at a distance of more than the larger radius. Most rays that enter
+ * a primitive's box end here. */
 static bool misses_cone(const struct curves *c, uint32_t prim, const struct curve_ray *r)
 {
 	uint32_t i = c->cone[prim] >> CURVE_SHIFT;
@@ -177,7 +180,7 @@ static void begin(struct meeting *m, const struct curves *c, uint32_t prim, cons
 	find_candidates(m);
 }
 
-/* Whether the ray goes along the outward normal at a point of that part. */
+/* Whether the ray leaves the curve at a point p of that part. */
 static bool is_leaving(const struct meeting *m, enum cone_part part, vec3 p)
 {
 	const struct cone *k = &m->cone;
@@ -191,7 +194,7 @@ static bool is_leaving(const struct meeting *m, enum cone_part part, vec3 p)
 	return k->cos * vec3_dot(away, d) + k->sin * vec3_length(away) * vec3_dot(k->axis, d) > 0;
 }
 
-/* It is in its part and not hidden. */
+/* Whether a crossing is in its part, not culled and not hidden. */
 static bool is_there(const struct meeting *m, const struct curve_crossing *x)
 {
 	vec3 p = vec3_madd(m->ray->o, x->t, m->ray->d);
@@ -227,7 +230,7 @@ bool curves_meet(const struct curves *c, uint32_t prim, const struct curve_ray *
 
 /* ---- points ---- */
 
-/* Mitsuba's directions across the axis: u is counted from `from` towards `to`. */
+/* Computes Mitsuba's directions perpendicular to the axis: u is counted from `from` towards `to`. */
 static void directions(vec3 axis, vec3 *from, vec3 *to)
 {
 	vec3 up = {-axis.z * axis.x, -axis.z * axis.y, 1 - axis.z * axis.z};
@@ -236,11 +239,11 @@ static void directions(vec3 axis, vec3 *from, vec3 *to)
 	*from = vec3_cross(*to, axis);
 }
 
-/* By the smallest rotation that turns one axis into the other. */
+/* Rotates a direction by the smallest rotation that turns the axis `from` into `to`. */
 static vec3 transport_direction(vec3 direction, vec3 from, vec3 to)
 {
 	double sum = 1 + vec3_dot(from, to);
-	if (!(sum > 0x1p-40)) /* turned around: it stays perpendicular */
+	if (!(sum > 0x1p-40)) /* opposite axes: the direction stays perpendicular */
 		return direction;
 	return vec3_madd(direction, -vec3_dot(to, direction) / sum, vec3_add(from, to));
 }

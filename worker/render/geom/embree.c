@@ -33,7 +33,7 @@ void embree_attach(RTCScene scene, RTCGeometry g, uint32_t id)
 	rtcReleaseGeometry(g);
 }
 
-/* Called once per thousand primitives or so, on a thread of Embree's choice. */
+/* Embree calls this about once per thousand primitives, on a thread of its choice. */
 static bool progress_monitor(void *counter, double done)
 {
 	(void)done;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Embree 3 and 4 under common names, and how trees are made: that of the world (accel.c) and those of meshes
- * (instances.c). Only these two and solved.c include this. */
+/* Common names for Embree 3 and 4, and the construction of trees: that of the world (accel.c) and those of meshes
+ * (instances.c). Only these two files and solved.c include this header. */
 #ifndef WORKER_RENDER_GEOM_EMBREE_H
 #define WORKER_RENDER_GEOM_EMBREE_H
 
@@ -21,16 +21,16 @@ typedef struct RTCIntersectContext embree_context;
 #endif
 #pragma GCC diagnostic pop
 
-RTCScene embree_scene(RTCDevice device); /* robust; NULL: no memory */
-/* The triangles of a shape, whose arrays must outlive it. NULL: no memory. */
+RTCScene embree_scene(RTCDevice device); /* a new scene in robust mode; NULL if out of memory */
+/* Returns a geometry with the triangles of a shape, whose arrays must outlive it. NULL if out of memory. */
 RTCGeometry embree_triangles(RTCDevice device, const struct accel_shape *s);
-/* Commits a geometry and gives it to the scene under that number. */
+/* Commits a geometry and attaches it to the scene with that ID. */
 void embree_attach(RTCScene scene, RTCGeometry g, uint32_t id);
-/* Builds the tree; the device reports what fails. Counts as progress (common/base/liveness.h). */
+/* Builds the tree. Errors are reported through the device. Counts as progress (common/base/liveness.h). */
 void embree_build(RTCScene scene);
 void embree_bounds(RTCScene scene, vec3 *low, vec3 *high);
 
-/* The functions of primitives that are intersected by our own callbacks. */
+/* The callbacks of primitives that we intersect ourselves. */
 struct embree_ops {
 	RTCBoundsFunction bounds;
 	RTCIntersectFunctionN intersect;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Triangles are sorted by their planes, rounded to a grid in which axes and the plane through the origin are in the
- * middle of a cell; a plane divided by the grid counts as two. */
+/* Triangles are sorted by their planes, rounded to a grid. The axes and planes through the origin lie in the middle of
+ * a grid cell; a plane on the border of two cells counts as two planes. */
 #include "worker/render/geom/flat_parts.h"
 
 #include "common/base/liveness.h"
@@ -43,7 +43,7 @@ static int32_t on_grid(double x)
 	return (int32_t)lrint(fmin(fmax(x, -4), 4) * GRID);
 }
 
-/* The mesh fits into the unit sphere. */
+/* on_grid suffices for distances because the mesh fits into the unit sphere. */
 static struct face face_of(const struct accel_shape *s, uint32_t prim)
 {
 	const struct triangle t = triangle_from(s->position, s->index[prim]);

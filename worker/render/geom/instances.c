@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Builds a tree for each mesh. Embree's callbacks transform a query of the world into a segment in the mesh's frame.
- * The segment ends where the query does, or where it leaves the mesh's box, so all its numbers are of the order of the
- * mesh's size.
+ * Instances of meshes. instances_init builds a tree for each mesh. Embree's callbacks transform a query from world
+ * space into a segment in the mesh's frame. The segment ends where the query does, or where it leaves the mesh's box,
+ * so all its numbers are of the order of the mesh's size.
  *
- * Only building fails, without memory. A query that does not meet the mesh's box meets nothing.
+ * Only building fails, if out of memory. A query that does not meet the mesh's box meets nothing.
  */
 #include "worker/render/geom/instances.h"
 
@@ -17,15 +17,16 @@ struct within {
 	embree_context context;
 	const struct query *q;
 	uint32_t shape;
-	const struct placement *place; /* at the query's time */
-	struct placement room;	       /* for one that moves */
-	vec3 from, d;		       /* start of the segment; unit direction */
-	double length, t0, t1;	       /* the part of the query from t0 to t1 */
-	double reach;		       /* the error bound of Embree's floats */
-	double before, beyond;	       /* Embree's ray is longer by this at its ends, see query_lowness */
+	const struct placement *place; /* placement at the query's time */
+	struct placement room;	       /* room for the placement of an instance that moves */
+	vec3 from, d;		       /* start and unit direction of the segment */
+	/* Length of the segment, which is the part of the query from t0 to t1. */
+	double length, t0, t1;
+	double reach;	       /* error bound of Embree's floats */
+	double before, beyond; /* Embree's ray is longer by this at its ends, see query_lowness */
 };
 
-/* As in accel.c: both ends are so high over the triangle's plane that rounding cannot change the side. */
+/* As in accel.c: whether both ends are so high over the triangle's plane that rounding cannot change their sides. */
 static bool clearly_crosses(const struct within *w, const struct RTCHit *hit, const struct RTCRay *ray)
 {
 	vec3 n = {(double)hit->Ng_x, (double)hit->Ng_y, (double)hit->Ng_z};
@@ -106,7 +107,7 @@ void instances_fini(struct instances *s)
 
 /* ---- Embree's callbacks */
 
-/* A ray of the world may deviate from the true one. */
+/* The bounds allow for the deviation of Embree's ray from the true one. */
 static void bounds(const struct RTCBoundsFunctionArguments *args)
 {
 	const struct instances *s = args->geometryUserPtr;
@@ -122,7 +123,7 @@ static void bounds(const struct RTCBoundsFunctionArguments *args)
 	b->upper_z = (float)(m->center.z + m->half.z + r);
 }
 
-/* Clips [t0, t1] to what lies between low and high along one axis; false: nothing is left. */
+/* Clips [t0, t1] to the range between low and high along one axis. Returns false if nothing is left. */
 static bool clip(double o, double d, double low, double high, double *t0, double *t1)
 {
 	if (d == 0)
@@ -133,7 +134,7 @@ static bool clip(double o, double d, double low, double high, double *t0, double
 	return *t0 <= *t1;
 }
 
-/* The unit normal, in the mesh's frame, of the surface that an end is on; 0: on none. */
+/* Returns the unit normal, in the mesh's frame, of the surface on which an end is; 0 if it is on none. */
 static vec3 normal_at(const struct placement *m, const struct ray_end *end)
 {
 	vec3 n = end ? placement_normal_back(m, end->ng) : (vec3){0, 0, 0};
@@ -141,14 +142,14 @@ static vec3 normal_at(const struct placement *m, const struct ray_end *end)
 	return length > 0 ? vec3_scale(1 / length, n) : n;
 }
 
-/* Lifts from a surface with normal n to the side that d leaves for; the ray is longer by query_lowness. */
+/* Lifts p off a surface with normal n, to the side into which d leaves; *longer: the extra length by query_lowness. */
 static vec3 lift_off_surface(vec3 p, vec3 n, vec3 d, double reach, double *longer)
 {
 	*longer = reach * query_lowness(n, d);
 	return vec3_madd(p, copysign(reach, vec3_dot(n, d)), n);
 }
 
-/* The part of the query up to t_max that is inside the instance's box; false: none. */
+/* Computes the part of the query up to t_max that is inside the instance's box. Returns false if there is none. */
 static bool enter_instance(struct within *w, const struct instances *s, const struct instance *it,
 			   const struct query *q, double t_max)
 {
@@ -180,7 +181,8 @@ static bool enter_instance(struct within *w, const struct instances *s, const st
 	return w->length > 0 && vec3_is_finite(w->d);
 }
 
-/* The float ray starts before the segment, and ends after it, by the error bound of floats, unless it is clipped. */
+/* Fills in the float ray, which starts before the segment and ends after it by the error bound of floats, except where
+ * the query's t_min clips it. */
 static void fill_ray(const struct within *w, struct RTCRay *ray)
 {
 	vec3 o = vec3_madd(w->from, -w->before, w->d);
@@ -196,7 +198,8 @@ static void fill_ray(const struct within *w, struct RTCRay *ray)
 			       .mask = 0xFFFFFFFFu};
 }
 
-/* The hit as a fraction of the query: Embree's, or that of the triangle's plane if Embree's precision allows it. */
+/* Returns the distance of a hit in units of q->d: that of the triangle's plane if it agrees with Embree's within the
+ * precision of floats, otherwise Embree's. */
 static double place_of_hit(const struct within *w, const struct RTCRayHit *rh)
 {
 	double share = (w->t1 - w->t0) / w->length, t = w->t0 + ((double)rh->ray.tfar - w->before) * share;

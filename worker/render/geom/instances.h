@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Instances of meshes: one Embree tree for each mesh, in the mesh's own frame, and one user geometry with all instances
- * as primitives. A ray that enters the box of one is transformed into the mesh's frame in double, starts where it
- * enters that box, and only then becomes float. Embree's own instances would round transform and ray in the world, so
- * their errors would be proportional to the scene instead of the mesh. What Embree proposes is checked in the world, as
- * everywhere (accel.h).
+ * as primitives. A ray that enters the box of an instance is transformed into the mesh's frame in double, starts where
+ * it enters that box, and only then becomes float. Embree's own instances would round the transform and the ray in
+ * world space, so their errors would be proportional to the scene instead of the mesh. The hits that Embree proposes
+ * are checked in world space, as everywhere (accel.h).
  *
  * Runs inside Embree's traversal: any thread; allocates nothing there.
  */
@@ -15,9 +15,9 @@
 
 struct instance_tree {
 	RTCScene scene;
-	vec3 low, high; /* of the mesh, in its frame */
-	double reach;	/* the error bound of Embree's floats in it */
-	bool mirrored;	/* its triangles are wound as for mirrored instances */
+	vec3 low, high; /* bounding box of the mesh, in its frame */
+	double reach;	/* error bound of Embree's floats in the mesh's frame */
+	bool mirrored;	/* its triangles are wound as in mirrored instances */
 };
 
 struct instance {
@@ -27,16 +27,19 @@ struct instance {
 struct instances {
 	const struct accel_shape *shapes;
 	uint32_t tree_count, count;
-	struct instance_tree *trees; /* one per mesh */
+	struct instance_tree *trees; /* one for each mesh */
 	struct instance *list;
-	double off, off_far; /* the error bound of a ray of the world at p: off + off_far |p| */
+	/* Error bound of a ray in world space at p: off + off_far |p|. */
+	double off, off_far;
 };
 
-/* For all shapes with a placement. The device reports Embree's errors. -ENOMEM. */
+/* Builds the trees for all shapes with a placement. Embree's errors are reported through the device. Returns
+ * -ENOMEM if out of memory. */
 int instances_init(struct instances *s, RTCDevice device, const struct accel_shape *shapes, uint32_t count);
 void instances_fini(struct instances *s);
 
-/* Their data is a struct instances, which must outlive the geometry, with off and off_far set when it is committed. */
+/* Callbacks whose user data is a struct instances. It must outlive the geometry, and off and off_far must be set when
+ * the geometry is committed. */
 extern const struct embree_ops instances_ops;
 
 #endif

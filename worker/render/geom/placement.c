@@ -9,7 +9,7 @@ static vec3 matrix_row(const mat4 *m, int k)
 	return (vec3){m->m[k][0], m->m[k][1], m->m[k][2]};
 }
 
-/* The Frobenius norm of the linear part; at most sqrt(3) times the largest stretch. */
+/* Returns the Frobenius norm of the linear part; at most sqrt(3) times the largest stretch. */
 static double norm(const mat4 *m)
 {
 	double a = vec3_length(matrix_row(m, 0)), b = vec3_length(matrix_row(m, 1)), c = vec3_length(matrix_row(m, 2));
@@ -56,7 +56,8 @@ bool placement_make(struct placement *p, const mat4 *m, vec3 low, vec3 high)
 	return true;
 }
 
-/* Between keyframes columns are no longer than at one of them, so that what holds there holds everywhere. */
+/* Checks the keyframes only: between keyframes the columns are no longer than at one of them, so what holds at the
+ * keyframes holds everywhere. */
 bool placement_make_moving(struct placement *p, const struct movement *m)
 {
 	double off = 0;
@@ -82,7 +83,7 @@ void placement_move(const struct placement *p, double time, struct placement *ou
 {
 	const struct movement *m = p->moves;
 	mat4 at = motion_at(&m->motion, time), inverse;
-	/* It has one: S is definite at the keyframes, and so between them. */
+	/* The inverse exists: S is definite at the keyframes, and so between them. */
 	if (!mat4_invert(at, &inverse))
 		inverse = at;
 	fill(out, &at, &inverse, m->low, m->high);

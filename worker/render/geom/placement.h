@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Where one instance of a mesh is. The mesh has float vertices in a frame of its own, in which it fits into the unit
- * sphere; the instance's vertices are these in double, transformed into the world whenever they are read. So everything
- * decided by planes and computed in double happens in the world, and two triangles that share a vertex share it there,
- * to the bit. Pure; any thread.
+ * The placement of one instance of a mesh. The mesh has float vertices in a frame of its own, in which it fits into the
+ * unit sphere; the instance's vertices are these in double, transformed to world space whenever they are read. So every
+ * decision about planes and every computation in double happens in world space, and two triangles that share a vertex
+ * share it there to the bit. Pure; any thread.
  */
 #ifndef WORKER_RENDER_GEOM_PLACEMENT_H
 #define WORKER_RENDER_GEOM_PLACEMENT_H
@@ -11,34 +11,38 @@
 #include "worker/render/geom/triangle.h"
 #include "worker/render/math/motion.h"
 
-/* How an instance moves: from the mesh's frame, in which this is its bounding box, to the world. */
+/* The movement of an instance from the mesh's frame, in which its bounding box is given, to the world. */
 struct movement {
 	struct motion motion;
 	vec3 low, high;
 };
 
 struct placement {
-	vec3 x, y, z, at;	      /* columns: p in the world is x p.x + y p.y + z p.z + at */
-	vec3 back[3];		      /* rows of the inverse of x, y, z */
-	vec3 center, half;	      /* the bounding box, in the world */
-	double rounding;	      /* rounding error of world coordinates, in the mesh's frame */
-	double vertex_is_off;	      /* error of rounding to float in the mesh's frame, in the world */
-	uint32_t first;		      /* the first shape that is an instance of the same mesh */
-	bool mirrored;		      /* its triangles are wound opposite to the mesh's frame */
-	const struct movement *moves; /* NULL: it is still. Otherwise this is where it is when the shutter opens, except
-					 that center, half and vertex_is_off hold for all times */
+	vec3 x, y, z, at;  /* matrix columns: p maps to x p.x + y p.y + z p.z + at in world space */
+	vec3 back[3];	   /* rows of the inverse of the matrix x, y, z */
+	vec3 center, half; /* bounding box in world space */
+	/* Rounding error of world coordinates, expressed in the mesh's frame. */
+	double rounding;
+	/* Error of rounding vertices to float in the mesh's frame, expressed in world space. */
+	double vertex_is_off;
+	uint32_t first; /* index of the first shape that is an instance of the same mesh */
+	bool mirrored;	/* its triangles are wound in the opposite sense to those in the mesh's frame */
+	/* NULL: the instance does not move. Otherwise this is its placement when the shutter opens, except that center,
+	 * half and vertex_is_off hold for all times. */
+	const struct movement *moves;
 };
 
-/* m: affine, from the mesh's frame, in which this is its bounding box, to the world. false: it has no inverse, or is
- * so uneven that lengths differ by more than 2^16, or so small relative to the world (2^-80) that products of its
- * lengths would underflow. */
+/* Makes a placement from an affine map m from the mesh's frame, in which low and high bound it, to the world. Returns
+ * false if m has no inverse, is so uneven that its scales in different directions differ by more than 2^16, or is so
+ * small relative to the world (2^-80) that products of lengths would underflow. */
 bool placement_make(struct placement *p, const mat4 *m, vec3 low, vec3 high);
 
-/* The same for an instance that moves; m must outlive it. */
+/* placement_make_moving is like placement_make(), but for an instance that moves; m must outlive the placement.
+ * placement_move returns the placement at a time. */
 bool placement_make_moving(struct placement *p, const struct movement *m);
 void placement_move(const struct placement *p, double time, struct placement *out);
 
-/* Where it is at that time; room: for one that moves. */
+/* Returns the placement at a time; `room` is used if the instance moves. */
 static inline const struct placement *placement_at(const struct placement *p, double time, struct placement *room)
 {
 	if (!p->moves)
@@ -47,7 +51,7 @@ static inline const struct placement *placement_at(const struct placement *p, do
 	return room;
 }
 
-/* Whether lengths differ by no more than that. */
+/* Whether the scales of m in different directions differ by no more than the limit of placement_make(). */
 bool placement_is_even(const mat4 *m);
 
 static inline vec3 placement_vector(const struct placement *m, vec3 v)
@@ -60,7 +64,7 @@ static inline vec3 placement_point(const struct placement *m, vec3 p)
 	return vec3_add(placement_vector(m, p), m->at);
 }
 
-/* Unit. */
+/* Transforms a normal to world space and normalises it. */
 static inline vec3 placement_normal(const struct placement *m, vec3 n)
 {
 	return vec3_normalize(vec3_madd(vec3_madd(vec3_scale(n.x, m->back[0]), n.y, m->back[1]), n.z, m->back[2]));
@@ -76,13 +80,14 @@ static inline vec3 placement_point_back(const struct placement *m, vec3 p)
 	return placement_vector_back(m, vec3_sub(p, m->at));
 }
 
-/* Not normalised. */
+/* Transforms a normal to the mesh's frame without normalising it. */
 static inline vec3 placement_normal_back(const struct placement *m, vec3 n)
 {
 	return (vec3){vec3_dot(m->x, n), vec3_dot(m->y, n), vec3_dot(m->z, n)};
 }
 
-/* Edges are computed from the mesh's own, so that they keep their precision however far away it is. */
+/* Edges are computed from those in the mesh's frame, so that they keep their precision however
+ * far away the instance is. */
 static inline struct triangle placement_triangle(const struct placement *m, const float (*position)[3],
 						 const uint32_t i[3])
 {

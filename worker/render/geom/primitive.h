@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Shapes as they are traced, their primitives, and ends of rays on them. Lengths are those of the rescaled world. */
+/* Shapes as they are traced, their primitives, and the ends of rays on them. Lengths are those of the rescaled
+ * world. */
 #ifndef WORKER_RENDER_GEOM_PRIMITIVE_H
 #define WORKER_RENDER_GEOM_PRIMITIVE_H
 
@@ -8,33 +9,35 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Where surfaces coincide, only the one of the lowest rank is present. */
+/* Ranks of surfaces. Where surfaces coincide, only the one of the lowest rank is present. */
 enum surface_rank {
 	SURFACE_SHINES,
 	SURFACE_OPAQUE,
 	SURFACE_TRANSMITS,
-	SURFACE_PASSES, /* transmits straight through: null, mask */
+	SURFACE_PASSES, /* transmits light straight through: null, mask */
 	SURFACE_RANKS
 };
 
 struct accel_shape {
 	bool is_sphere;
-	vec3 center; /* sphere */
+	vec3 center; /* for spheres */
 	double radius;
-	uint32_t vertex_count, triangle_count; /* otherwise triangles; the arrays must outlive the accel and be readable
-						  up to 16 bytes from the start of the last vertex */
+	/* For triangle meshes. The arrays must outlive the accel and be readable up to 16 bytes from the
+	 * start of the last vertex. */
+	uint32_t vertex_count, triangle_count;
 	const float (*position)[3];
 	const uint32_t (*index)[3];
 	enum surface_rank rank;
-	const struct placement *place; /* where this instance of a mesh is, or how a sphere moves; NULL: positions are
-					  in world space */
-	const double (*unrounded)[3];  /* vertices in double, for a shape too large for floats relative to small ones;
-					  NULL: position */
-	const struct curves *curves;   /* it is these, without triangles; NULL: it is none */
-	bool culled;		       /* curves: no ray meets them from inside */
+	/* The placement of this instance of a mesh, or the movement of a sphere; NULL: positions are in world space. */
+	const struct placement *place;
+	/* Vertices in double, for a shape too large for floats relative to small ones; NULL: `position` is exact. */
+	const double (*unrounded)[3];
+	/* The shape consists of these curves and has no triangles; NULL: it has no curves. */
+	const struct curves *curves;
+	bool culled; /* for curves: rays do not meet them from inside */
 };
 
-/* The triangle `prim`; time: see struct prim_ref. */
+/* Returns the triangle `prim` at a time: see struct prim_ref. */
 static inline struct triangle accel_triangle(const struct accel_shape *s, uint32_t prim, double time)
 {
 	const uint32_t *i = s->index[prim];
@@ -45,7 +48,7 @@ static inline struct triangle accel_triangle(const struct accel_shape *s, uint32
 			: triangle_from(s->position, i);
 }
 
-/* Whether it is an instance of a mesh. A sphere with a placement moves. */
+/* Whether the shape is an instance of a mesh. A sphere with a placement is not; it moves. */
 static inline bool accel_is_instance(const struct accel_shape *s)
 {
 	return s->place && !s->is_sphere;
@@ -56,21 +59,21 @@ static inline bool accel_moves(const struct accel_shape *s)
 	return s->place && s->place->moves;
 }
 
-/* A primitive at a time: 0 where the shutter opens, 1 where it closes. The time matters for what moves; everything that
- * belongs to one path has the same. */
+/* A primitive and a time: 0 when the shutter opens, 1 when it closes. The time only matters for shapes that move.
+ * Everything that belongs to one path has the same time. */
 struct prim_ref {
 	uint32_t shape, prim;
 	double time;
 };
 #define PRIM_NONE ((struct prim_ref){UINT32_MAX, UINT32_MAX, 0})
 
-/* On no primitive, at that time. */
+/* A reference to no primitive, with a time. */
 static inline struct prim_ref prim_none_at(double time)
 {
 	return (struct prim_ref){UINT32_MAX, UINT32_MAX, time};
 }
 
-/* An end of a ray or segment: position, primitive, and unit geometric normal there (0: not on a surface). */
+/* An end of a ray or segment: position, primitive, and the unit geometric normal there (0: not on a surface). */
 struct ray_end {
 	vec3 p, ng;
 	struct prim_ref prim;
@@ -78,8 +81,9 @@ struct ray_end {
 
 struct ray_hit {
 	struct prim_ref prim;
-	double t;    /* approximately */
-	double u, v; /* Embree's barycentrics, for rays in the triangle's plane */
+	double t; /* approximate distance */
+	/* Embree's barycentrics, used for rays that lie in the triangle's plane; for curves, the part and the root. */
+	double u, v;
 };
 
 #endif

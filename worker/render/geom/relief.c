@@ -8,7 +8,7 @@ struct bent {
 	vec3 m, dm;
 };
 
-/* The tangent t made orthogonal to n and lifted by the slope; and its derivative. */
+/* Computes the tangent t made orthogonal to n and lifted by the slope, and its derivative if d is given. */
 static void lift_tangent(const struct relief_site *s, const struct relief_step *d, vec3 t, vec3 dt, double slope,
 			 double dslope, struct bent *out)
 {
@@ -28,20 +28,21 @@ static void bend_height(const struct relief_site *s, const struct relief_step *d
 	     none = {0, 0, 0};
 	lift_tangent(s, d, s->tu, d ? d->dtu : none, s->unit * h->x.x, change.x, &a);
 	lift_tangent(s, d, s->tv, d ? d->dtv : none, s->unit * h->x.y, change.y, &b);
-	/* Texture coordinates may be mirrored. */
+	/* The sign accounts for mirrored texture coordinates. */
 	double hand = vec3_dot(vec3_cross(s->tu, s->tv), s->n) < 0 ? -1 : 1;
 	out->m = vec3_scale(hand, vec3_cross(a.m, b.m));
 	if (d)
 		out->dm = vec3_scale(hand, vec3_add(vec3_cross(a.dm, b.m), vec3_cross(a.m, b.dm)));
 }
 
-/* Whether texture coordinates are mirrored, seen from outside with v pointing down. */
+/* Whether the texture coordinates are mirrored, as seen from outside with v pointing down. */
 static bool is_mirrored(const struct relief_site *s)
 {
 	return vec3_dot(vec3_cross(s->tu, s->tv), s->n) > 0;
 }
 
-/* The frame turns with n, and around it with the axis: as in worker/render/halfvec/constraint.c. */
+/* Bends the normal by a normal map. The frame turns with n, and around n with the axis: see
+ * worker/render/halfvec/constraint.c. */
 static void bend_normal(const struct relief_site *s, const struct relief_step *d, struct relief_value *l, bool turned,
 			struct bent *out)
 {
@@ -62,7 +63,7 @@ static void bend_normal(const struct relief_site *s, const struct relief_step *d
 			   vec3_madd(vec3_madd(vec3_scale(l->x.x, ds), l->x.y, dt), l->x.z, d->dn));
 }
 
-/* false: the surface keeps its normal. */
+/* Computes the bent normal. Returns false if the surface keeps its normal. */
 static bool apply_relief(const struct relief *r, const struct relief_site *s, const struct relief_step *d,
 			 struct bent *out)
 {

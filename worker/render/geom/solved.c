@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Embree asks for the bounds of a primitive, and whether a ray meets it. A sphere is met at the roots of a quadratic, a
- * triangle where the ray crosses its plane, a curve as in curves.h, all in double; what surfaces coincide with, and on
- * which primitives the ray starts and ends, is asked as for the triangles that Embree intersects itself. One that moves
- * is where it is at the query's time, in bounds that hold for all times.
+ * Callbacks by which Embree gets the bounds of a primitive and finds out whether a ray meets it. A sphere is met at the
+ * roots of a quadratic, a triangle where the ray crosses its plane, a curve as in curves.h, all in double. Coinciding
+ * surfaces and the primitives on which the ray starts and ends are treated as for the triangles that Embree intersects
+ * itself. A primitive that moves is placed where it is at the query's time; its bounds hold for all times.
  *
  * Nothing fails here: comparisons are such that a root that is NaN is no hit.
  */
@@ -17,7 +17,8 @@ bool query_crosses(const struct query *q, const struct accel_shape *s, uint32_t 
 	return (start > 0 && beyond > 0) || (start < 0 && beyond < 0);
 }
 
-/* Rays more grazing than this lose hits that are closer to the surface they leave than the error of floats. */
+/* A ray that leaves a surface at an angle whose sine is less than 1 / LOWEST may lose hits that are closer to the
+ * surface than the error of floats. */
 #define LOWEST 64.0
 
 double query_lowness(vec3 n, vec3 d)
@@ -56,14 +57,14 @@ static void put_bounds(vec3 c, vec3 h, double r, struct RTCBounds *b)
 	b->upper_z = (float)(c.z + h.z + r);
 }
 
-/* Enlarged as those of a sphere that is still. */
+/* The bounds of a moving primitive, enlarged like those of a sphere that does not move. */
 static void bounds_of_moving(const struct placement *p, struct RTCBounds *b)
 {
 	vec3 c = p->center, h = p->half;
 	put_bounds(c, h, 0x1p-20 * (fmax(h.x, fmax(h.y, h.z)) + fabs(c.x) + fabs(c.y) + fabs(c.z)), b);
 }
 
-/* Not inline: spheres that stand still go by it. */
+/* Not inline, to keep it out of the path of spheres that do not move. */
 __attribute__((noinline)) static struct sphere_prim moved_sphere(const struct sphere_prim *s, double time)
 {
 	struct placement now;
@@ -83,9 +84,10 @@ static void sphere_bounds(const struct RTCBoundsFunctionArguments *args)
 	put_bounds(s->center, (vec3){0, 0, 0}, r, args->bounds_o);
 }
 
-/* The nearest valid root of |o + t d - c|^2 = r^2 in (t_min, t_max). If the ray starts on the sphere one root is 0,
- * if a segment ends on it one root is 1: the other follows from Vieta's formulas without cancellation. Otherwise the
- * discriminant is computed from the distance of the line to the centre (Haines et al. 2019, Ray Tracing Gems ch. 7). */
+/* Computes the nearest valid root of |o + t d - c|^2 = r^2 in (t_min, t_max). If the ray starts on the sphere one
+ * root is 0, if a segment ends on it one root is 1: the other root follows from Vieta's formulas without
+ * cancellation. Otherwise the discriminant is computed from the distance of the line to the centre (Haines et al.
+ * 2019, Ray Tracing Gems ch. 7). */
 static bool sphere_root(const struct sphere_prim *still, const struct query *q, double t_max, double *t)
 {
 	struct sphere_prim moved;
@@ -161,7 +163,7 @@ static void wide_bounds(const struct RTCBoundsFunctionArguments *args)
 					     .upper_z = high[2]};
 }
 
-/* The same as the filter for triangles intersected by Embree; these are never PRIM_NONE. */
+/* The same tests as in the filter for triangles that Embree intersects; these triangles are never PRIM_NONE. */
 static bool wide_root(const struct wide_prims *w, uint32_t prim, const struct query *q, double t_max, double *t)
 {
 	const struct prim_ref ref = {w->id, prim, q->from.time};
@@ -225,8 +227,8 @@ static struct curve_ray curve_ray_of(const struct curve_prims *c, const struct q
 				  .culled = c->culled};
 }
 
-/* Hairs are so thin that two crossings may have the same float tfar, which is compared in double. u and v: what
- * surface.h needs to find it again. */
+/* Hairs are so thin that two crossings may have the same float tfar, so they are compared in double. hit.u and hit.v
+ * hold the part and the root, from which surface.h computes the crossing again. */
 static void curve_intersect(const struct RTCIntersectFunctionNArguments *args)
 {
 	if (!args->valid[0])

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A hit becomes a site on its primitive (barycentrics, or the direction from a sphere's centre), the site a point with
- * frame and texture coordinates, and, for half vectors, the derivatives of these along two tangents; relief bends
- * normal and derivatives in the same way.
+ * Computes points on primitives. A hit is converted to coordinates on its primitive (barycentrics, or the direction
+ * from a sphere's centre), these to a point with frame and texture coordinates, and, for half vectors, to the
+ * derivatives of the frame along two tangents. Relief bends the normal and its derivatives in the same way.
  *
  * Nothing fails: if texture coordinates are degenerate, another tangent is used that turns as little as possible, and a
  * normal of zero length is replaced by the geometric one.
@@ -17,8 +17,8 @@ static vec3 vertex_at(const float (*a)[3], uint32_t i)
 	return (vec3){(double)a[i][0], (double)a[i][1], (double)a[i][2]};
 }
 
-/* Moves a point of the triangle's plane that is outside to the nearest one inside. Clamping each barycentric
- * separately would move along a sliver by as many of its widths as they are off. */
+/* Moves a point in the triangle's plane that is outside the triangle to the nearest point inside. Clamping each
+ * barycentric separately would move it along a sliver by as many of the sliver's widths as it is off. */
 static void move_inside(vec3 e1, vec3 e2, double *b1, double *b2)
 {
 	const double start[3][2] = {{0, 0}, {0, 0}, {1, 0}}, step[3][2] = {{1, 0}, {0, 1}, {-1, 1}};
@@ -37,8 +37,8 @@ static void move_inside(vec3 e1, vec3 e2, double *b1, double *b2)
 	}
 }
 
-/* Barycentrics of the ray's crossing with the triangle's plane, clamped to the triangle, since Embree reported a
- * hit. false: the ray is in the plane. */
+/* Computes the barycentrics of the ray's crossing with the triangle's plane, clamped to the triangle because Embree
+ * reported a hit. Returns false if the ray is in the plane. */
 static bool solve_triangle(vec3 o, vec3 d, vec3 v0, vec3 e1, vec3 e2, double *b1, double *b2)
 {
 	vec3 h = vec3_cross(d, e2), s = vec3_sub(o, v0), q = vec3_cross(s, e1);
@@ -55,8 +55,8 @@ static bool solve_triangle(vec3 o, vec3 d, vec3 v0, vec3 e1, vec3 e2, double *b1
 	return true;
 }
 
-/* A tangent that turns as little as possible from one triangle to the next: the shortest rotation from r to n
- * applied to a. Half vectors are coordinates in frames, and frames along edges would turn at random. Every such
+/* Returns a tangent that turns as little as possible from one triangle to the next: the shortest rotation from r to n
+ * applied to a. Half vectors are coordinates in frames, and frames aligned with edges would turn at random. Every such
  * field has a singularity; this one's is at n = -r, which few surfaces face. */
 static vec3 carried_axis(vec3 n)
 {
@@ -65,10 +65,10 @@ static vec3 carried_axis(vec3 n)
 	return k > 0x1p-20 ? vec3_madd(a, -vec3_dot(a, n) / k, vec3_add(r, n)) : a;
 }
 
-/* dp/du and dp/dv from the texture coordinates. */
+/* dp/du and dp/dv, computed from the texture coordinates. */
 struct tangents {
 	vec3 u, v;
-	bool any; /* false: missing or degenerate */
+	bool any; /* false: texture coordinates are missing or degenerate */
 };
 
 static struct tangents tangents_of(const struct geom_shape *s, const uint32_t i[3], vec3 e1, vec3 e2)
@@ -89,13 +89,13 @@ static struct tangents tangents_of(const struct geom_shape *s, const uint32_t i[
 	return t;
 }
 
-/* A shape where it is at a time. */
+/* A shape in its position at a time. */
 struct posed {
 	struct geom_shape shape;
 	struct placement place;
 };
 
-/* Not inline: shapes that stand still go by it. */
+/* Not inline, to keep it out of the path of shapes that do not move. */
 __attribute__((noinline)) static const struct geom_shape *pose_moving(const struct geom_shape *s, double time,
 								      struct posed *room)
 {
@@ -152,14 +152,14 @@ static vec3 vertex_normal(const struct geom_shape *s, uint32_t i)
 	return s->place ? placement_normal(s->place, vertex_at(s->normal, i)) : vertex_at(s->normal, i);
 }
 
-/* Not normalised. */
+/* Returns the interpolated normal, not normalised. */
 static vec3 interpolated_normal(const struct geom_shape *s, const uint32_t i[3], double b1, double b2)
 {
 	vec3 m = vec3_scale(1 - b1 - b2, vertex_normal(s, i[0]));
 	return vec3_madd(vec3_madd(m, b1, vertex_normal(s, i[1])), b2, vertex_normal(s, i[2]));
 }
 
-/* A triangle's point before relief. Without texture coordinates, barycentrics are used. */
+/* Returns a triangle's point before relief. Without texture coordinates, barycentrics are used. */
 static struct relief_site site_on_triangle(const struct geom_shape *s, const struct corner *c, const struct tangents *t,
 					   vec3 n, const struct surface_point *x)
 {
@@ -173,7 +173,8 @@ static struct relief_site site_on_triangle(const struct geom_shape *s, const str
 	return r;
 }
 
-/* Before relief. Normals that point to the back somewhere inside the triangle are unusable: shade flat. */
+/* Returns the shading normal before relief. Where the interpolated normal points to the back, the
+ * triangle is shaded flat. */
 static vec3 smooth_normal(const struct geom_shape *s, const uint32_t i[3], const struct surface_point *x)
 {
 	if (!s->normal)
@@ -182,7 +183,7 @@ static vec3 smooth_normal(const struct geom_shape *s, const uint32_t i[3], const
 	return vec3_dot(m, x->ng) > 0 ? vec3_normalize(m) : x->ng;
 }
 
-/* The interpolated tangent, not normalised. false: there is none, or opposite ones cancel. */
+/* Computes the interpolated tangent, not normalised. Returns false if there is none or opposite tangents cancel. */
 static bool smooth_axis(const struct geom_shape *s, uint32_t prim, double b1, double b2, vec3 *axis)
 {
 	if (!s->tangent)
@@ -196,7 +197,7 @@ static bool smooth_axis(const struct geom_shape *s, uint32_t prim, double b1, do
 	return true;
 }
 
-/* Everything but which primitive of which shape it is. */
+/* Fills in everything except x->shape and x->prim. */
 static void fill_triangle(const struct geom_shape *s, const uint32_t i[3], const struct corner *c, double b1, double b2,
 			  struct surface_point *x)
 {
@@ -253,7 +254,7 @@ void surface_uv(const struct geom_shape *s, struct surface_point *x)
 	sphere_uv(&s->sphere_axes, vec3_scale(s->normal_sign, x->ng), &x->u, &x->v);
 }
 
-/* A sphere's point before relief. At the poles dp/du is 0. */
+/* Returns a sphere's point before relief. At the poles dp/du is 0. */
 static struct relief_site site_on_sphere(const struct geom_shape *s, const struct surface_point *x)
 {
 	struct relief_site r = {.ng = x->ng, .n = x->ng, .axis = x->axis, .u = x->u, .v = x->v, .unit = s->unit};
@@ -266,14 +267,15 @@ static struct relief_site site_on_sphere(const struct geom_shape *s, const struc
 	return r;
 }
 
-/* Everything except which shape it is, and u and v, unless there is relief. */
+/* Fills in everything except x->shape, and u and v unless there is relief. */
 static void on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, struct surface_point *x)
 {
 	x->prim = prim;
 	x->p = vec3_madd(s->center, s->radius, w);
 	x->b1 = x->b2 = 0;
 	x->ng = vec3_scale(s->normal_sign, w);
-	/* du along the longitude: axis x normal; undefined at the poles, where frame_along chooses a frame. */
+	/* The axis is along the longitude, axis x normal. It is undefined at the poles, where
+	 * frame_along chooses a frame. */
 	x->axis = vec3_scale(2 * M_PI * s->radius, vec3_cross(s->sphere_axes.n, w));
 	vec3 n = x->ng;
 	if (s->relief) {
@@ -335,7 +337,7 @@ void surface_turn_relief(struct surface_point *x)
 	x->sh = frame_along(vec3_normalize(n), x->axis);
 }
 
-/* The hit in double: the root nearest to Embree's. */
+/* Returns the direction from the centre to the hit in double: the root nearest to Embree's. */
 static vec3 sphere_direction(const struct geom_shape *s, vec3 o, vec3 d, double t)
 {
 	vec3 oc = vec3_sub(o, s->center);
@@ -372,7 +374,7 @@ void surface_from_hit(const struct geom_shape *s, vec3 o, vec3 d, const struct r
 
 void surface_tangents(const struct surface_point *x, vec3 *du, vec3 *dv)
 {
-	/* If both normals are equal, the shading frame is this one. */
+	/* If both normals are equal, the shading frame is also the frame of ng. */
 	if (x->sh.n.x == x->ng.x && x->sh.n.y == x->ng.y && x->sh.n.z == x->ng.z) {
 		*du = x->sh.s;
 		*dv = x->sh.t;
@@ -388,8 +390,8 @@ static void change_on_sphere(const struct geom_shape *s, const struct surface_po
 	double bend = 1 / s->radius;
 	c->dn[0] = vec3_scale(s->normal_sign * bend, c->du);
 	c->dn[1] = vec3_scale(s->normal_sign * bend, c->dv);
-	/* du is axis x w, normalised. Along the circle of latitude it turns by bend around the outward direction w's
-	 * own circle and by bend cot(theta) towards the pole; along the meridian it is transported in parallel. */
+	/* du is the normalised axis x w. Per unit length along the circle of latitude, it turns by `bend` towards the
+	 * centre and by bend cot(theta) towards the pole; along the meridian it is transported in parallel. */
 	vec3 w = vec3_scale(s->normal_sign, x->ng);
 	double cosine = vec3_dot(s->sphere_axes.n, w), sine = vec3_length(vec3_cross(s->sphere_axes.n, w));
 	vec3 turn = vec3_scale(-bend, w);
@@ -419,7 +421,7 @@ static void bend_on_sphere(const struct geom_shape *s, const struct surface_poin
 	}
 }
 
-/* Gradients of the second and third barycentric. */
+/* Computes the gradients of the second and third barycentric. */
 static void barycentric_gradients(const struct corner *k, vec3 *g1, vec3 *g2)
 {
 	vec3 area = vec3_cross(k->e1, k->e2);
@@ -428,7 +430,7 @@ static void barycentric_gradients(const struct corner *k, vec3 *g1, vec3 *g2)
 	*g2 = vec3_scale(inverse, vec3_cross(area, k->e1));
 }
 
-/* How the interpolated tangent turns. */
+/* Computes the unit axis and its derivatives from the interpolated tangent. */
 static void turn_axis(const struct geom_shape *s, const struct surface_point *x, struct surface_change *c)
 {
 	vec3 a, g1, g2;
@@ -453,7 +455,7 @@ static void turn_axis(const struct geom_shape *s, const struct surface_point *x,
 	}
 }
 
-/* The normal without relief, and its derivatives in c->dn. */
+/* Returns the normal without relief and sets its derivatives in c->dn. */
 static vec3 change_on_triangle(const struct geom_shape *s, const struct surface_point *x, struct surface_change *c)
 {
 	const uint32_t *i = s->index[x->prim.prim];
@@ -484,7 +486,7 @@ static void bend_on_triangle(const struct geom_shape *s, const struct surface_po
 	struct corner k = corner_of(s, i);
 	struct tangents t = tangents_of(s, i, k.e1, k.e2);
 	struct relief_site site = site_on_triangle(s, &k, &t, n, x);
-	double t1[2] = {1, 0}, t2[2] = {0, 1}; /* derivatives of (u,v) by the barycentrics */
+	double t1[2] = {1, 0}, t2[2] = {0, 1}; /* derivatives of (u,v) with respect to the barycentrics */
 	for (int a = 0; s->uv && a < 2; a++) {
 		t1[a] = (double)s->uv[i[1]][a] - (double)s->uv[i[0]][a];
 		t2[a] = (double)s->uv[i[2]][a] - (double)s->uv[i[0]][a];

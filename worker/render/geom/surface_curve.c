@@ -1,19 +1,21 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * All derivatives follow from how a point of a cone moves: by `around` along side, by which e turns by around / x, and
- * by `up` along the surface, by which the center of its sphere moves by up / (length cos) of the axis, and on a sphere
- * the normal turns.
+ * Surface points on curves and their derivatives.
  *
- * Nothing fails: where the frame has no derivative, at the poles of spheres and at tips, it is 0.
+ * All derivatives follow from how a point of a cone moves: moving by `around` along `side` turns e by around / x;
+ * moving by `up` along the surface moves the centre of the point's sphere by up / (length cos) of the axis on the
+ * cone's side, and turns the normal on a sphere.
+ *
+ * Nothing fails: where the frame has no derivative, at the poles of spheres and at tips, the derivative is 0.
  */
 #include "worker/render/geom/surface_curve.h"
 
-/* D (surface_curve.h) at a point of a cone, and its change from end to end. */
+/* D (surface_curve.h) at a point of a cone, and its difference between the two ends. */
 struct bend {
 	vec3 d, change;
 };
 
-/* 0: the tangent points backwards or sideways, so that this end is shaded as the cone is. */
+/* Returns D at one end; 0 if the tangent points backwards or sideways, so that this end is shaded as the cone is. */
 static vec3 bend_at_end(const struct cone *k, const float tangent[3])
 {
 	vec3 t = {(double)tangent[0], (double)tangent[1], (double)tangent[2]};
@@ -33,13 +35,13 @@ static struct bend bend_of(const struct curves *c, uint32_t prim, const struct c
 	return b;
 }
 
-/* Not normalised. */
+/* Returns w - (w.D) axis (surface_curve.h), not normalised. */
 static vec3 bent(const struct curve_place *p, const struct bend *b, vec3 w)
 {
 	return vec3_madd(w, -vec3_dot(w, b->d), p->cone.axis);
 }
 
-/* The shading normal before relief, outwards; *flat: it is the geometric one. Not normalised. */
+/* Returns the outward shading normal before relief, not normalised; *flat: it is the geometric normal. */
 static vec3 outward(const struct curve_place *p, const struct bend *b, bool *flat)
 {
 	vec3 m = bent(p, b, p->n);
@@ -62,14 +64,14 @@ vec3 curve_smooth_normal(const struct geom_shape *s, const struct surface_point 
 	return vec3_scale(s->normal_sign, vec3_normalize(outward(&p, &b, &flat)));
 }
 
-/* How much v grows over the cone. */
+/* Returns by how much the texture coordinate v grows over the cone. */
 static double texture_step(const struct curves *c, uint32_t prim)
 {
 	uint32_t i = c->cone[prim] >> CURVE_SHIFT;
 	return (double)c->v[i + 1] - (double)c->v[i];
 }
 
-/* On the spheres dp/dv is 0: relief does not apply there. */
+/* Returns the point before relief. On the spheres dp/dv is 0, so relief does not apply there. */
 static struct relief_site site_at(const struct geom_shape *s, const struct surface_point *x,
 				  const struct curve_place *p, vec3 n)
 {
@@ -117,7 +119,7 @@ void curve_from_hit(const struct geom_shape *s, vec3 o, vec3 d, const struct ray
 	struct cone k = curves_cone(s->curves, hit->prim.prim);
 	enum cone_part part = hit->u < 0.5 ? CONE_START : hit->u < 1.5 ? CONE_SIDE : CONE_END;
 	double root[2], t = hit->t;
-	/* Where both have become one by rounding, Embree's is as good. */
+	/* If rounding leaves no two roots, Embree's distance is as good. */
 	if (cone_roots(&k, part, o, d, root) && isfinite(root[hit->v > 0.5]))
 		t = root[hit->v > 0.5];
 	if (part == CONE_SIDE && !(k.cos > 0))
@@ -150,9 +152,10 @@ bool curve_near(const struct geom_shape *s, struct prim_ref prim, vec3 p, struct
 
 /* ---- derivatives ---- */
 
-/* As the point moves by a unit along a tangent. */
+/* Derivatives as the point moves by a unit length along a tangent. */
 struct motion_step {
-	double turn, s; /* of e around the axis, in radians; along the axis, in lengths of it */
+	/* Turn: of e around the axis, in radians; s: along the axis, in units of the cone's length. */
+	double turn, s;
 	vec3 dn, dside;
 };
 
@@ -173,13 +176,13 @@ static struct motion_step step_along(const struct curve_place *p, vec3 tangent)
 	return m;
 }
 
-/* The derivative of bent(w) where w changes by dw. */
+/* Returns the derivative of bent(w) if w changes by dw. */
 static vec3 bent_step(const struct curve_place *p, const struct bend *b, const struct motion_step *m, vec3 w, vec3 dw)
 {
 	return vec3_madd(dw, -vec3_dot(dw, b->d) - m->s * vec3_dot(w, b->change), p->cone.axis);
 }
 
-/* The derivative of w / |w|. */
+/* Returns the derivative of w / |w|. */
 static vec3 unit_step(vec3 w, vec3 dw)
 {
 	double length = vec3_length(w);
@@ -187,7 +190,8 @@ static vec3 unit_step(vec3 w, vec3 dw)
 	return vec3_scale(1 / length, vec3_madd(dw, -vec3_dot(unit, dw), unit));
 }
 
-/* How dp/du and dp/dv change on the side: e turns, x shrinks by sin as the point moves up, and `up` turns with e. */
+/* Returns how dp/du and dp/dv change on the side: e turns, x shrinks by sin as the point moves
+ * up, and `up` turns with e. */
 static struct relief_step relief_step_of(const struct geom_shape *s, const struct surface_point *x,
 					 const struct curve_place *p, const struct motion_step *m, double up)
 {

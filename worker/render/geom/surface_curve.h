@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The part of surface.h that is about curves. dp/du runs around a curve and dp/dv along it, as in Mitsuba's
- * `linearcurve`: the shading frame's s is around and its t along.
+ * The part of surface.h for curves. dp/du runs around a curve and dp/dv along it, as in Mitsuba's `linearcurve`: the
+ * shading frame's s is around and its t along the curve.
  *
- * With tangents, shading normals are perpendicular to the tangent of the smooth curve instead of the cone's axis: with
- * D the tangent less the axis, in units of its share along the axis, a vector w perpendicular to the axis becomes
- * w - (w.D) axis, which is perpendicular to axis + D. D is interpolated along a cone. Pure; any thread.
+ * With tangents, shading normals are perpendicular to the tangent of the smooth curve instead of the cone's axis. Let D
+ * be the tangent divided by its component along the axis, minus the axis. Then a vector w perpendicular to the axis
+ * becomes w - (w.D) axis, which is perpendicular to axis + D. D is interpolated along a cone. Pure; any thread.
  */
 #ifndef WORKER_RENDER_GEOM_SURFACE_CURVE_H
 #define WORKER_RENDER_GEOM_SURFACE_CURVE_H
@@ -21,7 +21,7 @@ bool curve_near(const struct geom_shape *s, struct prim_ref prim, vec3 p, struct
 
 vec3 curve_smooth_normal(const struct geom_shape *s, const struct surface_point *x);
 struct relief_site curve_relief_site(const struct geom_shape *s, const struct surface_point *x);
-/* c has du and dv, and axis is du; the rest is 0. */
+/* Computes c->dn and c->daxis. On entry, c has du and dv, axis is du, and the rest is 0. */
 void curve_change(const struct geom_shape *s, const struct surface_point *x, struct surface_change *c);
 
 #endif

@@ -1,32 +1,36 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Shapes in the rescaled world, points on them, and how these change: what surface.h computes. */
+/* Shapes in the rescaled world, points on them, and how these points change as they move: the results of surface.h. */
 #ifndef WORKER_RENDER_GEOM_SURFACE_POINT_H
 #define WORKER_RENDER_GEOM_SURFACE_POINT_H
 
 #include "worker/render/geom/primitive.h"
 #include "worker/render/geom/relief.h"
 
-/* A shape in the rescaled world. Rays hit the floats, unless there are doubles; everything else is derived from
- * them. Instances of a mesh share its arrays. */
+/* A shape in the rescaled world. Rays hit the float positions, or the doubles if there are any; everything else is
+ * derived from them. Instances of a mesh share its arrays. */
 struct geom_shape {
 	bool is_sphere;
 	vec3 center;
 	double radius, normal_sign;
-	struct frame sphere_axes; /* of the (u,v) parametrisation: n is the pole */
+	/* Axes of the (u,v) parametrisation: n is the pole. */
+	struct frame sphere_axes;
 	uint32_t vertex_count, triangle_count;
 	float (*position)[3];
-	double (*unrounded)[3]; /* as in struct accel_shape */
+	double (*unrounded)[3]; /* see struct accel_shape */
 	uint32_t (*index)[3];
-	float (*normal)[3];	       /* NULL: flat */
-	float (*uv)[2];		       /* NULL: barycentrics are used */
-	float (*tangent)[3][3];	       /* unit, at each corner of each triangle, three times 0: it has none; NULL: dp/du
-					  is used */
-	const struct relief *relief;   /* bends shading normals; NULL: none */
-	const struct curves *curves;   /* it is these, with normal_sign; NULL: it is none */
-	bool culled;		       /* curves: no ray meets them from inside, where normals do not point */
-	const struct placement *place; /* for instances, and spheres that move; NULL: positions and normals are in world
-					  space */
-	double unit;		       /* the scene's unit of length in world units: for relief */
+	float (*normal)[3]; /* vertex normals; NULL: flat shading */
+	float (*uv)[2];	    /* NULL: barycentrics are the texture coordinates */
+	/* Unit tangents at each corner of each triangle, or 0 at all three corners of a triangle that has
+	 * none; NULL: dp/du is used. */
+	float (*tangent)[3][3];
+	const struct relief *relief; /* bends shading normals; NULL: none */
+	/* The shape consists of these curves, oriented by normal_sign; NULL: it has no curves. */
+	const struct curves *curves;
+	/* For curves: rays do not meet them from the side to which the normals do not point. */
+	bool culled;
+	/* For instances and for spheres that move; NULL: positions and normals are in world space. */
+	const struct placement *place;
+	double unit; /* the scene's unit of length in world units, for relief */
 };
 
 static inline bool surface_moves(const struct geom_shape *s)
@@ -38,20 +42,23 @@ struct surface_point {
 	vec3 p, ng;
 	struct frame sh; /* sh.n is the shading normal, bent by relief */
 	double u, v;
-	double b1, b2; /* barycentrics on a triangle; struct curve_site on a curve; 0 on a sphere */
-	vec3 axis; /* along which the shading frame is laid (frame_along): the interpolated tangent, dp/du, or another
-		  direction where there is none */
+	/* Barycentrics on a triangle; the coordinates of struct curve_site on a curve; 0 on a sphere. */
+	double b1, b2;
+	/* The direction along which the shading frame is aligned (frame_along): the interpolated tangent, dp/du, or a
+	 * substitute where neither exists. */
+	vec3 axis;
 	struct prim_ref prim;
-	const struct geom_shape *shape; /* of prim; NULL for a point that lies on none */
+	const struct geom_shape *shape; /* the shape of prim; NULL for a point that is on no shape */
 };
 
 /* Derivatives of a point's frame as it moves, per unit length, [0] along du and [1] along dv. */
 struct surface_change {
-	vec3 du, dv;   /* orthonormal, in the plane of ng: frame_along(ng, axis) */
-	vec3 dn[2];    /* of the shading normal; 0 on flat-shaded triangles */
-	vec3 axis;     /* the unit axis */
-	vec3 daxis[2]; /* of the unit axis: 0 on a triangle without tangents, turning with the meridians on a sphere
-			  and around a curve (except at their poles) */
+	vec3 du, dv; /* orthonormal, in the plane perpendicular to ng: frame_along(ng, axis) */
+	vec3 dn[2];  /* derivatives of the shading normal; 0 on flat-shaded triangles */
+	vec3 axis;   /* the unit axis */
+	/* Derivatives of the unit axis: 0 on a triangle without tangents; on a sphere and around a curve it turns with
+	 * the meridians (except at their poles). */
+	vec3 daxis[2];
 };
 
 #endif

@@ -16,8 +16,8 @@ static bool comes_first(vec3 a, vec3 b)
 	return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
 }
 
-/* On which side of the line through a and b the ray passes: the volume of d, a - o, b - o; exactly the opposite for
- * b and a. */
+/* Returns a number whose sign tells on which side of the line through a and b the ray passes: the volume spanned by d,
+ * a - o, b - o. Exchanging a and b gives exactly the opposite number. */
 static double side_of(vec3 o, vec3 d, vec3 a, vec3 b)
 {
 	bool turned = comes_first(b, a);

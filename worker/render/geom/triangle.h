@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* One triangle in double, with vertices that are mostly floats: its plane, and where a line crosses it. Pure; any
- * thread. */
+/* A triangle in double, with vertices that are usually floats: its plane, and where a line
+ * crosses it. Pure; any thread. */
 #ifndef WORKER_RENDER_GEOM_TRIANGLE_H
 #define WORKER_RENDER_GEOM_TRIANGLE_H
 
@@ -10,9 +10,9 @@
 #include <stdint.h>
 
 struct triangle {
-	vec3 v[3], n;	 /* n: not normalised */
-	double edges;	 /* bounds the terms of n */
-	double rounding; /* error of its vertices, relative to their coordinates */
+	vec3 v[3], n;	 /* vertices, and normal n, not normalised */
+	double edges;	 /* upper bound on the terms of n */
+	double rounding; /* error of the vertices, relative to their coordinates */
 };
 
 static inline vec3 triangle_vertex(const float (*position)[3], uint32_t i)
@@ -30,7 +30,7 @@ static inline double triangle_norm1(vec3 v)
 	return fabs(v.x) + fabs(v.y) + fabs(v.z);
 }
 
-/* e1, e2: v1 - v0 and v2 - v0. */
+/* e1, e2: the edges v1 - v0 and v2 - v0. */
 static inline struct triangle triangle_between(vec3 v0, vec3 v1, vec3 v2, vec3 e1, vec3 e2)
 {
 	return (struct triangle){{v0, v1, v2}, vec3_cross(e1, e2), triangle_norm1(e1) * triangle_norm1(e2), 0x1p-24};
@@ -48,7 +48,7 @@ static inline vec3 triangle_vertex_unrounded(const double (*position)[3], uint32
 	return (vec3){position[i][0], position[i][1], position[i][2]};
 }
 
-/* With vertices in double, each off by a few roundings of its inputs. */
+/* A triangle with vertices in double, each with an error of a few roundings of its inputs. */
 static inline struct triangle triangle_unrounded(const double (*position)[3], const uint32_t i[3])
 {
 	vec3 v0 = triangle_vertex_unrounded(position, i[0]), v1 = triangle_vertex_unrounded(position, i[1]),
@@ -58,8 +58,8 @@ static inline struct triangle triangle_unrounded(const double (*position)[3], co
 	return t;
 }
 
-/* Height over the plane, times |n|; 0 if p is in the plane as far as double can tell: p and n carry the rounding of
- * a few operations, whose terms `edges` bounds. */
+/* Returns the height of p over the plane, times |n|; 0 if p is in the plane as far as double can tell. p and n carry
+ * the rounding errors of a few operations, whose terms `edges` bounds. */
 static inline double triangle_height(const struct triangle *t, vec3 p)
 {
 	vec3 to = vec3_sub(t->v[0], p);
@@ -67,7 +67,7 @@ static inline double triangle_height(const struct triangle *t, vec3 p)
 	return fabs(h) <= 0x1p-49 * t->edges * (triangle_norm1(p) + triangle_norm1(to)) ? 0 : h;
 }
 
-/* The smallest of its three altitudes; 0 if it is a point. */
+/* Returns the smallest of the three altitudes; 0 if the triangle is a point. */
 static inline double triangle_altitude(const struct triangle *t)
 {
 	vec3 e[3] = {vec3_sub(t->v[1], t->v[0]), vec3_sub(t->v[2], t->v[1]), vec3_sub(t->v[0], t->v[2])};
@@ -75,11 +75,11 @@ static inline double triangle_altitude(const struct triangle *t)
 	return longest2 > 0 ? sqrt(vec3_dot(t->n, t->n) / longest2) : 0;
 }
 
-/* Largest side of its bounding box. */
+/* Returns the largest side of the bounding box. */
 float triangle_extent(const float (*position)[3], const uint32_t i[3]);
 
-/* Where o + t d crosses the plane, if that is within the triangle. Two triangles that share an edge leave no gap,
- * because both test it with the same operations. */
+/* Sets *t to where o + t d crosses the plane; returns false unless that is within the triangle. Two triangles that
+ * share an edge leave no gap, because both test it with the same operations. */
 bool triangle_meets(const struct triangle *k, vec3 o, vec3 d, double *t);
 
 #endif
