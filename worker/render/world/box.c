@@ -17,7 +17,7 @@ double box_extent(const struct box *b)
 	return fmax(b->high.x - b->low.x, fmax(b->high.y - b->low.y, b->high.z - b->low.z));
 }
 
-/* Between two planes across an axis: narrows [t[0], t[1]]. */
+/* Narrows [t[0], t[1]] to the range between two planes perpendicular to an axis. Returns false if nothing is left. */
 static bool clip_to_slab(double low, double high, double p, double d, double t[2])
 {
 	if (d == 0)

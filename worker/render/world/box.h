@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Boxes along the axes. Pure. */
+/* Axis-aligned boxes. Pure. */
 #ifndef WORKER_RENDER_WORLD_BOX_H
 #define WORKER_RENDER_WORLD_BOX_H
 
@@ -11,11 +11,11 @@ struct box {
 	vec3 low, high;
 };
 
-/* The box of no points: low above high. */
+/* Returns the box of no points, with low above high. */
 struct box box_empty(void);
 void box_grow(struct box *b, vec3 p);
-double box_extent(const struct box *b); /* its largest side */
-/* Whether the ray from p along d meets it no further than at t_max. */
+double box_extent(const struct box *b); /* length of the largest side */
+/* Whether the ray from p along d meets the box at a distance of at most t_max. */
 bool box_is_met(const struct box *b, vec3 p, vec3 d, double t_max);
 
 #endif

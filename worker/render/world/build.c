@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Builds a world: geometry in double, the scene moved into the unit sphere, floats (geometry.c); then BSDFs, emitters,
- * effects and what they omit, and last Embree's structure, before which render_check stops in large scenes.
+ * Builds a world in the order of prepare(): settings; geometry in double, moved into the unit sphere and rounded to
+ * float (geometry.c); BSDFs, media and emitters; effects and what they make unnecessary. Last comes Embree's tree,
+ * which render_check does not build for large scenes.
  *
- * Failures have the object's place and leave nothing behind: the world is one arena. Surfaces that coincide are notes,
- * not errors.
+ * Errors name the object's place in the scene file and leave nothing behind, because the world is one arena. Coinciding
+ * surfaces are reported as notes, not errors.
  */
 #include "worker/render/world/build.h"
 
@@ -32,7 +33,7 @@
 
 #include <string.h>
 
-/* Bytes that Embree needs per triangle, per segment of a curve, and per shape with the data of accel.c. */
+/* Bytes that Embree needs per triangle, per segment of a curve, and per shape, including the data of accel.c. */
 enum { EMBREE_TRIANGLE = 150, EMBREE_SEGMENT = 140, EMBREE_SHAPE = 320 };
 
 static struct attribute_table attributes_of(struct builder *b, uint32_t shape)
@@ -61,7 +62,7 @@ static bool backs_are_black(const struct builder *b)
 	return backs > SETTING_BACKS_AUTO ? backs > SETTING_BACKS_LIT : b->scene->black_backs;
 }
 
-/* In 0.6 a shape that bounds a medium and has no BSDF lets light through: the node of a `null` in its place. */
+/* In Mitsuba 0.6 a shape that bounds a medium and has no BSDF lets light through: makes the node of a `null` for it. */
 static const struct scene_node *add_null(struct builder *b, const struct scene_node *shape)
 {
 	struct scene_node *n = arena_alloc(&b->scratch, 1, sizeof *n);
@@ -80,9 +81,9 @@ static void set_volumes(struct builder *b)
 					   .scale = b->w->scale};
 }
 
-/* One BSDF per node, however many shapes refer to it, unless it uses the shape's attributes: then one per mesh,
- * which instances share, or one per shape if it shows edges. The default is grey, or black for emitters, or in 0.6 none
- * for media. */
+/* Uses BSDF number `bsdf` for a shape. There is one BSDF per node, however many shapes refer to it, unless it uses the
+ * shape's attributes: then there is one per mesh, which instances share, or one per shape if it shows edges. The
+ * default is grey; black for emitters; and, in 0.6, `null` for shapes that bound media. */
 static void set_bsdf(struct world *w, uint32_t shape, uint32_t bsdf)
 {
 	struct geom_shape *g = &w->shapes[shape];
@@ -94,10 +95,10 @@ static void set_bsdf(struct world *w, uint32_t shape, uint32_t bsdf)
 static int create_bsdfs(struct builder *b)
 {
 	struct world *w = b->w;
-	/* one more, for shapes that no path meets */
+	/* One more BSDF is for shapes that no path meets. */
 	w->bsdfs = arena_alloc(&w->arena, (size_t)w->shape_count + 1, sizeof *w->bsdfs);
 	b->bsdf_nodes = arena_alloc(&b->scratch, w->shape_count, sizeof(void *));
-	struct node_table made; /* a mesh is identified by its triangles */
+	struct node_table made; /* meshes are identified by their index arrays */
 	if (!w->bsdfs || !b->bsdf_nodes || node_table_init(&made, w->shape_count, &b->scratch))
 		return build_out_of_memory(b->e);
 	struct boundary_table *boundaries = NULL;
@@ -219,7 +220,7 @@ static int create_emitters(struct builder *b)
 	build.attributes = NULL;
 	for (uint32_t i = 0; i < s->object_count; i++) {
 		const struct scene_node *n = s->objects[i];
-		/* A separate area emitter exists for shapes to refer to. */
+		/* An area emitter outside of shapes exists only for shapes to refer to. */
 		if (n->cls != PLUGIN_EMITTER || (n->id && emitter_needs_surface(n)))
 			continue;
 		struct emitter *em = &w->emitters[w->emitter_count];
@@ -263,8 +264,8 @@ static int choose_emitters(struct builder *b)
 	return 0;
 }
 
-/* The colour of the grey value 1: the common illuminant's, as of an emitter of rgb 1 or constant 1. By the midpoint
- * rule; the density with which wavelengths are drawn cancels. */
+/* Computes the colour of the grey value 1: that of the emitters' common spectrum, as for an emitter with rgb 1 or a
+ * constant spectrum 1. Uses the midpoint rule; the density with which wavelengths are drawn cancels. */
 static void set_grey(struct world *w)
 {
 	for (int i = 0; i < 3; i++)
@@ -286,7 +287,8 @@ static void set_grey(struct world *w)
 static int build_accel(struct builder *b)
 {
 	struct world *w = b->w;
-	/* The meshes as read take half of the memory that Embree is about to need, so they are freed first. */
+	/* The meshes as they were read take half of the memory that Embree is about to need, so they are freed
+	 * first. */
 	arena_fini(&b->scratch);
 	struct accel_shape *s = coincident_shapes(w, &b->scratch);
 	if (!s)
@@ -300,7 +302,8 @@ static int find_coincidence(struct builder *b)
 	return s ? coincident_find(b->w, b->shape_nodes, s, b->e) : build_out_of_memory(b->e);
 }
 
-/* Adds shape i, in the world's lengths. The box is a little larger than the shape, which was rounded to floats. */
+/* Adds the box of shape i, converted to world lengths. It is slightly enlarged because the shape was rounded to
+ * floats. */
 static void add_to_box(const struct builder *b, uint32_t i, struct box *box)
 {
 	const struct world *w = b->w;
@@ -312,7 +315,7 @@ static void add_to_box(const struct builder *b, uint32_t i, struct box *box)
 	}
 }
 
-/* Makes w->passed and w->refracting. */
+/* Computes w->passed and w->refracting. */
 static void bound_shadows(struct builder *b)
 {
 	struct world *w = b->w;
@@ -351,7 +354,7 @@ static int find_effects(struct builder *b, uint32_t max_depth)
 	return w->effects.refracted_shadows && refracting_points_make(w) < 0 ? build_out_of_memory(b->e) : 0;
 }
 
-/* Everything but Embree: all effects are known before that is built. */
+/* Builds everything except Embree's tree, before which all effects must be known. */
 static int prepare(struct builder *b, const struct render_options *o)
 {
 	int rc = effects_parse(o ? o->effects : "", &b->forced, b->e);
@@ -397,7 +400,7 @@ static int prepare(struct builder *b, const struct render_options *o)
 	return rc;
 }
 
-/* They are black by the file's rule, not by the user's choice. */
+/* Whether backs are black by the file's rule rather than by the user's choice. */
 static bool backs_may_surprise(const struct builder *b)
 {
 	return b->w->accuracy.backs <= SETTING_BACKS_AUTO && backs_are_black(b);
@@ -408,7 +411,8 @@ static uint32_t segments_of(const struct geom_shape *g)
 	return g->curves ? g->curves->count : 0;
 }
 
-/* A check needs no tree, but building one to report black backs is worth a fraction of a second. */
+/* Whether Embree's tree is quick to build. A check does not need it, but reporting black backs is
+ * worth a fraction of a second. */
 static bool is_quick_to_build(const struct world *w)
 {
 	enum { QUICK = 1 << 18 };
@@ -489,7 +493,7 @@ double world_brightest(const struct world *w)
 	double most = 0;
 	for (uint32_t i = 0; i < w->emitter_count; i++)
 		most = fmax(most, w->emitters[i].brightest);
-	for (uint32_t i = 0; i < w->media_count; i++) /* along the scene's diameter */
+	for (uint32_t i = 0; i < w->media_count; i++) /* light emitted along the scene's diameter */
 		if (w->media[i].shines)
 			most = fmax(most, 2 * emission_max(&w->media[i].emission));
 	return 3 * most; /* X + Y + Z */

@@ -5,7 +5,8 @@
 
 #include <stdio.h>
 
-/* Gives a medium its number, 1 + its index in the order of first use; 0: there is none. It is made at first use. */
+/* Sets *number to the number of a medium, 1 + its index in the order of first use, or to 0 if n is NULL. The medium
+ * is made at its first use. */
 static int number_medium(struct builder *b, const struct scene_node *n, struct node_table *numbers, uint32_t *number)
 {
 	struct world *w = b->w;
@@ -18,7 +19,7 @@ static int number_medium(struct builder *b, const struct scene_node *n, struct n
 	return rc ? build_go_on(b, rc) : 0;
 }
 
-/* Makes the media inside of shapes with a `volumelight` emit. lights: the emitter of each medium so far. */
+/* Makes the media inside shapes with a `volumelight` emit. lights[]: the emitter of each medium so far. */
 static int light_media(struct builder *b, const struct scene_node **lights)
 {
 	struct world *w = b->w;
@@ -81,7 +82,7 @@ int build_media(struct builder *b)
 	return rc ? rc : light_media(b, lights);
 }
 
-/* Whether some shape ends it, or it ends by itself. */
+/* Whether the medium is bounded: by a shape, or because it varies in space or has no effect. */
 static bool is_bounded(const struct world *w, uint32_t medium)
 {
 	const struct medium *m = &w->media[medium - 1];
@@ -108,10 +109,10 @@ void build_media_note(struct builder *b)
 		}
 }
 
-/* The medium on this side of the next surface along d that states one. Where none does, it is the camera's. */
+/* Returns the medium on the near side of the next surface along d that states one; if there is none, the camera's. */
 static uint32_t next_medium(const struct world *w, struct ray_end from, vec3 d)
 {
-	enum { SURFACES = 1024 }; /* that state none, at most */
+	enum { SURFACES = 1024 }; /* limit on surfaces without a medium */
 	struct ray_hit hit;
 	struct surface_point x;
 	uint32_t medium;

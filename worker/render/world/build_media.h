@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The world's media: each once, with a number for every side of a shape that states it, and for the camera. Where media
- * scatter, light sub-paths must know in which one they start: build_scattering finds it for each emitter whose shape
- * states none, by a ray to the next shape that does.
+ * Builds the world's media. Each medium is made once; every side of a shape that states a medium, and the camera,
+ * refers to it by number. Where media scatter, light sub-paths must know in which medium they start: for emitters whose
+ * shapes state none, build_scattering finds it by tracing a ray to the next shape that states one.
  */
 #ifndef WORKER_RENDER_WORLD_BUILD_MEDIA_H
 #define WORKER_RENDER_WORLD_BUILD_MEDIA_H
@@ -10,9 +10,11 @@
 #include "worker/render/world/build_private.h"
 
 int build_media(struct builder *b);
-/* After the emitters: sets w->notes.endless if one around the camera hides what shines from infinity. */
+/* Call after the emitters are built. Sets w->notes.endless if an unbounded medium around the camera
+ * hides emitters at infinity. */
 void build_media_note(struct builder *b);
-/* After Embree's tree: which shapes light passes without a vertex, and the media around emitters. */
+/* Call after Embree's tree is built. Determines through which shapes light passes without a vertex, and
+ * the media around emitters. */
 int build_scattering(struct builder *b);
 
 #endif

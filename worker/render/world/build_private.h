@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Shared by the files that build a world: build.c, which runs the steps in order, geometry.c, which makes shapes, and
- * shared_mesh.c. One thread.
+ * Shared by the files that build a world: build.c, which runs the steps in order, geometry.c, which makes shapes,
+ * shared_mesh.c and others. One thread.
  */
 #ifndef WORKER_RENDER_WORLD_BUILD_PRIVATE_H
 #define WORKER_RENDER_WORLD_BUILD_PRIVATE_H
@@ -16,31 +16,36 @@
 
 #include <string.h>
 
-/* Data needed for building, but not in the world. */
+/* Data that is only needed while building. */
 struct builder {
 	struct world *w;
 	const struct scene *scene;
 	const struct asset_source *assets;
 	struct arena scratch;
-	/* One per shape: its geometry in double; for an instance the mesh that it shares, and the instance,
-	 * otherwise NULL. */
+	/* One entry per shape: its geometry in double; for an instance, the mesh that it shares and the
+	 * instance node, otherwise NULL. */
 	struct shape_geometry *geometry;
 	struct shared_mesh **shared;
 	const struct scene_node **instances;
-	struct motion **motions; /* in scene units, applied after what has been built; NULL: still */
-	uint64_t triangles;	 /* over all meshes, shared ones once */
+	/* One per shape, in scene units, applied to the shape as it was built; NULL: the shape does not move. */
+	struct motion **motions;
+	uint64_t triangles; /* total over all meshes, counting shared meshes once */
 	const struct scene_node **shape_nodes, **bsdf_nodes, **emitter_nodes;
 	struct effects_choice forced;
 	struct attribute_pool attributes;
 	struct grid_cache grids;
-	struct volume_build volumes; /* with `grids` */
-	struct box all, *boxes;	     /* boxes: one a shape */
-	bool lost_light;	     /* a shape that shines was left out, because it has no area */
-	struct report *found;	     /* the problems after which building goes on; NULL: the first ends it */
+	struct volume_build volumes; /* uses `grids` */
+	/* Bounding box of the scene, and one box per shape. */
+	struct box all, *boxes;
+	/* A shape that emits was left out because it has no area. */
+	bool lost_light;
+	/* Collects problems after which building continues; NULL: the first problem ends it. */
+	struct report *found;
 	struct error *e;
 };
 
-/* An object has failed with `code`. 0: the problem is noted, and building goes on without the object. */
+/* Call if an object has failed with `code`. Returns 0 if the problem was recorded and building continues without the
+ * object; otherwise the error code. */
 static inline int build_go_on(struct builder *b, int code)
 {
 	return b->found ? report_problem_once(b->found, code, b->e) : code;

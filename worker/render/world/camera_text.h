@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The camera of a scene as text. Pure; any thread. */
+/* Writes the camera of a scene as text. Pure; any thread. */
 #ifndef WORKER_RENDER_WORLD_CAMERA_TEXT_H
 #define WORKER_RENDER_WORLD_CAMERA_TEXT_H
 

@@ -46,7 +46,7 @@ static const char *reason(enum surface_rank hidden, enum surface_rank by)
 	return by == SURFACE_SHINES ? "shines" : by == SURFACE_OPAQUE ? "is opaque" : "refracts or scatters";
 }
 
-/* Otherwise it is not visible which of them is present. */
+/* Whether the pair is worth a note; otherwise it is not visible which of the two surfaces is present. */
 static bool is_news(const struct world *w, const struct accel_shape *s, const struct coincide_shapes *c)
 {
 	if (c->hidden == c->by)

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What can happen at all in a scene, determined from its description before Embree is built. Each effect decides what
- * is built and run; each is reported as on or off, with the reason and what omitting it saves. The user's choice takes
- * precedence.
+ * Effects: the features that a scene can use, determined from its description before Embree's tree is built. Each
+ * effect decides what is built and run; each is reported as on or off, with the reason and what omitting it saves. The
+ * user's choice takes precedence.
  *
- * Adding one: a name and its two texts in effects_text.c, its rule in effects_analyse.c.
+ * To add an effect: its name and texts go into effects.c, its rule into effects_analyse.c.
  */
 #ifndef WORKER_RENDER_WORLD_EFFECTS_H
 #define WORKER_RENDER_WORLD_EFFECTS_H
@@ -15,11 +15,11 @@
 
 enum effect {
 	EFFECT_COLOUR,
-	EFFECT_WAVELENGTH, /* the mutation of that name */
+	EFFECT_WAVELENGTH, /* the wavelength mutation */
 	EFFECT_DISPERSION,
 	EFFECT_APERTURE,
-	EFFECT_EMITTER_MOVE, /* x_0 moves on its emitter */
-	EFFECT_HALF_VECTORS, /* walks, with the derivatives of half vectors */
+	EFFECT_EMITTER_MOVE, /* mutations move x_0 on its emitter */
+	EFFECT_HALF_VECTORS, /* half vector walks and derivatives */
 	EFFECT_SPECULAR,
 	EFFECT_GLOSSY,
 	EFFECT_DIFFUSE,
@@ -43,18 +43,18 @@ enum effect {
 	EFFECTS
 };
 
-/* How an effect may be overridden. */
+/* How the user may override an effect. */
 enum {
 	EFFECT_MAY_FORCE_ON = 1,
 	EFFECT_MAY_FORCE_OFF = 2,
-	EFFECT_OF_THE_SCENE = 4 /* forced off, the image is that of another scene */
+	EFFECT_OF_THE_SCENE = 4 /* if it is forced off, the image shows a different scene */
 };
 
 struct effect_decl {
 	const char *name;
 	unsigned may;
 	const char *saves;  /* what omitting it saves */
-	const char *refuse; /* why it cannot be forced, if so */
+	const char *refuse; /* why it cannot be forced; NULL if it can */
 };
 extern const struct effect_decl effect_table[EFFECTS];
 
@@ -65,29 +65,31 @@ struct effects_choice {
 };
 
 struct effects {
-	bool colour; /* if off, no wavelengths are drawn, and a grey value stands for the common illuminant's shape */
+	/* If off, no wavelengths are drawn, and a grey value scales the spectrum that all emitters share. */
+	bool colour;
 	bool dispersion, aperture, specular, glossy, emitter_move;
-	bool absorption;	     /* some medium does */
-	bool scattering;	     /* some medium scatters or shines: edges are walked through all of them */
-	bool medium_light;	     /* some medium shines */
-	bool transparent_shadows;    /* connections look through what lets light straight through */
-	bool refracted_shadows;	     /* connections to emitters are refracted by what refracts exactly */
-	bool media;		     /* absorption or scattering */
-	bool joints;		     /* any that joining sub-paths asks about: media, dispersion, transparent and
-					refracted shadows */
+	bool absorption;	  /* some medium absorbs */
+	bool scattering;	  /* some medium scatters or emits: edges are walked through all media */
+	bool medium_light;	  /* some medium emits */
+	bool transparent_shadows; /* connections look through surfaces that let light straight through */
+	bool refracted_shadows;	  /* connections to emitters are refracted at exactly specular surfaces */
+	bool media;		  /* absorption or scattering */
+	/* Any effect that matters when sub-paths are joined: media, dispersion, transparent or refracted shadows. */
+	bool joints;
 	bool motion;		     /* paths have a time */
-	enum color_shape illuminant; /* of all emitters, if colour is off */
-	uint32_t max_depth;	     /* edges of the longest path that can carry light, at most the scene's */
+	enum color_shape illuminant; /* spectrum shared by all emitters, if colour is off */
+	/* Edges of the longest path that can carry light, at most the scene's max_depth. */
+	uint32_t max_depth;
 	struct effect_line lines[RENDER_EFFECTS_MAX];
 	size_t line_count;
 };
 _Static_assert((int)EFFECTS <= (int)RENDER_EFFECTS_MAX, "each has its line");
 
-/* Whether a path between camera and light can meet a shape, or why not. */
+/* Whether a path between camera and light can meet a shape, or why it cannot. */
 enum visibility {
 	VISIBILITY_YES,
-	VISIBILITY_ENCLOSED, /* inside a closed opaque shape that the camera is outside of */
-	VISIBILITY_DARK,     /* nothing emits in the scene, or all emitters are enclosed */
+	VISIBILITY_ENCLOSED, /* inside a closed opaque shape while the camera is outside */
+	VISIBILITY_DARK,     /* nothing in the scene emits, or all emitters are enclosed */
 	VISIBILITY_DEPTH,    /* paths are too short to scatter */
 };
 

@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Reads materials, emitters and shapes once and counts who has what. Then it decides effect by effect, in the order of
- * their dependencies, what the scene needs, what the user forces, and the sentence with the reason. Nothing fails:
- * choices that are not possible were refused when the text was parsed (effects_text.c).
+ * Decides which effects a scene needs.
+ *
+ * take_census goes through materials, emitters and shapes once and counts which of them use what. Then each effect is
+ * decided in the order of dependencies: whether the scene needs it, whether the user forces it, and the sentence with
+ * the reason. Nothing fails: impossible choices were refused when the text was parsed (effects_text.c).
  */
 #include "worker/render/world/effects_analyse.h"
 
@@ -15,7 +17,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* A count, and the first by name. */
+/* A count of objects, and the name of the first. */
 struct tally {
 	size_t count;
 	char first[112];
@@ -37,7 +39,7 @@ static void count(struct tally *t, const struct scene_node *n, const char *namel
 
 enum { NAMES_MAX = 144 };
 
-/* "`glass1`", "`glass1` and 2 more" */
+/* Returns "`glass1`", or "`glass1` and 2 more". */
 static const char *names_of(const struct tally *t, char text[NAMES_MAX])
 {
 	if (t->count > 1)
@@ -55,7 +57,8 @@ static const char *verb_of(const struct tally *t, const char *one, const char *m
 struct census {
 	struct tally specular, glossy, diffuse, transmission, textured, coloured, dispersive, constant_eta;
 	struct tally hidden_specular, hidden_dispersive,
-		unused_dispersive; /* materials that no path meets; that no shape uses */
+		/* Materials that no path meets, and materials that no shape uses. */
+		unused_dispersive;
 	struct tally absorbing, scattering, shining;
 	struct tally straight, refracting;
 	struct tally environment, area, delta, textured_light, coloured_light;
@@ -98,8 +101,8 @@ static void add_hidden(struct census *c, const struct bsdf *b, const struct scen
 		count(&c->hidden_dispersive, n, "");
 }
 
-/* For each BSDF: whether one of its shapes is reached, otherwise the reason for its last one; YES if it has no
- * shape. One pass over the shapes, however many BSDFs there are. */
+/* For each BSDF: finds whether paths can reach one of its shapes, otherwise the reason for its last shape; YES if it
+ * has no shape. One pass over the shapes, however many BSDFs there are. */
 static void find_bsdf_visibility(const struct world *w, const enum visibility *shape, struct bsdf_visibility *of)
 {
 	for (uint32_t k = 0; k < w->bsdf_count; k++)
@@ -188,7 +191,7 @@ struct report {
 	const struct effects_choice *forced;
 };
 
-/* The line of an effect that the scene needs or not; returns whether it is on. */
+/* Adds the line of an effect. called: the scene needs it. Returns whether the effect is on. */
 __attribute__((format(printf, 4, 5))) static bool line(struct report *r, enum effect which, bool called,
 						       const char *why, ...)
 {
@@ -242,7 +245,7 @@ static void colour(struct report *r, const struct census *c)
 			line(r, EFFECT_COLOUR, called, "all materials are grey and all emitters have one spectrum");
 }
 
-/* Needed by another effect that is forced on. */
+/* Turns colour on because another effect that is forced on needs it. */
 static void force_colour(struct report *r, const char *by)
 {
 	struct effect_line *l = &r->fx->lines[0];
@@ -295,7 +298,7 @@ static void spectral(struct report *r, const struct census *c, bool rgb)
 		force_colour(r, "dispersion");
 }
 
-/* A line that names what has something, or another sentence. */
+/* Adds a line that names the objects in the tally, or the sentence `none` if there are none. */
 static bool add_tally_line(struct report *r, enum effect which, const struct tally *t, const char *one,
 			   const char *many, const char *none)
 {
@@ -304,7 +307,7 @@ static bool add_tally_line(struct report *r, enum effect which, const struct tal
 			: line(r, which, false, "%s", none);
 }
 
-/* A line that names the materials that have something, or "no material ...". */
+/* Adds a line that names the materials in the tally, or "no material ..." if there are none. */
 static bool materials(struct report *r, enum effect which, const struct tally *t, const char *one, const char *many,
 		      const char *none)
 {
@@ -317,7 +320,7 @@ static bool materials(struct report *r, enum effect which, const struct tally *t
 static void lobes(struct report *r, const struct census *c)
 {
 	struct effects *fx = r->fx;
-	struct effect_line *at = &fx->lines[fx->line_count++]; /* half vectors: known after the other two */
+	struct effect_line *at = &fx->lines[fx->line_count++]; /* half vectors: filled in below */
 	if (!c->specular.count && c->hidden_specular.count) {
 		char text[NAMES_MAX];
 		fx->specular =
@@ -426,8 +429,8 @@ static void emitter_moves(struct report *r, const struct census *c)
 							      : "nothing shines");
 }
 
-/* Connections through these materials. Where media scatter they cannot be forced: edges cross the faces of `null`
- * anyway, and connections end at all other surfaces. */
+/* Decides whether connections pass these materials. Where media scatter this cannot be forced: edges cross the faces of
+ * `null` anyway, and connections end at all other surfaces. */
 static bool shadows(struct report *r, enum effect effect, const struct tally *t, const char *scattered, const char *one,
 		    const char *many)
 {

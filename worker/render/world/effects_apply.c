@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Changes a world according to its effects: shapes that no path meets become black, and what was switched off is
- * removed. */
+/* Changes a world according to its effects: shapes that no path can meet become black, and effects
+ * that are off are removed. */
 #include "worker/render/world/effects_apply.h"
 
 #include "worker/render/bsdf/lobe_filter.h"
@@ -21,7 +21,8 @@ static bool is_switched_off(const struct emitter *em, const struct effects_choic
 	return forced->of[which] < 0;
 }
 
-/* Shapes that no path meets become black and need nothing; not if something is forced on that may belong to them. */
+/* Makes shapes that no path can meet black and removes emitters without effect. Not used if an effect is forced on,
+ * which might concern these objects. */
 static void leave_out(struct world *w, const enum visibility *shape)
 {
 	uint32_t black = w->bsdf_count++; /* there is room for one more than there are shapes */
@@ -46,7 +47,7 @@ static unsigned lobes_without(const struct bsdf *b, const struct effects_choice 
 	return without;
 }
 
-/* Where a medium's albedo varies, its optical depths are known only for both effects together (medium.h). */
+/* If a medium's albedo varies, its optical depth is only known for both effects together (medium.h). */
 static int apply_to_medium(struct medium *m, const struct effects *fx, const struct effects_choice *forced,
 			   struct error *e)
 {
@@ -55,7 +56,8 @@ static int apply_to_medium(struct medium *m, const struct effects *fx, const str
 	m->shines = m->shines && fx->medium_light;
 	if (!volume_varies(&m->second) || m->absorbs == m->scatters)
 		return 0;
-	m->absorbs = m->scatters = false; /* no path reaches it, unless: */
+	m->absorbs = m->scatters =
+		false; /* Either no path reaches the medium, or the user switched one of the effects off. */
 	return forced->of[EFFECT_ABSORPTION] < 0 || forced->of[EFFECT_SCATTERING] < 0
 		       ? error_set(
 				 e, EINVAL,
@@ -70,7 +72,7 @@ int effects_apply(struct world *w, const struct effects_choice *forced, const en
 		leave_out(w, shape);
 	for (uint32_t i = 0; i < w->bsdf_count; i++) {
 		struct bsdf *b = &w->bsdfs[i];
-		/* Forced on: as if the index varied, but by nothing. */
+		/* Dispersion that is forced on treats the index as varying with wavelength, by an amount of 0. */
 		if (!w->effects.dispersion)
 			b->dispersive = false;
 		else if (forced->of[EFFECT_DISPERSION] > 0 && b->eta != 1)

@@ -7,7 +7,8 @@
 
 struct world;
 
-/* Removes what no path meets and what was switched off. */
+/* Removes what no path can meet and what was switched off. -EINVAL if the choice cannot be
+ * applied to this scene; -ENOMEM. */
 int effects_apply(struct world *w, const struct effects_choice *forced, const enum visibility *shape, struct error *e);
 
 #endif

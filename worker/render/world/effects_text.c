@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The text with which a plan overrides effects, and notes about those of a scene.
+ * The text by which a plan overrides effects, and the notes about the effects of a scene.
  *
- * Only parsing fails, -EINVAL: an unknown effect (with the nearest name), one that cannot be forced, or a text without
- * signs and names.
+ * Only parsing fails, with -EINVAL: for an unknown effect (the message suggests the nearest name), an effect that
+ * cannot be forced, or text that is not a list of signed names.
  */
 #include "worker/render/world/effects_text.h"
 
@@ -14,7 +14,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* EFFECTS: unknown name. */
+/* Returns the effect of that name; EFFECTS if it is unknown. */
 static enum effect find(const char *name, size_t length)
 {
 	int i = 0;

@@ -1,17 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Points at which paths from the camera scatter (emitter_points.h) are sorted into cells by halving them across the
- * longest axis of their box that can, again and again. Each cell has its chances.
+ * Learns which emitters light which places.
  *
- * If emitter e is chosen with probability p_e, the second moment of the light that a point gets is sum c_e^2 / p_e, c_e
- * being what e brings. Relative to all light there, and averaged over the points of a cell, it is sum a_e / p_e, a_e
- * the mean of the squared shares of e; and that is least for p_e proportional to sqrt(a_e). As a cell has few points,
- * a_e counts BORROWED points of the cell around it as well, and so on up to the whole scene. Light sub-paths choose
- * their emitter by power and by the shares of the whole scene, one half each; in DEFENSIVE of all cases cells do so,
- * too, so that light which no point has met is chosen as well, and weights stay bounded.
+ * The points at which camera paths scatter (emitter_points.h) are sorted into cells: their box is halved repeatedly,
+ * each time across the longest axis along which the points can be divided. Each cell has its own probabilities.
  *
- * Failures: without memory. Where too few points get light by a straight line (all lamps shine at mirrors), or emitters
- * are too many, power alone decides.
+ * If emitter e is chosen with probability p_e, the second moment of the estimate of a point's direct light is sum c_e^2
+ * / p_e, where c_e is the light from e. Relative to all light at the point, and averaged over the points of a cell, it
+ * is sum a_e / p_e, where a_e is the mean of the squared shares of e. The minimum is at p_e proportional to sqrt(a_e).
+ * Because a cell has few points, a_e includes BORROWED points of the enclosing cell, whose a_e in turn includes points
+ * of the cell around it, up to the whole scene. Light sub-paths choose their emitter by the mean of two probabilities,
+ * one by power and one by the shares of the whole scene. Cells use these probabilities in a fraction DEFENSIVE of all
+ * cases, so that light that reached none of the points is chosen, too, and weights stay bounded.
+ *
+ * Fails only if out of memory. Where too few points get light along a straight line (as when all lamps shine at
+ * mirrors), or there are too many emitters, power alone decides.
  */
 #include "worker/render/world/emitter_choice.h"
 
@@ -20,30 +23,31 @@
 #include "worker/render/world/emitter_points.h"
 
 enum {
-	VALUES = 1 << 21, /* points times parts, and one point a pixel, within these bounds: */
+	VALUES = 1 << 21, /* most points times parts; within the following bounds there is one point per pixel */
 	POINTS_MOST = 1 << 13,
 	POINTS_LEAST = 1 << 9,
 	CELL_POINTS = 16,
 };
 static const double BORROWED = 4, DEFENSIVE = 0.1;
 
-/* Nodes are those of a heap: 1 is the whole scene, and 2 i and 2 i + 1 are the halves of i. */
+/* Nodes are numbered as in a heap: 1 is the whole scene, and 2 i and 2 i + 1 are the halves of i. */
 struct emitter_choice {
-	uint32_t first_cell; /* index of the first leaf; there are as many leaves */
+	uint32_t first_cell; /* index of the first leaf; also the number of leaves */
 	struct cut {
 		unsigned axis;
 		double at;
-	} * cuts; /* where node i is halved */
+	} * cuts; /* cuts[i]: where node i is halved */
 	uint32_t parts;
-	double *edge; /* parts + 1 edges of chances for each cell: part i is chosen between edges i and i + 1 */
+	/* For each cell, parts + 1 cumulative probabilities: part i is chosen between edges i and i + 1. */
+	double *edge;
 };
 
 struct maker {
 	const struct world *w;
 	struct emitter_choice *to;
 	const struct emitter_points *points;
-	double *sum;   /* of squared shares: one number for each part and node */
-	double *light; /* chances of parts as if light sub-paths chose them */
+	double *sum;   /* sums of squared shares, for each part and node */
+	double *light; /* probabilities of the parts if light sub-paths chose them */
 };
 
 static const double *cell_of(const struct emitter_choice *c, vec3 p)
@@ -88,7 +92,7 @@ double emitter_choice_denser(const struct world *w, vec3 p, int32_t emitter, con
 
 /* ---- making it ---- */
 
-/* The axes by the lengths of the nodes' box, the longest first. */
+/* Sorts the axes by the side lengths of the nodes' box, the longest first. */
 static void sort_axes(const struct point_tree_node *nodes, size_t count, unsigned axis[3])
 {
 	struct box box = box_empty();
@@ -111,8 +115,9 @@ static bool is_divided(const struct point_tree_node *nodes, size_t middle, unsig
 	return true;
 }
 
-/* Sorts what is below nodes[middle] before it. Returns the axis, the longest that can: a floor has one height, and its
- * points would all be above, where those before `middle` are not looked for. */
+/* Partitions the nodes around nodes[middle] along the longest axis for which all nodes before `middle` are strictly
+ * below it, and returns that axis. Along other axes a lookup would not find them: the points of a floor, for example,
+ * all have the same height. */
 static unsigned divide(struct point_tree_node *nodes, size_t count, size_t middle)
 {
 	unsigned axis[3];
@@ -130,7 +135,7 @@ static double *sums_of(const struct maker *m, uint32_t node)
 	return &m->sum[(size_t)node * m->to->parts];
 }
 
-/* Divides the points, and adds up the squares of their shares. */
+/* Divides the points recursively and adds up the squares of their shares. */
 static void halve(const struct maker *m, uint32_t node, struct point_tree_node *nodes, size_t count)
 {
 	const uint32_t n = m->to->parts;
@@ -152,7 +157,7 @@ static void halve(const struct maker *m, uint32_t node, struct point_tree_node *
 		sum[e] = sums_of(m, 2 * node)[e] + sums_of(m, 2 * node + 1)[e];
 }
 
-/* sqrt(a), scaled to a sum of 1, mixed with the chances of light sub-paths. */
+/* Computes sqrt(a), scaled to a sum of 1 and mixed with the probabilities of light sub-paths. */
 static void part_chances(const double *a, uint32_t n, const double *light, double *out)
 {
 	double sum = 0;
@@ -162,7 +167,7 @@ static void part_chances(const double *a, uint32_t n, const double *light, doubl
 		out[e] = (1 - DEFENSIVE) * (sqrt(a[e]) / sum) + DEFENSIVE * light[e];
 }
 
-/* edge[n] is 1, and nothing is chosen that has no chance. */
+/* Computes the cumulative probabilities. edge[n] is 1, and parts of probability 0 are never chosen. */
 static void edges(const double *chance, uint32_t n, double *edge)
 {
 	double sum = 0;
@@ -177,7 +182,7 @@ static void edges(const double *chance, uint32_t n, double *edge)
 		edge[e - 1] = 1;
 }
 
-/* From sums to means with what is borrowed from the node around it; `count` points are in the node. */
+/* Turns sums into means that include the borrowed points of the enclosing node. `count` points are in the node. */
 static void fill(const struct maker *m, uint32_t node, size_t count)
 {
 	const uint32_t n = m->to->parts;
@@ -194,7 +199,7 @@ static void fill(const struct maker *m, uint32_t node, size_t count)
 	fill(m, 2 * node + 1, count - count / 2);
 }
 
-/* Sets chances of light sub-paths, and their chances of parts. */
+/* Sets the probabilities of light sub-paths, and those of the parts that follow from them. */
 static void choose_for_light(struct world *w, const struct maker *m)
 {
 	const struct emitter_points *p = m->points;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What points are joined to: emitters, and parts of the environment, of which different places see different ones
- * (through a window, above a floor). The square of numbers from which the environment's points are drawn is divided
- * evenly, so its parts are equally bright, or equally large where it is even. Parts 0 to emitter_count - 1 are whole
- * emitters; those of a divided environment follow. Pure.
+ * The parts among which emitter_choice.h chooses: emitters, and parts of the environment, of which different places see
+ * different ones (through a window, above a floor). The unit square from which points of the environment are drawn is
+ * divided evenly, so its parts are equally bright, or equally large for a constant environment. Parts 0 to
+ * emitter_count - 1 are whole emitters; those of a divided environment follow. Pure.
  */
 #ifndef WORKER_RENDER_WORLD_EMITTER_PART_H
 #define WORKER_RENDER_WORLD_EMITTER_PART_H
@@ -12,7 +12,8 @@
 
 enum { ENVIRONMENT_SIDE = 8, ENVIRONMENT_PARTS = ENVIRONMENT_SIDE * ENVIRONMENT_SIDE };
 
-/* Points of an emitter are found in the square again if they are drawn alike for all that they light. */
+/* Whether an emitter is divided into parts. For that, the point in the unit square must follow from the emitter's
+ * point, which requires that points are drawn in the same way wherever they are seen from. */
 static inline bool emitter_is_divided(const struct world *w, int32_t emitter)
 {
 	return emitter == w->environment && !w->emitters[emitter].ops->sample_toward &&
@@ -30,21 +31,21 @@ static inline int32_t emitter_of_part(const struct world *w, uint32_t part)
 	return part < w->emitter_count ? (int32_t)part : w->environment;
 }
 
-/* A divided emitter is not a part itself. An emitter of power 0 may have been switched off (effects_apply.h), which
- * shows only in its power. */
+/* Whether a part emits. A divided emitter is not a part itself. An emitter that was switched off
+ * (effects_apply.h) has power 0. */
 static inline bool emitter_part_shines(const struct world *w, uint32_t part)
 {
 	return w->emitters[emitter_of_part(w, part)].power > 0 &&
 	       (part >= w->emitter_count || !emitter_is_divided(w, (int32_t)part));
 }
 
-/* The density of points of a part, once it is chosen, over the density of points of its whole emitter. */
+/* Returns the density of points of a part, given that it was chosen, divided by their density on the whole emitter. */
 static inline double emitter_part_denser(const struct world *w, uint32_t part)
 {
 	return part < w->emitter_count ? 1 : ENVIRONMENT_PARTS;
 }
 
-/* From two numbers in [0,1) those by which its emitter draws a point of the part. */
+/* Converts two numbers in [0,1) to those from which the emitter draws a point of the part. */
 static inline void emitter_part_narrow(const struct world *w, uint32_t part, const double u[2], double out[2])
 {
 	uint32_t k = part - w->emitter_count;
@@ -53,7 +54,7 @@ static inline void emitter_part_narrow(const struct world *w, uint32_t part, con
 	out[1] = whole ? u[1] : (k / ENVIRONMENT_SIDE + u[1]) / ENVIRONMENT_SIDE;
 }
 
-/* The part that has a point of em, which is that emitter at some time. */
+/* Returns the part that contains a point of em, which is that emitter at some time. */
 static inline uint32_t emitter_part_of(const struct world *w, int32_t emitter, const struct emitter *em,
 				       const struct emitter_point *y)
 {

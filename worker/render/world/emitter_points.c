@@ -1,11 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Walks leave the camera. A surface that scatters sends them on diffusely, a specular one straight through or by
- * reflection: what materials would do more exactly does not matter for which lamps are near. At each point x, emitter e
- * offers what one point of it would bring if nothing were between. The greatest offers are tested by shadow rays, until
- * what is left is faint; so the work grows with the emitters that matter at x, not with all.
+ * Finds points that camera paths reach, and the shares of direct light at each.
  *
- * Failures: without memory. There may be fewer points than wanted, or none, where walks leave the scene.
+ * Walks leave the camera. A surface that scatters sends them on diffusely, a specular one straight through or by
+ * reflection; the exact behaviour of materials does not matter for which lamps are near. At each point x, the
+ * unoccluded light is computed for one sampled point of each part of the emitters. The largest of these contributions
+ * are tested by shadow rays until the remaining ones are faint, so the work grows with the number of emitters that
+ * matter at x, not with all.
+ *
+ * Fails only if out of memory. There may be fewer points than wanted, or none, if walks leave the scene.
  */
 #include "worker/render/world/emitter_points.h"
 
@@ -15,27 +18,28 @@
 #include <string.h>
 
 enum {
-	WALKS = 4,	/* for each point wanted, at most */
-	POINTS = 4,	/* per walk, at most */
-	STEPS = 16,	/* the same, with those that leave no point */
-	TESTS = 96,	/* shadow rays per point, */
-	RAYS = 1 << 18, /* and of all */
-	SURFACES = 8,	/* that one of them passes */
+	WALKS = 4,	/* most walks for each point wanted */
+	POINTS = 4,	/* most points per walk */
+	STEPS = 16,	/* most surfaces that a walk meets, including those that yield no point */
+	TESTS = 96,	/* most shadow rays per point */
+	RAYS = 1 << 18, /* most shadow rays for all points */
+	SURFACES = 8,	/* most surfaces that a shadow ray passes */
 };
-static const double GLOSS = 0.1, /* what gloss may reflect of what comes from anywhere */
-	FAINT = 0.01;		 /* a share of the light that has arrived */
+static const double GLOSS = 0.1, /* fraction of the light that glossy reflection may add from any direction */
+	FAINT = 0.01;		 /* fraction of the light that has arrived, below which an offer is not tested */
 
 struct point {
-	vec3 p, ng; /* ng: on the side that the walk came from; 0 in a medium */
+	/* Ng: on the side from which the walk came; 0 in a medium. */
+	vec3 p, ng;
 	struct prim_ref prim;
 	bool opaque;
 };
 
-/* Where a shadow ray ends. */
+/* The end of a shadow ray. */
 struct target {
-	struct ray_end end; /* not at infinity */
+	struct ray_end end; /* only if not infinite */
 	bool infinite;
-	vec3 d; /* unit */
+	vec3 d; /* unit direction to it */
 };
 
 struct finder {
@@ -47,8 +51,8 @@ struct finder {
 	struct offer {
 		double light;
 		bool tested;
-	} * offers;		/* one for each part, */
-	struct target *targets; /* and where it comes from */
+	} * offers;		/* the unoccluded light of each part */
+	struct target *targets; /* and the point that emits it */
 };
 
 /* ---- what emitters bring ---- */
@@ -59,7 +63,7 @@ static bool lets_light_through(const struct world *w, uint32_t shape)
 	return part->passable || (w->bsdfs[part->bsdf].modes & BSDF_TRANSMIT);
 }
 
-/* Whether light arrives along a straight line, not bent by what it passes. */
+/* Whether light arrives at x along a straight line, passing surfaces that let light through without being bent. */
 static bool is_lit(const struct finder *f, const struct point *x, const struct target *y)
 {
 	const struct world *w = f->w;
@@ -80,7 +84,8 @@ static bool is_lit(const struct finder *f, const struct point *x, const struct t
 	return false;
 }
 
-/* A point of the part by u, and the density with which it was drawn, toward x. false: it offers nothing. */
+/* Draws a point of the part from u. *pdf: its density as seen from x, per solid angle. Returns
+ * false if there is no point. */
 static bool draw_point(const struct world *w, uint32_t part, const struct emitter *em, const struct point *x,
 		       const double u[2], struct emitter_point *y, struct target *to, double *pdf)
 {
@@ -107,7 +112,7 @@ static bool draw_point(const struct world *w, uint32_t part, const struct emitte
 	return true;
 }
 
-/* What the part would bring to x if nothing were between. */
+/* Returns the light that the part would bring to x if nothing were between. */
 static double unoccluded_light(const struct world *w, uint32_t part, const struct point *x, const double u[2],
 			       const struct wavelengths *wl, struct target *to)
 {
@@ -136,13 +141,13 @@ static uint32_t greatest_untested(const struct offer *o, uint32_t n)
 	return best;
 }
 
-/* The numbers of one point or step; `use` counts from 0. */
+/* Draws the numbers of one point or step of a walk; `use` counts from 0. */
 static void draw_numbers(uint64_t walk, uint64_t step, uint64_t use, double u[4])
 {
 	rng_uniform4(0, RNG_EMITTERS, walk, step, use, u);
 }
 
-/* Adds x with its shares, if any light arrives. */
+/* Adds the point x with its shares, if any light arrives there. */
 static void add(struct finder *f, const struct point *x, uint64_t walk, uint64_t step)
 {
 	const struct world *w = f->w;
@@ -182,7 +187,7 @@ struct step {
 	double t_min, t_max;
 };
 
-/* false: the film has nothing there. */
+/* Starts a walk at the camera. Returns false if the camera sees nothing at that film point. */
 static bool leave_camera(const struct world *w, uint64_t walk, struct step *s)
 {
 	const struct scene_settings *set = &w->settings;
@@ -205,19 +210,19 @@ static vec3 mirrored(vec3 d, vec3 n)
 	return vec3_madd(d, -2 * vec3_dot(d, n), n);
 }
 
-/* Where a walk goes on that came along d; n: unit, on that side. */
+/* Returns the direction in which a walk that came along d continues. n: unit normal on the side from which it came. */
 static vec3 scattered(const struct bsdf *b, vec3 d, vec3 n, const double u[4])
 {
 	bool through = (b->modes & BSDF_TRANSMIT) && (u[2] < 0.5 || !(b->modes & BSDF_REFLECT));
 	if (!b->has_smooth || (b->has_delta && u[3] < 0.5))
 		return through ? d : mirrored(d, n);
-	/* By the cosine. */
+	/* A direction distributed by the cosine. */
 	struct frame axes = frame_around(through ? vec3_neg(n) : n);
 	double r = sqrt(u[0]), phi = 2 * M_PI * u[1];
 	return frame_to_world(&axes, (vec3){r * cos(phi), r * sin(phi), sqrt(1 - u[0])});
 }
 
-/* A point of the way to the next surface, which is at `distance`. */
+/* Adds a point on the way to the next surface, which is at `distance`. */
 static void add_in_medium(struct finder *f, const struct step *s, double distance, uint64_t walk, uint64_t step)
 {
 	double u[4];
@@ -227,7 +232,8 @@ static void add_in_medium(struct finder *f, const struct step *s, double distanc
 	add(f, &x, walk, STEPS + step);
 }
 
-/* Goes to the next surface, which leaves a point if it scatters: *points is counted. false: the walk ends. */
+/* Continues a walk to the next surface and adds a point there if it scatters, which is counted in *points.
+ * Returns false if the walk ends. */
 static bool step_to_surface(struct finder *f, struct step *s, uint64_t walk, uint64_t number, int *points)
 {
 	const struct world *w = f->w;

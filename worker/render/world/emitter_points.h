@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Points at which paths from the camera scatter, and how much of its direct light each gets from which part of
- * the emitters (emitter_part.h): what emitter_choice.h learns from.
+ * Finds points at which camera paths scatter, and which share of the direct light at each point comes from each part of
+ * the emitters (emitter_part.h). emitter_choice.h learns from them.
  */
 #ifndef WORKER_RENDER_WORLD_EMITTER_POINTS_H
 #define WORKER_RENDER_WORLD_EMITTER_POINTS_H
@@ -11,12 +11,12 @@
 
 struct emitter_points {
 	uint32_t count;
-	struct point_tree_node *nodes; /* positions; id: the row of `share` */
-	float *share;		       /* [count][emitter_part_count], the sum of each row is 1 */
+	struct point_tree_node *nodes; /* positions; id is the row of `share` */
+	float *share;		       /* [count][emitter_part_count]; each row sums to 1 */
 };
 
-/* Points of a finished world with at least one emitter, at most `most` of them; those that get no light are left out.
- * Memory comes from the arena. Deterministic. -ENOMEM: no memory. */
+/* Finds points of a finished world with at least one emitter, at most `most` of them; points that get no light are left
+ * out. Memory comes from the arena. Deterministic. Returns -ENOMEM if out of memory. */
 int emitter_points_find(const struct world *w, uint32_t most, struct arena *arena, struct emitter_points *out);
 
 #endif

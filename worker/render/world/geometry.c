@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Shapes of a world: read in double, moved into the unit sphere with the camera, then rounded to float; shapes that are
- * too large for that relative to small ones also stay in double.
+ * The shapes of a world. build_read_shapes reads them in double; build_rescale chooses the world's origin and scale,
+ * which also apply to the camera; build_place_shapes rounds the shapes to float, and keeps those that are too large for
+ * that relative to small ones in double as well.
  *
- * Failures have the object's place. Triangles without area, meshes without triangles, shapes that are too small
- * relative to others and materials that are not read are counted and noted, not errors.
+ * Errors name the object's place in the scene file. Triangles without area, meshes without triangles, shapes that are
+ * too small relative to others and materials that are not read are counted and noted; they are not errors.
  */
 #include "worker/render/world/geometry.h"
 
@@ -18,16 +19,16 @@
 
 #include <stdio.h>
 
-/* Over all shapes: Embree takes about 150 bytes for each. */
+/* Limit on the triangles of all shapes together; Embree needs about 150 bytes per triangle. */
 enum { TRIANGLES_MAX = 1 << 28 };
 
-/* Counted and noted: triangles without area, which nothing hits and which are left out, meshes without triangles, and
- * files with materials that Mitsuba 0.6 would read because the shape has no BSDF in the scene. */
+/* Counters for the notes: triangles without area, which nothing hits and which are left out, meshes without triangles,
+ * and files with materials that Mitsuba 0.6 would read because the shape has no BSDF in the scene. */
 struct counted {
 	uint64_t triangles;
-	uint32_t shapes, empty; /* shapes that have some; that have nothing else */
+	uint32_t shapes, empty; /* shapes that have triangles without area; those that have no others */
 	const struct scene_node *first;
-	uint32_t without; /* meshes that have no triangles at all */
+	uint32_t without; /* meshes without any triangles */
 	const struct scene_node *first_without;
 	uint32_t materials;
 	const struct scene_node *first_material;
@@ -81,15 +82,16 @@ static void note_materials(struct world *w, const struct counted *c)
 			 c->materials, c->materials == 1 ? "" : "es", node_title(c->first_material, first));
 }
 
-/* Curves are tubes of triangles where something needs these: displacement, an emitter, from which points are drawn by
- * area, and instances and motion, which a placement moves. Without any radius they are triangles without area. */
+/* Whether curves must be converted to tubes of triangles, because something needs triangles: displacement; an
+ * emitter, whose points are drawn by area; instances and motion, which a placement moves. Curves without any radius
+ * become triangles without area. */
 static bool needs_triangles(const struct builder *b, const struct scene_node *n, const struct shape_geometry *g,
 			    bool placed)
 {
 	return placed || build_is_displaced(b, n) || node_child(n, PLUGIN_EMITTER, 0) || !(g->curve.thickest > 0);
 }
 
-/* placed: instances or motion place what is read. */
+/* Reads a shape. placed: instances or motion will place it. */
 static int read_shape(struct builder *b, const struct scene_node *n, bool placed, struct shape_geometry *g,
 		      uint64_t *dropped)
 {
@@ -104,7 +106,7 @@ static int read_shape(struct builder *b, const struct scene_node *n, bool placed
 	return displacement_apply(g, n, b->assets, b->scene->dialect_3, b->w->accuracy.tessellation, &b->scratch, b->e);
 }
 
-/* Counts what was read. */
+/* Adds a shape to the counters. */
 static int take_geometry(struct builder *b, const struct scene_node *n, const struct shape_geometry *g,
 			 uint64_t dropped, struct counted *counted)
 {
@@ -116,7 +118,8 @@ static int take_geometry(struct builder *b, const struct scene_node *n, const st
 		       : node_error(n, b->e, E2BIG, "the scene has more than %d triangles with it", TRIANGLES_MAX);
 }
 
-/* The mesh that an instance shares, read when the first of them needs it; NULL: the instance is built by itself. */
+/* Finds the mesh that an instance shares; the first instance that needs it reads it. *out is NULL if the
+ * instance is built on its own. */
 static int find_shared(struct builder *b, const struct listed_shape *l, struct shared_mesh **meshes,
 		       struct counted *counted, struct shared_mesh **out)
 {
@@ -135,7 +138,7 @@ static int find_shared(struct builder *b, const struct listed_shape *l, struct s
 			shared_mesh_read(m, l->moves != NULL);
 		if (!rc && m->shared)
 			rc = take_geometry(b, l->node, &m->geometry, dropped, counted);
-	} else if (l->moves && !m->shared) { /* the instances before it stood still */
+	} else if (l->moves && !m->shared) { /* the instances before it do not move */
 		shared_mesh_read(m, true);
 		if (m->shared)
 			rc = take_geometry(b, l->node, &m->geometry, 0, counted);
@@ -144,7 +147,7 @@ static int find_shared(struct builder *b, const struct listed_shape *l, struct s
 	return rc;
 }
 
-/* Adds the next shape of the world, unless it has nothing to hit. */
+/* Adds the next shape to the world, unless it has nothing to hit. */
 static int read_listed(struct builder *b, const struct listed_shape *l, struct shared_mesh **meshes,
 		       struct counted *counted)
 {
@@ -201,7 +204,7 @@ int build_read_shapes(struct builder *b)
 		return build_out_of_memory(b->e);
 	b->all = box_empty();
 	struct counted counted = {0};
-	for (uint32_t i = 0; i < listed; i++) /* those of one instance follow each other */
+	for (uint32_t i = 0; i < listed; i++) /* shapes of one instance are adjacent */
 		b->w->instance_count += list[i].instance && (i == 0 || list[i].instance != list[i - 1].instance);
 	for (uint32_t i = 0; i < listed && !rc; i++)
 		if ((rc = read_listed(b, &list[i], meshes, &counted)))
@@ -216,8 +219,9 @@ int build_read_shapes(struct builder *b)
 	return 0;
 }
 
-/* Points of a shape as large as the scene have errors of a few 2^-53 of that. If the smallest shape is a few
- * thousand times as large as these errors, integrators agree; at 2^-44 of the scene, path and bdpt differed by 2 %. */
+/* Points on a shape as large as the scene have errors of a few 2^-53 of its size. If the smallest shape
+ * is a few thousand times as large as these errors, integrators agree; at 2^-44 of the scene's size, path
+ * and bdpt differed by 2 %. */
 #define LEAST_SCALE 0x1p-42
 
 static void note_scales(struct builder *b)
@@ -258,7 +262,7 @@ int build_rescale(struct builder *b)
 	if (r > 0)
 		frexp(r, &exponent);
 	w->scale = ldexp(1, -exponent);
-	/* Rounding to float moves vertices by parts in 2^24: the sphere must contain them all the same. */
+	/* Rounding to float moves vertices by up to 2^-24 of their size; the sphere must still contain them. */
 	w->radius = (r > 0 ? r * w->scale : 1) * (1 + 0x1p-20);
 	rc = camera_init(&w->camera, &w->settings, w->center, w->scale, b->e);
 	for (uint32_t i = 0; rc && i < b->scene->object_count; i++) {
@@ -269,8 +273,8 @@ int build_rescale(struct builder *b)
 	return rc ? rc : moving_camera(b);
 }
 
-/* ---- curves: points are rounded to float, as vertices of meshes are, and shared by the cones on both sides, so a
- * chain has no gaps; cones are computed from them whenever they are asked for. ---- */
+/* ---- curves: their points are rounded to float, like the vertices of meshes, and shared by the cones on both sides,
+ * so that a chain has no gaps; cones are computed from the points on demand. ---- */
 
 static bool alloc_curves(struct curves *out, const struct curve *c, struct arena *a)
 {
@@ -313,7 +317,7 @@ static void put_chain(struct curves *out, const struct world *w, const struct ch
 	}
 }
 
-/* g->curves stays NULL where no piece has a radius in float. */
+/* Leaves g->curves NULL if no piece has a radius in float. */
 static int place_curves(struct builder *b, struct geom_shape *g, const struct curve *c, const struct scene_node *n)
 {
 	struct curves *out = arena_alloc(&b->w->arena, 1, sizeof *out);
@@ -348,7 +352,7 @@ static void place_sphere(struct builder *b, struct geom_shape *g, const struct s
 	g->sphere_axes.n = vec3_normalize(mat4_vector(&s->to_world, (vec3){0, 0, 1}));
 }
 
-/* *gone: in float nothing of it has an area. */
+/* Places shape i. *gone: rounded to float, no part of the shape has an area. */
 static int place_shape(struct builder *b, uint32_t i, double wide_from, bool *gone)
 {
 	struct world *w = b->w;

@@ -3,10 +3,11 @@
 
 #include "worker/render/world/place_mesh.h"
 
-/* Matrices in files have six digits. */
+/* Relative tolerance: matrices in files have six digits. */
 #define TOLERANCE 1e-5
 
-/* Only translation, rotation, reflection and, with *scale, one scale for all directions. */
+/* Whether m consists only of translation, rotation, reflection and one scale for all directions, which *scale
+ * receives. */
 static bool is_similar(const mat4 *m, double *scale)
 {
 	const vec3 x = mat4_column(m, 0), y = mat4_column(m, 1), z = mat4_column(m, 2);
@@ -16,7 +17,8 @@ static bool is_similar(const mat4 *m, double *scale)
 	       fabs(vec3_dot(y, z)) <= off && fabs(vec3_dot(z, x)) <= off;
 }
 
-/* Spheres stay spheres, and displaced shapes, whose displacement is in scene units, keep their size. */
+/* Checks the motion: spheres must stay spheres, and displaced shapes, whose displacement is in scene
+ * units, must keep their size. */
 static int check(const struct builder *b, const struct listed_shape *l, uint32_t id, const struct motion *m)
 {
 	bool sphere = b->geometry[id].kind == SHAPE_SPHERE;
@@ -33,7 +35,7 @@ static int check(const struct builder *b, const struct listed_shape *l, uint32_t
 	return 0;
 }
 
-/* How it moves while the shutter is open; *moves: it does. */
+/* Computes how an object moves while the shutter is open. *moves: it moves at all. */
 static int make_motion(struct builder *b, const struct scene_node *n, const struct animation *a, struct motion **out,
 		       bool *moves)
 {
@@ -43,7 +45,8 @@ static int make_motion(struct builder *b, const struct scene_node *n, const stru
 	if (!m || !keys)
 		return build_out_of_memory(b->e);
 	*moves = motion_make(m, a, s->shutter_open, s->shutter_close, keys);
-	/* Then it does not matter whether the duration of a line is a time or a share of the shutter's. */
+	/* If the shutter is open for 1 unit of time, it does not matter whether the exposure of a line is given as a
+	 * time or as a fraction of the shutter's. */
 	bool one = fabs(s->shutter_close - s->shutter_open - 1) < 1e-9;
 	return *moves && s->roll != ROLL_NONE && !one
 		       ? node_error(n, b->e, ENOTSUP,
@@ -102,7 +105,7 @@ int moving_place_sphere(struct builder *b, uint32_t id)
 	return 0;
 }
 
-/* A place at each of m's times. */
+/* Checks that the position at each of m's times is within reach. */
 static int check_reach(const struct builder *b, const struct scene_node *n, const struct motion *m)
 {
 	for (uint32_t i = 0; i < m->count; i++)
@@ -112,7 +115,7 @@ static int check_reach(const struct builder *b, const struct scene_node *n, cons
 	return 0;
 }
 
-/* A place or, of an environment, a direction at each of m's times. */
+/* Like check_reach(), but for an emitter; an environment has directions, which must keep their angles. */
 static int check_emitter(const struct builder *b, const struct emitter *em, const struct scene_node *n,
 			 const struct motion *m)
 {

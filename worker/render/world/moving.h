@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Moving shapes, while a world is built. A shape is built where it is when the shutter opens, and then moves like an
- * instance of its own mesh, by its transforms after the inverse of the first; a mesh in a shapegroup is built as it is
- * there. One thread.
+ * Moving shapes while a world is built. A shape is built in the position in which its first transform places it, and
+ * then moves like an instance of its own mesh, by its transforms combined with the inverse of the first; a mesh in a
+ * shapegroup is built in the coordinates of the group. One thread.
  */
 #ifndef WORKER_RENDER_WORLD_MOVING_H
 #define WORKER_RENDER_WORLD_MOVING_H
@@ -10,19 +10,21 @@
 #include "worker/render/shape/group.h"
 #include "worker/render/world/build_private.h"
 
-/* Of shape `id`, which has been read and has the box `from`: its motion, and the box in which it stays. -ENOTSUP: it
- * cannot move like that; -ERANGE: it leaves the range of coordinates. */
+/* For shape `id`, which has been read and has the bounding box `from`: computes its motion, and the box in which it
+ * stays while it moves. -ENOTSUP: it cannot move like that; -ERANGE: it leaves the range of coordinates. */
 int moving_begin(struct builder *b, const struct listed_shape *l, uint32_t id, struct box from);
-/* After the world has been rescaled: its placement, from a frame of that centre and scale in which it has this box.
- * -EINVAL as placement_make; -ENOMEM. */
+/* After the world has been rescaled: computes the placement of shape `id`, whose mesh has the given centre, scale and
+ * box. Returns -EINVAL where placement_make fails; -ENOMEM. */
 int moving_place(struct builder *b, uint32_t id, vec3 center, double scale, const struct box *box, struct placement *p);
-/* The same for a sphere of the world. */
+/* Like moving_place(), but for a sphere of the world. */
 int moving_place_sphere(struct builder *b, uint32_t id);
 
-/* An emitter without a surface, after that; it has been made where it is first. -EINVAL, -ERANGE: it cannot move so. */
+/* Sets the motion of an emitter without a surface, after the world has been rescaled. The emitter has been made in its
+ * first position. -EINVAL, -ERANGE, -ENOTSUP: it cannot move like that. */
 int moving_emitter(struct builder *b, struct emitter *em, const struct scene_node *n);
 
-/* The camera, after the world has been rescaled. -EINVAL, -ERANGE: it cannot move like that. */
+/* Sets the motion of the camera, after the world has been rescaled. -EINVAL, -ERANGE, -ENOTSUP:
+ * it cannot move like that. */
 int moving_camera(struct builder *b);
 
 #endif

@@ -13,7 +13,7 @@ int node_table_init(struct node_table *t, uint32_t most, struct arena *arena)
 	return t->entries ? 0 : -ENOMEM;
 }
 
-/* The finalizer of SplitMix64: addresses differ in few bits. */
+/* The finalizer of SplitMix64, because addresses differ in few bits. */
 static uint64_t mix(uint64_t x)
 {
 	x = (x ^ x >> 30) * 0xbf58476d1ce4e5b9;
@@ -21,7 +21,7 @@ static uint64_t mix(uint64_t x)
 	return x ^ x >> 31;
 }
 
-/* The entry, or the free one where it belongs. */
+/* Returns the entry with that key, or the free entry where it belongs. */
 static struct node_entry *place_of(struct node_table *t, const void *node, const void *mesh)
 {
 	size_t i = (size_t)mix((uintptr_t)node + mix((uintptr_t)mesh + 1));

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Maps a node to the number of its BSDF, for all meshes or for one of them, or of its medium: a hash table with linear
- * probing, at most half full. Nothing is removed. One thread; allocated in the given arena.
+ * A hash table that maps a node to the number of its BSDF, for all meshes or for one of them, or to the number
+ * of its medium. It uses linear probing and is at most half full. Entries are never removed. One thread;
+ * allocated in the given arena.
  */
 #ifndef WORKER_RENDER_WORLD_NODE_TABLE_H
 #define WORKER_RENDER_WORLD_NODE_TABLE_H
@@ -12,7 +13,8 @@
 #include <stdint.h>
 
 struct node_entry {
-	const void *node, *mesh; /* the key; NULL is a valid node; mesh NULL: for all meshes */
+	/* The key. NULL is a valid node; mesh NULL: the entry applies to all meshes. */
+	const void *node, *mesh;
 	uint32_t number;
 	bool used;
 };
@@ -20,16 +22,16 @@ struct node_entry {
 struct node_table {
 	struct node_entry *entries;
 	size_t mask, count, most;
-	uint64_t compared; /* entries probed so far */
+	uint64_t compared; /* number of entries probed so far */
 };
 
-/* Makes a table for at most that many entries. 0 or -ENOMEM. */
+/* Makes a table for at most that many entries. Returns 0 or -ENOMEM. */
 int node_table_init(struct node_table *t, uint32_t most, struct arena *arena);
 
-/* false: not found. */
+/* Looks up a key. Returns false if it is not in the table. */
 bool node_table_find(struct node_table *t, const void *node, const void *mesh, uint32_t *number);
 
-/* Adds one that is not in the table. */
+/* Adds a key that is not in the table. */
 void node_table_add(struct node_table *t, const void *node, const void *mesh, uint32_t number);
 
 #endif

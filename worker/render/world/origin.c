@@ -31,7 +31,7 @@ static double median(struct weighted_value *w, uint32_t count)
 	return w[count - 1].at;
 }
 
-/* Extent of the smallest shape. */
+/* Returns the extent of the smallest shape. */
 static double least_extent(const struct box *shapes, uint32_t count)
 {
 	double least = INFINITY;

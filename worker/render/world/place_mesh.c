@@ -34,8 +34,9 @@ static void put_float3(float out[3], vec3 v)
 	out[2] = (float)v.z;
 }
 
-/* Keeps the triangles that still have an area in float, wound such that their normal agrees with the vertex normals.
- * Those of a displaced shape are unchanged: where one overhangs, its outside is still that of its neighbours. */
+/* Keeps the triangles that still have an area in float, wound such that their normal agrees with the
+ * vertex normals. The triangles of a displaced shape keep their winding: where one overhangs, its outside
+ * is still that of its neighbours. */
 static uint32_t take_triangles(struct geom_shape *g, struct mesh *m, bool displaced)
 {
 	uint32_t kept = 0;
@@ -70,7 +71,7 @@ int build_place_mesh(struct builder *b, struct geom_shape *g, struct mesh *m, co
 	struct arena *arena = &b->w->arena;
 	uint32_t vertices = m->vertex_count;
 	g->vertex_count = vertices;
-	/* One more vertex than there are: Embree reads 16 bytes from the start of each. */
+	/* Allocates one extra vertex, because Embree reads 16 bytes from the start of each. */
 	g->position = arena_alloc(arena, (size_t)vertices + 1, sizeof *g->position);
 	g->index = arena_alloc(arena, m->triangle_count, sizeof *g->index);
 	g->normal = m->normal ? arena_alloc(arena, vertices, sizeof *g->normal) : NULL;

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Spreads points over refracting surfaces by systematic sampling: areas are put end to end, and a point falls on each
- * multiple of a step. Where on its triangle or sphere it lies, a low-discrepancy sequence says, so that the points of a
- * large triangle are spread, too. Of meshes with many triangles, some stand for the others.
+ * Spreads points over refracting surfaces by systematic sampling: the areas of all primitives are laid end to end, and
+ * a point falls on each multiple of a step. A low-discrepancy sequence gives the position on the triangle or sphere, so
+ * that the points on a large triangle are spread, too. Of meshes with many triangles, only every n-th one is used and
+ * stands for its neighbours.
  */
 #include "worker/render/world/refracting.h"
 
@@ -12,15 +13,16 @@
 
 enum {
 	POINTS = 128,
-	TRIANGLES = 1 << 16,	  /* that stand for all meshes, */
-	TRIANGLES_LEAST = 1 << 4, /* and for one */
+	TRIANGLES = 1 << 16,	  /* most triangles that are used of all meshes together */
+	TRIANGLES_LEAST = 1 << 4, /* fewest triangles that are used of each mesh */
 };
 
-/* Points are placed as the area that was passed grows. */
+/* State of the systematic sampling. */
 struct spread {
 	struct world *w;
-	double area, step;  /* passed so far; between two points. step 0: areas are only added up */
-	uint32_t triangles; /* that may stand for a mesh */
+	/* Area: total area passed so far; step: area between two points, or 0 to only sum the areas. */
+	double area, step;
+	uint32_t triangles; /* most triangles that are used of a mesh */
 };
 
 static double triangle_area(const struct geom_shape *s, struct prim_ref prim)
@@ -31,14 +33,15 @@ static double triangle_area(const struct geom_shape *s, struct prim_ref prim)
 	return vec3_length(vec3_cross(vec3_sub(corner[1].p, corner[0].p), vec3_sub(corner[2].p, corner[0].p))) / 2;
 }
 
-/* The k-th number of Weyl's sequence of that irrational. */
+/* Returns the k-th number of Weyl's sequence for that irrational. */
 static double weyl(uint32_t k, double irrational)
 {
 	double x = (k + 0.5) * irrational;
 	return x - floor(x);
 }
 
-/* A point on the primitive. Two irrationals after Roberts: powers of the plastic number. */
+/* Returns the k-th point, placed on the primitive. The two irrationals are those of Roberts:
+ * powers of the plastic number. */
 static struct surface_point point_on(const struct geom_shape *s, struct prim_ref prim, uint32_t k)
 {
 	struct surface_point x;
@@ -135,7 +138,7 @@ static const struct refracting_point *nearest(const struct world *w, vec3 z)
 	return best;
 }
 
-/* The optical path from z by q to where light comes from; at infinity, but for a constant. */
+/* Returns the optical length of the path from z through q to the light; for light from infinity up to a constant. */
 static double optical_path(const struct refracting_point *q, vec3 z, const struct refracting_end *from)
 {
 	vec3 d = vec3_sub(q->p, z);

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Points spread over the surfaces that refract light exactly, and which of them light would pass soonest on its way
- * from a lamp (Fermat's principle). They are first guesses for refracted connections (path/refracted.h).
+ * Points spread over the surfaces that refract light exactly, ranked by the optical length of the path
+ * through each point from a lamp (Fermat's principle). The best ones are initial guesses for refracted
+ * connections (path/refracted.h).
  */
 #ifndef WORKER_RENDER_WORLD_REFRACTING_H
 #define WORKER_RENDER_WORLD_REFRACTING_H
@@ -14,22 +15,22 @@
 struct world;
 
 struct refracting_point {
-	vec3 p, n;  /* n: unit, towards the thinner medium */
-	double eta; /* the index behind it over the one in front of it, above 1 */
+	vec3 p, n;  /* n: unit normal, on the side of the smaller refractive index */
+	double eta; /* refractive index behind the surface divided by that in front of it; at least 1 */
 };
 
-/* Sets w->refracting_point and its count: in proportion to areas, where shapes are half-way through the exposure.
- * Curves have none. Deterministic. -ENOMEM: no memory. */
+/* Sets w->refracting_points and their count. Their density is proportional to area; moving shapes are taken halfway
+ * through the exposure. Curves have none. Deterministic. Returns -ENOMEM if out of memory. */
 int refracting_points_make(struct world *w);
 
-/* Where light comes from: a point, or, if it is infinitely far away, a unit direction towards it. */
+/* The origin of light: a point, or, if it is infinitely far away, the unit direction towards it. */
 struct refracting_end {
 	vec3 at;
 	bool infinite;
 };
 
-/* The points by which light from `from` would arrive at z soonest, the soonest first. Returns how many there are: none
- * unless z lies in the denser medium behind the point that is nearest to it. Pure. */
+/* Finds the points through which light from `from` has the shortest optical path to z, the shortest first. Returns
+ * their number: 0 unless z lies in the denser medium behind the point that is nearest to it. Pure. */
 enum { REFRACTING_RANKED = 2 };
 uint32_t refracting_points_rank(const struct world *w, vec3 z, const struct refracting_end *from,
 				const struct refracting_point *out[REFRACTING_RANKED]);

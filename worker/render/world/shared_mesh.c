@@ -7,7 +7,7 @@
 /* Matrices in files have six digits. */
 #define RIGID_TOLERANCE 1e-5
 
-/* Only translation, rotation or reflection. */
+/* Whether m consists only of translation, rotation and reflection. */
 static bool is_rigid(const mat4 *m)
 {
 	for (int i = 0; i < 3; i++)
@@ -50,7 +50,7 @@ int shared_mesh_box(const struct shared_mesh *m, const struct scene_node *instan
 		       : node_error(instance, e, ERANGE, "a vertex lies beyond %g", MESH_COORDINATE_MAX);
 }
 
-/* As floats, in the unit sphere around the middle of its box. */
+/* Converts the mesh to floats, in the unit sphere around the middle of its box. */
 static int place_once(struct builder *b, struct shared_mesh *m, const struct scene_node *node)
 {
 	vec3 half = vec3_scale(0.5, vec3_sub(m->box.high, m->box.low));
@@ -77,7 +77,7 @@ static bool turn_triangles(struct shared_mesh *m, struct arena *arena)
 	return m->turned != NULL;
 }
 
-/* From the mesh's frame to the world. */
+/* Returns the matrix from the mesh's frame to the world. */
 static mat4 to_world(const struct world *w, const struct shared_mesh *m, const mat4 *place)
 {
 	mat4 r = *place;
@@ -91,7 +91,7 @@ static mat4 to_world(const struct world *w, const struct shared_mesh *m, const m
 	return r;
 }
 
-/* The box of the mesh after rounding. */
+/* Returns the bounding box of the mesh after rounding to float. */
 static struct box float_box(const struct geom_shape *g)
 {
 	struct box b = box_empty();

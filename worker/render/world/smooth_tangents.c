@@ -7,14 +7,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What makes two vertices one. */
+/* Vertices with equal keys are welded into one. */
 struct weld {
 	float key[8]; /* position, normal, texture coordinates */
 	uint32_t vertex;
 };
 
-/* Sums at a vertex, over triangles whose texture coordinates run as on a picture seen from outside, and over mirrored
- * ones. */
+/* Sums at a vertex: [0] over triangles whose texture coordinates are not mirrored, as on a picture seen from
+ * outside, [1] over mirrored ones. */
 struct sums {
 	vec3 of[2];
 	double angle[2];
@@ -32,7 +32,7 @@ static int compare_welds(const void *a, const void *b)
 	return order ? order : (x->vertex > y->vertex) - (x->vertex < y->vertex);
 }
 
-/* Gives equal vertices the same number. Their count, or 0: out of memory. */
+/* Gives equal vertices the same number. Returns how many different vertices there are, or 0 if out of memory. */
 static uint32_t weld_vertices(const struct geom_shape *g, uint32_t **number, struct arena *scratch)
 {
 	struct weld *w = arena_alloc(scratch, g->vertex_count, sizeof *w);
@@ -45,7 +45,7 @@ static uint32_t weld_vertices(const struct geom_shape *g, uint32_t **number, str
 		memcpy(w[i].key + 3, g->normal[i], sizeof g->normal[i]);
 		memcpy(w[i].key + 6, g->uv[i], sizeof g->uv[i]);
 		for (int k = 0; k < 8; k++)
-			w[i].key[k] += 0.0f; /* -0 is 0 */
+			w[i].key[k] += 0.0f; /* turns -0 into 0 */
 		w[i].vertex = i;
 	}
 	qsort(w, g->vertex_count, sizeof *w, compare_welds);
@@ -56,7 +56,8 @@ static uint32_t weld_vertices(const struct geom_shape *g, uint32_t **number, str
 	return count;
 }
 
-/* The direction of a triangle's dp/du, and whether its texture coordinates are mirrored. false: it has none. */
+/* Computes the direction of a triangle's dp/du, and whether its texture coordinates are mirrored.
+ * Returns false if it has none. */
 static bool triangle_tangent(const struct geom_shape *g, const uint32_t i[3], vec3 *tangent, bool *mirrored)
 {
 	const float *a = g->uv[i[0]], *b = g->uv[i[1]], *c = g->uv[i[2]];
@@ -91,14 +92,16 @@ static void add_triangle(const struct geom_shape *g, const uint32_t i[3], const 
 	}
 }
 
-/* 0 where tangents cancel, such as around the middle of a fan, and only rounding would be left. */
+/* Returns the tangent at a vertex; 0 where tangents cancel, as around the middle of a fan, so that only
+ * rounding errors would be left. */
 static vec3 vertex_tangent(const struct sums *s, int mirrored)
 {
 	bool any = vec3_length(s->of[mirrored]) > 0x1p-10 * s->angle[mirrored];
 	return any ? mesh_unit(s->of[mirrored]) : (vec3){0, 0, 0};
 }
 
-/* A triangle without a tangent takes its neighbours', if all three corners have one of the same kind. */
+/* Computes the tangents at a triangle's corners. A triangle without a tangent of its own takes its neighbours', if all
+ * three corners have a tangent of the same orientation. Returns false if there are none. */
 static bool corner_tangents(const struct geom_shape *g, const uint32_t i[3], const uint32_t *number,
 			    const struct sums *sums, vec3 out[3])
 {
@@ -140,7 +143,7 @@ static int make_tangents(struct world *w, struct geom_shape *g, struct arena *sc
 
 int smooth_tangents_make(struct world *w, struct arena *scratch, struct error *e)
 {
-	struct node_table made; /* by triangles: those of mirrored instances have another order */
+	struct node_table made; /* keyed by index array: mirrored instances have another order */
 	bool begun = false;
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		struct geom_shape *g = &w->shapes[i];

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The effects of a scene and what a user may override, as displayed by programs. Filled in by render_check and
- * world_summary (build.h). Pure; any thread; allocates nothing.
+ * The effects of a scene and the options that a user may override, as displayed by programs. Filled in by render_check
+ * and world_summary (build.h). Pure; any thread; allocates nothing.
  */
 #ifndef WORKER_RENDER_WORLD_SUMMARY_H
 #define WORKER_RENDER_WORLD_SUMMARY_H
@@ -9,65 +9,69 @@
 #include "common/plan/plan.h"
 #include "worker/render/scene/settings.h"
 
-/* One effect, on or off, and why: "dispersion", false, "no dielectric has an index that varies with wavelength". */
+/* One effect, on or off, and the reason: "dispersion", false, "no dielectric has an index that varies with
+ * wavelength". */
 struct effect_line {
 	const char *name;
 	bool on;
 	bool forced;	  /* overridden by the user */
-	bool other_scene; /* forced off: the image is that of another scene */
+	bool other_scene; /* forced off, so the image shows a different scene */
 	char why[240];
-	const char *saves; /* what omitting it saves */
+	const char *saves; /* what omitting the effect saves */
 };
 enum { RENDER_EFFECTS_MAX = 26 };
 
-/* The overrides of hslt-submit and hslt-render; all zero: as the scene requires. The texts are those of a plan. */
+/* The overrides of hslt-submit and hslt-render; all zero: as the scene requires. The texts are in the form of a
+ * plan. */
 struct render_options {
 	uint32_t width, height;
 	char accuracy[PLAN_ACCURACY_MAX], effects[PLAN_EFFECTS_MAX];
 	uint32_t max_depth;
 };
 
-/* Shapes with coinciding surfaces, a sentence for each pair. */
+/* Notes about shapes with coinciding surfaces, one sentence for each pair. */
 enum { RENDER_COINCIDENT_MAX = 8 };
 struct render_coincident {
 	char text[RENDER_COINCIDENT_MAX][400];
-	size_t count, total; /* sentences; the number of pairs */
-	bool incomplete;     /* the search was incomplete */
+	size_t count, total; /* number of sentences; number of pairs */
+	bool incomplete;     /* the search reached its bound */
 };
 
-/* What was noticed while shapes were read and placed; "" if nothing was. */
+/* Notes about the scene, made while shapes were read and placed and afterwards; "" if there is nothing to say. */
 struct world_notes {
-	char scales[512];    /* a shape that is too small relative to another, by name */
+	char scales[512];    /* a shape that is too small relative to another one, by name */
 	char flat[384];	     /* how many triangles without area were left out */
-	char without[256];   /* how many meshes have none */
+	char without[256];   /* how many meshes have no triangles at all */
 	char gone[256];	     /* how many shapes are too small for the scene */
-	char materials[384]; /* how many files of shapes have materials that are not read */
+	char materials[384]; /* how many shape files name materials that are not read */
 	char unseen[192];    /* that the camera sees no shape */
 	char dark[128];	     /* that the emitters give no light */
-	char backs[192];     /* that it sees backs that are black */
-	char endless[256];   /* that it stands in a medium that no light from infinity gets through */
+	char backs[192];     /* that the camera sees backs that are black */
+	char endless[256];   /* that the camera stands in a medium that no light from infinity gets through */
 };
 
 struct render_summary {
-	struct scene_settings settings; /* with the overrides of the options */
-	uint32_t useful_depth;		/* edges of the longest path that can carry light, at most what was requested */
+	struct scene_settings settings; /* includes the overrides of the options */
+	/* Edges of the longest path that can carry light, at most what was requested. */
+	uint32_t useful_depth;
 	struct effect_line lines[RENDER_EFFECTS_MAX];
 	size_t line_count;
-	uint64_t shapes, triangles; /* instances, with everything they show */
-	uint64_t instances;	    /* objects of the scene that show a group of shapes somewhere */
-	uint64_t sharing, shared_meshes, stored_triangles; /* shapes that share meshes, as those of large groups do;
-							      number of these meshes; memory */
-	uint64_t segments;				   /* round cones of curves */
-	uint64_t memory;  /* bytes of the world, approximately; Embree's part is estimated per triangle */
-	double brightest; /* see world_brightest */
-	bool beams;	  /* see world_has_beam */
-	bool rolls;	  /* see world_rolls */
+	uint64_t shapes, triangles; /* including all that instances show */
+	uint64_t instances;	    /* number of instances in the scene */
+	/* Number of shapes that share meshes, number of meshes that they share, and number of triangles in memory. */
+	uint64_t sharing, shared_meshes, stored_triangles;
+	uint64_t segments; /* number of round cones of curves */
+	/* Approximate size of the world in bytes; Embree's part is estimated per triangle. */
+	uint64_t memory;
+	double brightest; /* see world_brightest() */
+	bool beams;	  /* see world_has_beam() */
+	bool rolls;	  /* see world_rolls() */
 	struct render_coincident coincident;
 	struct world_notes notes;
 };
 
-/* The camera in one line of name=value pairs with the scene language's names: fov in degrees along fov_axis,
- * to_world by rows (x left on the image, y up, z forward). For the image's header. */
+/* Size of the camera's text, one line of name=value pairs with the scene language's names: fov in degrees along
+ * fov_axis, to_world by rows (x left on the image, y up, z forward). It goes into the image's header. */
 enum { RENDER_CAMERA_TEXT = 768 };
 
 #endif

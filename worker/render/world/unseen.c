@@ -3,10 +3,10 @@
 
 #include <stdio.h>
 
-/* The sides that a box can be beyond: the near and the far plane, and four planes through the edges of the film. */
+/* The planes that a box can be beyond: the near and the far plane, and four planes through the edges of the film. */
 enum { NEAR, FAR, LEFT, RIGHT, TOP, BOTTOM, SIDES };
 
-/* Slopes of rays through the edges of what is rendered, with the pixels whose filter reaches in. */
+/* Slopes of rays through the edges of the rendered region, including the pixels whose filter reaches into it. */
 struct view {
 	double slope[SIDES];
 };
@@ -23,9 +23,9 @@ static struct view view_of(const struct world *w)
 				       [BOTTOM] = (y + height + more - c->center_y) / c->scale}};
 }
 
-/* Whether p, in the camera's frame, is beyond that side for every point of the aperture: the ray from one at r across
- * the axis has a slope that differs by -r / focus, so at a depth of z it is r (1 - z / focus) from the pinhole's. What
- * is beyond a side is convex: a box whose corners are, is. */
+/* Whether p, in the camera's frame, is beyond a plane for every point of the aperture. The ray from the aperture point
+ * at distance r from the axis has a slope that differs by -r / focus, so at depth z it is r (1 - z / focus) from the
+ * pinhole's ray. The region beyond a plane is convex, so a box is beyond it if its corners are. */
 static bool is_beyond(const struct camera *c, const struct view *v, int side, vec3 p)
 {
 	double blur = c->aperture > 0 ? c->aperture * fabs(1 - p.z / c->focus) : 0, edge = v->slope[side] * p.z;
@@ -45,7 +45,7 @@ static bool is_beyond(const struct camera *c, const struct view *v, int side, ve
 	}
 }
 
-/* The sides, as bits, that all corners are beyond. */
+/* Returns the planes, as bits, that all corners are beyond. */
 static unsigned sides_of(const struct world *w, const struct view *v, const struct box *b)
 {
 	const struct camera *c = &w->camera;
@@ -64,7 +64,7 @@ static unsigned sides_of(const struct world *w, const struct view *v, const stru
 
 void unseen_note(struct world *w, const struct box *boxes)
 {
-	if (w->camera.projection) /* its rays do not end at four planes */
+	if (w->camera.projection) /* such a view is not bounded by four planes */
 		return;
 	const struct view v = view_of(w);
 	unsigned all = (1U << SIDES) - 1;
@@ -102,7 +102,7 @@ void dark_note(struct world *w, bool lost)
 
 /* ---- black backs ---- */
 
-enum { SIDE = 32, LEAST = 20 }; /* a share of 1 / LEAST is worth a sentence */
+enum { SIDE = 32, LEAST = 20 }; /* the note appears from a fraction of 1 / LEAST on */
 
 static bool is_black_back(const struct world *w, const struct ray_hit *hit, vec3 from, vec3 d)
 {

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Finds shapes inside of closed opaque ones by their boxes first, then by planes; and scenes in which nothing shines.
+ * Finds shapes inside closed opaque ones, first by their boxes, then by planes; and scenes in which nothing emits.
  *
- * Shapes are sorted by where they start along x, so that for each container only those between its ends are looked at.
- * Of these, the ones whose boxes are inside its box are compared with each of its planes. Nothing fails: what cannot be
- * proved, as of shapes that move or of a camera that may be inside, counts as visible, which costs time and no light.
+ * Shapes are sorted by where they start along x, so that for each container only those between its ends are examined.
+ * Those whose boxes are inside the container's box are compared with each of its planes. Nothing fails: a shape counts
+ * as visible if the opposite cannot be proved, for example if it moves or if the camera may be inside the container;
+ * that costs time but loses no light.
  */
 #include "worker/render/world/visibility_bounds.h"
 
@@ -15,7 +16,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Shapes count as apart at this distance, in scene radii: floats have 2^-24. */
+/* Shapes count as apart at this distance, in scene radii; floats have a precision of 2^-24. */
 #define MARGIN 0x1p-16
 static vec3 vertex_of(const struct geom_shape *g, uint32_t i)
 {
@@ -23,7 +24,7 @@ static vec3 vertex_of(const struct geom_shape *g, uint32_t i)
 	return g->place ? placement_point(g->place, p) : p;
 }
 
-/* Plane of a triangle: unit normal, and its height over the origin. */
+/* Returns the unit normal of a triangle's plane, and its height over the origin. */
 static vec3 plane_of(const struct geom_shape *g, uint32_t triangle, double *height)
 {
 	const uint32_t *t = g->index[triangle];
@@ -33,7 +34,7 @@ static vec3 plane_of(const struct geom_shape *g, uint32_t triangle, double *heig
 	return n;
 }
 
-/* Smallest and largest n.p over a shape. */
+/* Computes the smallest and the largest n.p over a shape. */
 static void extent(const struct geom_shape *g, vec3 n, double *low, double *high)
 {
 	if (g->is_sphere) {
@@ -72,7 +73,8 @@ static double farthest(const struct geom_shape *g, vec3 from)
 	return fmax(far, sqrt(far2));
 }
 
-/* Convex, closed and opaque. An ellipsoid is, too, but as a mesh it is checked triangle by triangle. */
+/* Whether a shape is known to be convex, closed and opaque. An ellipsoid is, too, but it is a mesh whose triangles
+ * would have to be checked one by one. */
 static bool is_container(const struct world *w, const struct scene_node *node, uint32_t shape)
 {
 	const struct geom_shape *g = &w->shapes[shape];
@@ -81,8 +83,8 @@ static bool is_container(const struct world *w, const struct scene_node *node, u
 	       !(w->bsdfs[w->parts[shape].bsdf].modes & BSDF_TRANSMIT);
 }
 
-/* Whether no path from the camera starts inside: all of it is beyond the near plane, or behind the camera and its
- * aperture. */
+/* Whether no camera path can start inside the shape: all of it is beyond the near plane, or behind the
+ * camera and its aperture. */
 static bool camera_is_outside(const struct world *w, const struct geom_shape *g)
 {
 	const struct camera *c = &w->camera;
@@ -101,7 +103,7 @@ static bool contains(const struct geom_shape *outer, const struct geom_shape *in
 		double height, unused, low, high, least, most;
 		vec3 n = plane_of(outer, i, &height);
 		extent(outer, n, &low, &high);
-		/* All of a convex shape is on one side of each of its triangles. */
+		/* A convex shape lies on one side of the plane of each of its triangles. */
 		if (high > height + MARGIN)
 			n = vec3_neg(n), height = -height;
 		extent(inner, n, &least, &most);
@@ -118,7 +120,7 @@ static bool box_holds(const struct box *outer, const struct box *inner)
 	       inner->high.y <= outer->high.y && inner->low.z >= outer->low.z && inner->high.z <= outer->high.z;
 }
 
-/* The first of n sorted numbers that is not below x. */
+/* Returns the index of the first of n sorted numbers that is not below x. */
 static uint32_t first_from(const struct weighted_value *sorted, uint32_t n, double x)
 {
 	uint32_t low = 0, high = n;
@@ -132,7 +134,8 @@ static uint32_t first_from(const struct weighted_value *sorted, uint32_t n, doub
 	return low;
 }
 
-/* Only shapes that start between a container's ends along x, and whose box is inside its box, are checked closely. */
+/* Finds enclosed shapes. Only shapes that start between a container's ends along x and whose boxes are inside its
+ * box are checked closely. */
 static void find_enclosed(const struct world *w, const struct effects_source *src, enum visibility *shape)
 {
 	struct weighted_value *by_x = src->room;
@@ -166,7 +169,8 @@ void visibility_bounds_shapes(const struct world *w, const struct effects_source
 	for (uint32_t i = 0; i < w->shape_count; i++)
 		shape[i] = VISIBILITY_YES;
 	find_enclosed(w, src, shape);
-	bool dark = true, passable = false; /* faces that are no vertices let light through, whatever the depth */
+	bool dark = true,
+	     passable = false; /* passable: faces that are not vertices let light through, whatever the depth */
 	for (uint32_t i = 0; i < w->emitter_count; i++)
 		dark &= !visibility_bounds_emitter(w, shape, i);
 	for (uint32_t i = 0; i < w->media_count; i++) {

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Which shapes a path between camera and light can meet, and how long such a path can be, as far as it can be proved
- * from depth, emitters without light, black materials, and closed opaque shapes (cubes and spheres as the scene
- * language makes them) around others. One thread; allocates nothing.
+ * Finds which shapes a path between camera and light can meet, and how long such a path can be, as far as that can be
+ * proved from the depth, emitters without light, black materials, and closed opaque shapes (cubes and spheres as the
+ * scene language makes them) around others. One thread; allocates nothing.
  */
 #ifndef WORKER_RENDER_WORLD_VISIBILITY_BOUNDS_H
 #define WORKER_RENDER_WORLD_VISIBILITY_BOUNDS_H
@@ -13,29 +13,30 @@ struct box;
 struct weighted_value;
 
 struct bsdf_visibility {
-	enum visibility shapes; /* of those that have it */
+	enum visibility shapes; /* visibility of the shapes that use the BSDF */
 	bool has_shape;
 };
 
 /* The nodes from which the world's parts were made. */
 struct effects_source {
 	const struct scene *scene;
-	const struct scene_node *const *shape, *const *bsdf; /* one per shape; one per BSDF, NULL: the default one */
-	const struct scene_node *const *emitter;	     /* one per emitter */
-	const struct scene_node *sensor;		     /* NULL: there is none */
-	uint32_t max_depth;				     /* as requested; 0: the scene's */
-	const struct box *box;				     /* one per shape, in any unit */
-	struct weighted_value *room;			     /* space for one per shape */
-	struct bsdf_visibility *visibility;		     /* space for one per BSDF */
+	/* One per shape, and one per BSDF; NULL: the default BSDF. */
+	const struct scene_node *const *shape, *const *bsdf;
+	const struct scene_node *const *emitter; /* one per emitter */
+	const struct scene_node *sensor;	 /* NULL: the scene has none */
+	uint32_t max_depth;			 /* as requested; 0: the scene's value */
+	const struct box *box;			 /* one per shape, in any unit */
+	struct weighted_value *room;		 /* space for one per shape */
+	struct bsdf_visibility *visibility;	 /* space for one per BSDF */
 };
 
-/* Whether an emitter emits and is not enclosed. */
+/* Whether an emitter has power and is not enclosed. */
 bool visibility_bounds_emitter(const struct world *w, const enum visibility *shape, uint32_t emitter);
-/* shape[]: one per shape of w. max_depth: edges. */
+/* Fills in shape[], one entry per shape of w. max_depth: edges. */
 void visibility_bounds_shapes(const struct world *w, const struct effects_source *src, uint32_t max_depth,
 			      enum visibility *shape);
-/* Edges of the longest path that can carry light: 1 if nothing scatters, 2 if everything that does is in one plane,
- * whose points do not see each other; otherwise UINT32_MAX. */
+/* Returns the number of edges of the longest path that can carry light: 1 if nothing scatters; 2 if everything that
+ * scatters is in one plane, because its points do not see each other; otherwise UINT32_MAX. */
 uint32_t visibility_bounds_depth(const struct world *w, const enum visibility *shape);
 
 #endif

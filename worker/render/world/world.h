@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The world that all threads share: built once from a description, then immutable. Lengths are rescaled in double by a
- * power of two so that the scene's radius is in (1/2, 1], and moved so that its box is centred, or small things in a
- * scene of mixed scales (origin.h): floats are used only after that.
+ * power of two so that the scene's radius is in (1/2, 1], and the origin is moved to the centre of the scene's box or,
+ * in a scene of mixed scales, among the small things (origin.h). Only then are positions rounded to float.
  */
 #ifndef WORKER_RENDER_WORLD_WORLD_H
 #define WORKER_RENDER_WORLD_WORLD_H
@@ -20,11 +20,11 @@ struct refracting_point;
 struct world_shape {
 	uint32_t bsdf;
 	int32_t emitter;	     /* -1: not an emitter */
-	uint32_t interior, exterior; /* medium, 1 + its index; 0: none */
-	bool passable;		     /* a face of `null` that is no vertex of paths: path/media.h */
+	uint32_t interior, exterior; /* number of the medium: 1 + its index; 0: none */
+	bool passable;		     /* a face of `null` that is not a vertex of paths: path/media.h */
 };
 
-/* The medium on one side of a shape that states any; false: it states none. */
+/* Sets *medium to the medium on one side of a shape that states media. Returns false if the shape states none. */
 static inline bool world_medium_of_side(const struct world_shape *s, bool outside, uint32_t *medium)
 {
 	if (!s->interior && !s->exterior)
@@ -40,42 +40,48 @@ struct world {
 	struct accuracy_settings accuracy;
 	struct camera camera;
 	vec3 center;
-	double scale, radius; /* of the rescaled bounding sphere around the origin */
+	/* Scale: factor from scene to world lengths; radius: that of the rescaled bounding sphere around the origin. */
+	double scale, radius;
 	uint32_t shape_count, bsdf_count, emitter_count;
-	uint32_t instance_count;		   /* of the scene, whatever becomes of them */
-	uint32_t sharing_count, shared_mesh_count; /* shapes that share a mesh with others; number of these meshes */
+	uint32_t instance_count; /* number of instances in the scene, whether or not they share meshes */
+	/* Number of shapes that share a mesh with others, and number of these meshes. */
+	uint32_t sharing_count, shared_mesh_count;
 	struct geom_shape *shapes;
-	struct world_shape *parts; /* one a shape */
+	struct world_shape *parts; /* one per shape */
 	struct bsdf *bsdfs;
 	struct emitter *emitters;
-	uint32_t media_count, camera_medium; /* camera_medium: 1 + its index, as in world_shape; 0: none */
+	/* camera_medium: 1 + its index, as in world_shape; 0: none. */
+	uint32_t media_count, camera_medium;
 	struct medium *media;
-	bool has_passable;     /* some shape is */
-	struct box passed;     /* around all surfaces that connections may look through; may be empty */
-	struct box refracting; /* around all that may refract them; may be empty */
-	struct refracting_point *refracting_points; /* on these: refracting.h */
+	bool has_passable;     /* some shape is passable */
+	struct box passed;     /* bounds all surfaces that connections may look through; may be empty */
+	struct box refracting; /* bounds all surfaces that may refract connections; may be empty */
+	struct refracting_point *refracting_points; /* points on these surfaces: refracting.h */
 	uint32_t refracting_point_count;
-	uint32_t *emitter_medium;	       /* around emitters whose shapes state none; only where media scatter */
-	uint32_t *emitter_shape;	       /* that it belongs to; UINT32_MAX: none */
-	double *emitter_pdf, *emitter_cdf;     /* choice among emitters by light sub-paths */
-	struct emitter_choice *emitter_choice; /* by points that are lit; NULL: by emitter_pdf everywhere */
-	int32_t environment;		       /* index of the emitter that escaping rays meet; -1: none */
-	double grey_xyz[3];		       /* CIE XYZ of grey value 1 */
-	struct coincidence *coincidence;       /* coinciding surfaces; NULL: none */
-	struct render_coincident coincident;   /* notes about them */
+	/* The medium around each emitter whose shape states none; only where media scatter. */
+	uint32_t *emitter_medium;
+	uint32_t *emitter_shape;	   /* the shape of each emitter; UINT32_MAX: none */
+	double *emitter_pdf, *emitter_cdf; /* density and distribution function of the choice by light sub-paths */
+	/* The choice for next event estimation; NULL: by emitter_pdf everywhere. */
+	struct emitter_choice *emitter_choice;
+	/* Index of the emitter that escaping rays meet; -1: none. */
+	int32_t environment;
+	double grey_xyz[3];		     /* CIE XYZ of the grey value 1 */
+	struct coincidence *coincidence;     /* coinciding surfaces; NULL: none */
+	struct render_coincident coincident; /* notes about coinciding surfaces */
 	struct world_notes notes;
 	struct accel *accel;
 };
 
-/* Checked while rendering. -DHSLT_PLAIN makes a renderer without colour, dispersion and apertures, to measure what
- * these checks cost (tests/bench/effects.c). */
+/* Checks an effect while rendering. -DHSLT_PLAIN turns all of them off, to measure what these checks
+ * cost (tests/bench/effects.c). */
 #ifdef HSLT_PLAIN
 #define EFFECT_IS_ON(w, effect) ((void)(w), false)
 #else
 #define EFFECT_IS_ON(w, effect) ((w)->effects.effect)
 #endif
 
-/* What paths carry, made of a number in [0,1): wavelengths, R, G and B, or nothing in a grey scene. */
+/* Returns what a path carries, chosen by a number in [0,1): wavelengths; R, G and B; or nothing in a grey scene. */
 static inline struct wavelengths world_wavelengths(const struct world *w, double u)
 {
 	if (!EFFECT_IS_ON(w, colour))
@@ -85,42 +91,42 @@ static inline struct wavelengths world_wavelengths(const struct world *w, double
 	return wavelengths_sample_few(u, (unsigned)w->accuracy.wavelengths);
 }
 
-/* The time of a path depends on its place on the film. */
+/* Whether the shutter rolls, so that the time of a path depends on its film point. */
 static inline bool world_rolls(const struct world *w)
 {
 	return EFFECT_IS_ON(w, motion) && w->settings.roll != ROLL_NONE;
 }
 
-/* The camera at the time of a path's vertex; room: for one that moves. */
+/* Returns the camera at the time of a path's vertex; `room` is used if the camera moves. */
 static inline const struct camera *world_camera(const struct world *w, const struct surface_point *x,
 						struct camera *room)
 {
 	return camera_at(&w->camera, x->prim.time, room);
 }
 
-/* An emitter at the time of a path's vertex; room: for one that moves. */
+/* Returns an emitter at the time of a path's vertex; `room` is used if the emitter moves. */
 static inline const struct emitter *world_emitter(const struct world *w, int32_t emitter, double time,
 						  struct emitter_room *room)
 {
 	return emitter_at(&w->emitters[emitter], time, room);
 }
 
-/* The emitter selected by a number in [0,1); -1 if there is none. */
+/* Returns the emitter selected by a number in [0,1); -1 if there is none. */
 int32_t world_pick_emitter(const struct world *w, double u);
 
-/* A hit on a shape as a point of its textures. */
+/* Converts a surface point to a texture_point. */
 static inline struct texture_point world_texture_point(const struct surface_point *x)
 {
 	return (struct texture_point){x->u, x->v, x->b1, x->b2, x->prim.prim, .p = x->p};
 }
 
-/* The same as a point of its emitter. */
+/* Converts a surface point to a point of its emitter. */
 static inline struct emitter_point world_emitter_point(const struct surface_point *x)
 {
 	return (struct emitter_point){x->p, x->ng, world_texture_point(x), false};
 }
 
-/* And of its BSDF. */
+/* Converts a surface point to a point of its BSDF. */
 static inline struct bsdf_point world_bsdf_point(const struct surface_point *x, const struct wavelengths *w,
 						 enum transport transport)
 {
