@@ -1,14 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Paths as bytes. A vertex on a surface is written as what its point was made of (the primitive, and barycentrics, the
- * direction from a sphere's centre, or a curve's coordinates), so that reading makes the same point bit by bit, however
- * small the primitive is next to the scene, and bytes from elsewhere cannot name a point that does not lie on its
- * primitive. With the path goes log f as reading it gives: a path that somebody changed has another one.
+ * Paths as bytes. A vertex on a surface is written as the data from which its point was computed (the primitive,
+ * and barycentrics, the direction from a sphere's centre, or a curve's coordinates). So reading produces the same
+ * point bit by bit, however small the primitive is relative to the scene, and untrusted bytes cannot name a point
+ * that is not on its primitive. The bytes include log f as computed after reading them back; a path that was
+ * tampered with has another one.
  *
- * What is refused: numbers that are not finite, indices of what the scene does not have, points outside their
- * primitives, vertices that do not scatter as they say, paths that leave the window or carry no light, another
- * contribution than stated. Nothing is allocated. Unless media scatter, no ray is cast: whether anything lies between
- * two vertices is not asked.
+ * Reading refuses numbers that are not finite, indices of objects that the scene does not have, points outside their
+ * primitives, vertices that do not scatter as they state, paths that leave the window or carry no light, and a
+ * contribution other than the one stated. Nothing is allocated. Unless media scatter, no ray is traced, so it is not
+ * checked whether anything lies between two vertices.
  */
 #include "worker/render/chain/path_bytes.h"
 
@@ -18,8 +19,8 @@
 
 enum { PATH_EDGES = 8, PATH_HEAD = PATH_EDGES + 8, VERTEX_BYTES = 40 };
 
-/* What a scene does not call for is not there: the wavelength's number without colour, the time without motion, the
- * camera's vertex without aperture. */
+/* Returns the size of the head. Fields that the scene does not need are omitted: the wavelength without colour, the
+ * time without motion; likewise the camera's vertex without an aperture. */
 static size_t head_bytes(const struct world *w)
 {
 	size_t colour = EFFECT_IS_ON(w, colour) ? 8 : 0, motion = EFFECT_IS_ON(w, motion) ? 8 : 0;
@@ -31,19 +32,20 @@ static unsigned vertex_count(const struct world *w, unsigned edges)
 	return EFFECT_IS_ON(w, aperture) ? edges + 1 : edges;
 }
 
-/* How far a point of the aperture may lie from it, in units of the world's radius or of a larger aperture's, and the
- * square of a direction from 1. */
+/* Tolerances: how far a point may be from the aperture, in units of the world's radius or of the aperture's if that is
+ * larger, and the square of a direction from 1. */
 #define BELONGS 1e-9
-/* Roundings of a sum of barycentrics, or of a unit vector's square, that were made by a few operations. */
+/* Rounding errors of a sum of barycentrics, or of a unit vector's square, after a few operations. */
 #define ROUNDING 0x1p-48
-/* Walks meet specular directions far more exactly. */
+/* Limit on full_path_specular_miss; walks are far more exact. */
 #define SPECULAR 1e-3
-/* Tolerance of the contribution: workers with other numeric fingerprints round differently. */
+/* Tolerance of log f: workers with other numeric fingerprints round differently. */
 #define CONTRIBUTION 1e-6
 
 /* ---- writing */
 
-/* What surface_at makes the point of again. An emitter's point that was drawn knows its position alone. */
+/* Returns the coordinates from which read_surface computes the point again. An emitter's point that was
+ * drawn only has a position. */
 static vec3 place_of(const struct world *w, const struct path_vertex *v)
 {
 	const struct geom_shape *s = &w->shapes[v->x.prim.shape];
@@ -99,7 +101,7 @@ static bool read_surface(const struct world *w, struct prim_ref prim, vec3 place
 	return vec3_is_finite(x->ng);
 }
 
-/* An emitter that has no surface. */
+/* Reads a point of an emitter without a surface. */
 static bool read_far_emitter(const struct world *w, int32_t emitter, vec3 p, double time, struct path_vertex *v)
 {
 	struct emitter_room room;
@@ -129,7 +131,7 @@ static struct path_vertex pinhole(const struct world *w, double time)
 	return v;
 }
 
-/* Far beyond anything that belongs to the scene: squares of such numbers would overflow. */
+/* Whether p is far beyond everything in the scene, so that squares of its coordinates could overflow. */
 static bool is_huge(const struct world *w, vec3 p, double time)
 {
 	double most = 4 * (w->radius + 1) + vec3_length(pinhole(w, time).x.p) + w->camera.aperture;
@@ -172,7 +174,7 @@ static bool read_vertex(const struct world *w, const uint8_t *at, unsigned i, un
 	return i > 0 || (v->emitter == emitter && v->kind == VERTEX_EMITTER);
 }
 
-/* Without its contribution. */
+/* Reads a path without checking its contribution. */
 static bool read_path(struct path_context *c, const uint8_t *bytes, size_t size, struct full_path *x)
 {
 	if (size < PATH_EDGES)
@@ -206,9 +208,10 @@ static bool read_path(struct path_context *c, const uint8_t *bytes, size_t size,
 	return true;
 }
 
-/* Our code, but the bytes may be anybody's: what they make invalid (a signalling NaN, infinity less infinity) is
- * refused and no fault. A call, so that nothing of it is computed before or after the flags are looked at. stated: as
- * the bytes say. */
+/* Reads a path and computes its contribution; if `stated`, compares it with the one that the bytes state. The code is
+ * ours, but the bytes are not trusted: an invalid operation that they cause (a signalling NaN, infinity minus
+ * infinity) is refused and is not a fault. Not inline, so that no part is computed before or after the floating-point
+ * flags are saved and restored. */
 __attribute__((noinline)) static bool contribution_of(struct path_context *c, const uint8_t *bytes, size_t size,
 						      bool stated, struct full_path *x, double *contribution)
 {

@@ -2,14 +2,14 @@
 /*
  * Improved half vector space light transport (Hanika, Kaplanyan, Dachsbacher 2015): chains whose states are whole
  * paths, moved by a mixture of mutations (Veach and Guibas 1997; worker/render/mutation). The target is I = X+Y+Z of
- * the path's contribution per area; independent proposals also estimate b by f / T. Their bootstrap is that of bdpt.
+ * the path's contribution per area; independent proposals also estimate b by f / T. The bootstrap is that of bdpt.
  *
- * A step copies the state, draws a strategy of the mixture, lets it propose, and accepts with probability
- * min(1, ratio of the weights). The state that is left is splatted with its accumulated weight. At the end of an epoch
- * the state is saved as bytes (path_bytes.c), from which the next epoch resumes.
+ * A step draws a strategy of the mixture, lets it change a copy of the state, and accepts the proposal with probability
+ * min(1, ratio of the weights). A state that the chain leaves is splatted with its accumulated weight. At the end of an
+ * epoch the state is saved as bytes (path_bytes.c), from which the next epoch resumes.
  *
- * A proposal without density, or with one that is not finite or out of range, is counted by its reason and rejected. A
- * state that cannot be resumed fails the lease (-EILSEQ).
+ * A proposal whose density is zero, not finite or out of range is counted by its reason and rejected. A state that
+ * cannot be resumed fails the lease (-EILSEQ).
  */
 #include "worker/render/chain/chain.h"
 
@@ -26,8 +26,10 @@ struct path_chain {
 	struct mixture mixture;
 	struct mutation_ctx mutation;
 	struct path_place place[2];
-	struct path_place *current, *proposal; /* the proposal's path equals the current one between steps */
-	size_t began_size;		       /* the path with which the epoch began, as bytes */
+	/* The proposal's path equals the current one between steps. */
+	struct path_place *current, *proposal;
+	/* The path with which the epoch began, as bytes. */
+	size_t began_size;
 	uint8_t began[PATH_BYTES_MAX];
 };
 
@@ -39,7 +41,7 @@ static struct path_chain *path_of(struct chain *c)
 static void set_up(struct path_chain *c)
 {
 	struct error ignored;
-	/* The plan was checked when the lease came. */
+	/* The plan was checked when the lease arrived. */
 	mixture_parse(c->base.mixture, &c->mixture, &ignored);
 	c->current = &c->place[0];
 	c->proposal = &c->place[1];
@@ -121,7 +123,7 @@ static void flush(struct chain *base)
 	splat(path_of(base), path_of(base)->current);
 }
 
-/* The probability of acceptance; 0 if there is no valid proposal, the reason for which is counted. */
+/* Returns the acceptance probability; 0 if there is no valid proposal, the reason for which is counted. */
 static double propose(struct path_chain *c, const struct mixture_entry *entry, struct move *move,
 		      struct chain_sums *sums)
 {

@@ -58,8 +58,8 @@ bool path_start(struct path_context *c, uint64_t seed, uint64_t bootstrap_index,
 	c->roulette = roulette;
 	if (candidates.count == 0)
 		return false;
-	/* On the very border of what is sampled the path that was drawn may lie outside when it is computed again: once
-	 * in millions. The chain then looks for light as one without a seed does. */
+	/* At the very border of the sampled region, the path may lie outside when it is computed again: once in
+	 * millions of cases. The chain then looks for light like one without a seed. */
 	if (!ensemble_choose(c, &candidates, choice[0], x))
 		x->edges = 0;
 	return true;

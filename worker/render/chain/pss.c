@@ -22,8 +22,8 @@ double pss_small_step(double u, double r)
 	return w < 1 ? w : 0;
 }
 
-/* A small step from `from`, driven by the fresh numbers u and put in their place. The wavelength alone stays fresh: the
- * target hardly depends on it, and a chain that moves through all of them at once shows no coloured noise. */
+/* Replaces the fresh numbers u by `from` moved by small steps that u determines. Only the wavelength stays fresh: the
+ * target hardly depends on it, and a chain that moves through all wavelengths at once shows no coloured noise. */
 static void move(enum sampler_side side, unsigned vertex, const double from[SAMPLER_BLOCK], double u[SAMPLER_BLOCK])
 {
 	double wavelength = u[DIM_WAVELENGTH];

@@ -8,13 +8,13 @@
 
 #include <assert.h>
 
-/* The share of independent proposals. */
+/* The fraction of independent proposals. */
 #define LARGE_STEP 0.3
 
 struct pss_place {
 	struct pss_point point;
 	struct path_sample sample;
-	double weight; /* gathered, not splatted yet */
+	double weight; /* accumulated but not yet splatted */
 };
 
 struct pss_chain {
@@ -61,7 +61,7 @@ static bool start(struct chain *base, uint64_t bootstrap_index)
 	return c->current->sample.intensity > 0;
 }
 
-/* Evaluates a point that is all there: a large step's sampler that finds every block in place. */
+/* Evaluates a complete point: the sampler of a large step finds all blocks already filled. */
 static void reevaluate(struct pss_chain *c)
 {
 	struct pss_point copy = c->current->point;
@@ -89,7 +89,7 @@ static bool resume(struct chain *base, const struct chain_state *state)
 	if (!chain_get_head(base, state->bytes, state->size))
 		return false;
 	unsigned flags =
-		fptrap_leave(); /* the bytes may be anybody's: a signalling NaN is refused, and no fault of ours */
+		fptrap_leave(); /* the bytes are not trusted: a signalling NaN is refused and is not a fault of ours */
 	size_t n = pss_read(&c->current->point, state->bytes + CHAIN_STATE_HEAD, state->size - CHAIN_STATE_HEAD);
 	fptrap_return(flags);
 	if (n == 0 || n != state->size - CHAIN_STATE_HEAD)
@@ -106,7 +106,8 @@ static void splat(struct pss_chain *c, struct pss_place *at)
 {
 	if (at->weight == 0)
 		return;
-	/* Shares of the intensity: where it is denormal its reciprocal is infinite. */
+	/* Splats are divided by the intensity, not multiplied by its reciprocal, which is infinite
+	 * for a denormal intensity. */
 	double intensity = at->sample.intensity;
 	for (uint32_t i = 0; i < at->sample.count; i++) {
 		struct splat s = at->sample.splats[i];

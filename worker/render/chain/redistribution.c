@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * bdpt calls keep() for each contribution of a sample. Nearly all are below the threshold and are left as they are. For
- * the others, keep() builds the full path x, because its share depends on the path alone, not on the roulette of the
- * sub-paths, which stays a factor of the weight. Then run_chain() runs the chains: it proposes y by a local mutation,
- * accepts it with probability min(1, h(y) T(y -> x) / (h(x) T(x -> y))), and splats both states with their expected
- * weights.
+ * bdpt calls keep() for each contribution of a sample. Nearly all are below the threshold and are left as they are.
+ * For the others, keep() builds the full path x, because the share that is spread depends on the path alone, not on
+ * the roulette of the sub-paths, which stays a factor of the weight. Then run_chain() runs the chains: it proposes y
+ * by a local mutation, accepts it with probability min(1, h(y) T(y -> x) / (h(x) T(x -> y))), and splats both states
+ * with their expected weights.
  *
- * One path in millions cannot be built again; it keeps its contribution. Proposals with a density that is not
- * finite are counted and rejected.
+ * One path in millions cannot be built again; it keeps its contribution. Proposals with a density that is not finite
+ * are counted and rejected.
  */
 #include "worker/render/chain/redistribution.h"
 
@@ -26,17 +26,17 @@ const struct redistribution_rule redistribution_usual = {.threshold = 4, .mutati
 struct spread_place {
 	struct path_place place;
 	double scale; /* w */
-	double share; /* 1 - a; 0: the film gets all */
+	double share; /* 1 - a; 0: the film gets everything */
 };
 
 struct redistribution {
-	struct path_split split; /* first: keep() gets its address */
+	struct path_split split; /* must be first: keep() gets its address */
 	struct redistribution_rule rule;
-	struct path_context context; /* of the chains */
-	uint32_t light_every;	     /* of the samples */
+	struct path_context context; /* context of the chains */
+	uint32_t light_every;	     /* light_every of the samples */
 	const struct brightness *map;
 	struct splat_target *to;
-	struct mixture mixture; /* local strategies alone */
+	struct mixture mixture; /* local strategies only */
 	struct mutation_ctx mutation;
 	uint64_t unread[STRATEGY_COUNTERS];
 	uint64_t pixel, sample;
@@ -44,7 +44,7 @@ struct redistribution {
 	struct spread_place start, places[2];
 };
 
-/* Some inner vertex is not specular. */
+/* Whether some inner vertex is not specular. */
 static bool is_scattered(const struct full_path *x)
 {
 	for (unsigned j = 1; j < x->edges; j++)
@@ -53,7 +53,7 @@ static bool is_scattered(const struct full_path *x)
 	return false;
 }
 
-/* Computes w and the share of chains in the contribution of this path. */
+/* Computes w and the share 1 - a of this path's contribution that is spread. */
 static void compute_weight(struct redistribution *r, struct spread_place *at)
 {
 	double log_pdf[FULL_PATH_MAX_VERTICES];
@@ -80,7 +80,7 @@ static void splat(struct redistribution *r, struct spread_place *at, double unit
 	at->place.weight = 0;
 }
 
-/* The probability of acceptance. */
+/* Returns the acceptance probability. */
 static double propose(struct redistribution *r, const struct mixture_entry *entry, struct move *move,
 		      struct spread_place *x, struct spread_place *y)
 {
@@ -99,7 +99,7 @@ static double propose(struct redistribution *r, const struct mixture_entry *entr
 	return exp(fmin(to_y - to_x + log(y->scale * y->share / (x->scale * x->share)), 0));
 }
 
-/* One chain from the path `from`; each mutation splats `unit` times the brightness of its place. */
+/* Runs one chain from the path `from`; each mutation splats `unit` times the brightness of its place. */
 static void run_chain(struct redistribution *r, const struct spread_place *from, double unit)
 {
 	struct spread_place *x = &r->places[0], *y = &r->places[1];
@@ -131,8 +131,8 @@ static void run_chain(struct redistribution *r, const struct spread_place *from,
 	splat(r, x, unit);
 }
 
-/* The number of chains for `units` times the energy that one chain carries, and the factor `each` of their energy. Less
- * than one unit: one chain with that probability, otherwise none. */
+/* Returns the number of chains for `units` times the energy that one chain carries, and sets the factor *each on their
+ * energy. For less than one unit: one chain with that probability, otherwise none. */
 static unsigned chains_for(double units, double u, double *each)
 {
 	if (units < 1) {
@@ -176,7 +176,7 @@ static spectrum keep(struct path_split *split, struct path_context *c, unsigned 
 	return spectrum_scale(1 - share, l);
 }
 
-/* Independent strategies ignore the current path: they would not keep the energy near it. */
+/* Removes independent strategies: they ignore the current path, so they would not keep the energy near it. */
 static void leave_out_independent(struct mixture *m)
 {
 	unsigned n = 0;

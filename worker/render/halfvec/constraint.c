@@ -1,18 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/halfvec/constraint.h"
 
-/* What a constraint knows of an adjacent vertex. */
+/* What a constraint needs to know about an adjacent vertex. */
 struct neighbour {
-	vec3 w;	     /* unit direction to it */
-	double rate; /* how fast w turns as it moves perpendicular to w */
-	double own;  /* and as the constraint's own vertex does */
-	vec3 du, dv; /* how it moves */
+	vec3 w;	     /* unit direction to the adjacent vertex */
+	double rate; /* how fast w turns as the adjacent vertex moves perpendicular to w */
+	double own;  /* how fast w turns as the constraint's own vertex moves */
+	vec3 du, dv; /* tangents along which the adjacent vertex moves */
 };
 
 /* A half vector before normalisation, and its slopes. */
 struct half {
 	vec3 sum;     /* i + eta o */
-	double along; /* 1 if index-matched: then no slope is divided */
+	double along; /* h.n; 1 if index-matched, where slopes are not divided */
 	vec2 h;
 	bool matched, finite;
 };
@@ -30,7 +30,7 @@ static struct half half_of(const struct full_path *x, unsigned j, double eta)
 	r.matched = eta == 1 && (v->mode & BSDF_TRANSMIT);
 	if (!r.matched) {
 		r.along = l.z;
-		/* Beyond this the derivatives, which divide by its square, could overflow. */
+		/* For smaller values, the derivatives could overflow, since they divide by the square. */
 		r.finite = fabs(l.z) > 0x1p-300 * vec3_length(r.sum);
 	}
 	r.h = r.finite ? (vec2){l.x / r.along, l.y / r.along} : (vec2){INFINITY, INFINITY};
@@ -42,13 +42,13 @@ vec2 halfvec_of(const struct full_path *x, unsigned j)
 	return half_of(x, j, full_path_eta(x, j)).h;
 }
 
-/* Derivative of a unit direction that turns at `rate` as an end of it moves along d. */
+/* Returns the derivative of a unit direction that turns at `rate` as one of its ends moves along d. */
 static inline vec3 turn(vec3 w, vec3 d, double rate)
 {
 	return vec3_scale(rate, vec3_madd(d, -vec3_dot(w, d), w));
 }
 
-/* Derivative of the slopes as the half vector changes by d, in a fixed frame. */
+/* Returns the derivative of the slopes as the half vector changes by d, in a fixed frame. */
 static inline vec2 slope_change(const struct frame *f, const struct half *r, vec3 d)
 {
 	vec3 l = frame_to_local(f, d);
@@ -63,9 +63,9 @@ static inline mat2 by_neighbour(const struct frame *f, const struct half *r, con
 			       slope_change(f, r, turn(n->w, n->dv, weight * n->rate)));
 }
 
-/* The vertex itself moves along d: both directions turn, and the frame with the shading normal (by dn) and with the
- * axis a (by da). ds = -(s.dn) n + w t and dt = -(t.dn) n - w s, where w is the rate at which s = N(a - n (n.a)) turns
- * around n. */
+/* Returns the derivative of the slopes as the vertex itself moves along d: both directions turn, and the frame turns
+ * with the shading normal (by dn) and with the axis a (by da). ds = -(s.dn) n + w t and dt = -(t.dn) n - w s, where w
+ * is the rate at which s = N(a - n (n.a)) turns around n. */
 static inline vec2 by_itself(const struct frame *f, const struct half *r, const struct neighbour *i,
 			     const struct neighbour *o, double eta, vec3 d, vec3 a, vec3 dn, vec3 da)
 {
@@ -74,7 +74,7 @@ static inline vec2 by_itself(const struct frame *f, const struct half *r, const 
 	double dns = vec3_dot(f->s, dn), dnt = vec3_dot(f->t, dn);
 	double bent = vec3_dot(f->s, a); /* |a - n (n.a)| */
 	double twist = bent > 0 ? (vec3_dot(f->t, da) - dnt * vec3_dot(f->n, a)) / bent : 0;
-	double normal = 1, stretch = 0; /* of the half vector that the slopes are computed from */
+	double normal = 1, stretch = 0; /* normal: n component of the vector from which the slopes are computed */
 	if (r->matched)
 		normal = vec3_dot(r->sum, f->n);
 	else
@@ -84,7 +84,7 @@ static inline vec2 by_itself(const struct frame *f, const struct half *r, const 
 	return c;
 }
 
-/* How an end of the sub-path moves, seen from the adjacent vertex in direction w. */
+/* Sets the tangents along which an end of the sub-path moves, as seen from the adjacent vertex in that direction. */
 static void end_tangents(const struct world *w, const struct path_vertex *v, vec3 direction, struct neighbour *n)
 {
 	struct frame f;

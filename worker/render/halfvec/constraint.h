@@ -1,19 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Half vectors of a whole path and their derivatives (Hanika, Kaplanyan, Dachsbacher 2015, sec. 3.1 and 3.2; the
- * paper's indices: x_0 on the light, i towards the light, o towards the camera).
+ * Half vectors of a whole path and their derivatives (Hanika, Kaplanyan, Dachsbacher 2015, sec. 3.1 and 3.2; indices as
+ * in the paper: x_0 is on the light, i points towards the light, o towards the camera).
  *
- * h_j = (h.s, h.t) / (h.n), h along i_j + eta_j o_j, eta_j = n_o / n_i, in the shading frame (s, t, n) of x_j: the
- * plane-plane half vector with the signed h.n, so that neither the sign of h nor the order of the neighbours matters.
- * Index-matched transmission (eta = 1 exactly): h_j = ((i + o).s, (i + o).t).
+ * h_j = (h.s, h.t) / (h.n), where h = i_j + eta_j o_j, eta_j = n_o / n_i, and (s, t, n) is the shading frame of x_j.
+ * This is the plane-plane half vector, but divided by the signed h.n, so that neither the sign of h nor the order of
+ * the neighbours matters. For index-matched transmission (eta = 1 exactly), h_j = ((i + o).s, (i + o).t).
  *
- *   a = d h_j / d x_{j-1},   b = d h_j / d x_j,   c = d h_j / d x_{j+1}        rows s, t; columns tangent coordinates
+ *     a = d h_j / d x_{j-1},   b = d h_j / d x_j,   c = d h_j / d x_{j+1}        rows s, t; columns tangent coordinates
  *
- * Tangent coordinates are lengths along the orthonormal (du, dv) of the vertex that moves, in the plane of its
- * geometric normal. An emitter at infinity moves as a direction (solid angle), a delta emitter across the direction to
- * its neighbour. Derivatives are exact for shading normals that are not the geometric ones, too: the frame turns with
- * both. h.n = 0: h is infinite and all derivatives are 0, so that the matrix is singular. All else is finite. Pure; one
- * thread a call; nothing allocates.
+ * Tangent coordinates are lengths along the orthonormal (du, dv) of the vertex that moves, in the plane perpendicular
+ * to its geometric normal. An emitter at infinity moves as a direction (solid angle), a delta emitter perpendicular to
+ * the direction to its neighbour. The derivatives are also exact where the shading normal differs from the geometric
+ * normal: the frame turns with both. If h.n = 0, h is infinite and all derivatives are 0, so that the matrix is
+ * singular. All other results are finite. Pure; one thread per call; nothing allocates.
  */
 #ifndef WORKER_RENDER_HALFVEC_CONSTRAINT_H
 #define WORKER_RENDER_HALFVEC_CONSTRAINT_H
@@ -26,23 +26,26 @@ struct constraint {
 	mat2 a, b, c;
 };
 
-/* Constraints of the inner vertices c+1..b-1 of x, k[j] for vertex j. Needs edges c..b-1 joined and the inner modes. */
+/* Computes the constraints of the inner vertices c+1..b-1 of x; k[j] is that of vertex j. Edges c..b-1 must be joined
+ * and the modes of the inner vertices set. */
 void constraints_of(const struct world *w, const struct full_path *x, unsigned b, unsigned c, struct constraint *k);
-/* Computes h only. */
+/* Computes only h_j. */
 vec2 halfvec_of(const struct full_path *x, unsigned j);
 
 /*
  * The block tridiagonal system of the vertices c+1..b-1 between the fixed ends x_b and x_c (b - c >= 2):
- *   a_j dx_{j-1} + b_j dx_j + c_j dx_{j+1} = dh_j
- * eliminated from the camera's end (L_{b-1} = b_{b-1}, L_j = b_j - c_j L_{j+1}^-1 a_{j+1}); where a block L_j is
- * singular or nearly so although the matrix is not, by a banded elimination with pivoting.
+ *
+ *     a_j dx_{j-1} + b_j dx_j + c_j dx_{j+1} = dh_j
+ *
+ * It is eliminated from the camera's end (L_{b-1} = b_{b-1}, L_j = b_j - c_j L_{j+1}^-1 a_{j+1}). Where a block L_j is
+ * singular or nearly so although the matrix is not, a banded elimination with pivoting is used instead.
  */
 enum constraint_end { CONSTRAINT_OK, CONSTRAINT_SINGULAR };
 
 struct constraint_factors {
-	mat2 inverse[FULL_PATH_MAX_VERTICES]; /* by vertex, of L_j */
-	double det[FULL_PATH_MAX_VERTICES];   /* of L_j */
-	/* banded factors, when pivoted: the layout is constraint_system.inc's */
+	mat2 inverse[FULL_PATH_MAX_VERTICES]; /* inverse of L_j, by vertex */
+	double det[FULL_PATH_MAX_VERTICES];   /* determinant of L_j */
+	/* The factors of the banded elimination, if pivoted: constraint_system.inc describes their layout. */
 	double band[2 * FULL_PATH_MAX_VERTICES][10];
 };
 
@@ -53,34 +56,35 @@ struct constraint_factors_single {
 	mat2_single inverse[FULL_PATH_MAX_VERTICES];
 	float det[FULL_PATH_MAX_VERTICES];
 	float band[2 * FULL_PATH_MAX_VERTICES][10];
-	struct constraint_single k[FULL_PATH_MAX_VERTICES]; /* vertices of the factored system */
+	/* The constraints of the factored system, in float. */
+	struct constraint_single k[FULL_PATH_MAX_VERTICES];
 };
 
 struct constraint_system {
 	unsigned b, c;
 	bool pivoted;
-	unsigned char order[2 * FULL_PATH_MAX_VERTICES]; /* of the banded factors */
+	unsigned char order[2 * FULL_PATH_MAX_VERTICES]; /* pivots of the banded factors */
 	double log_det;					 /* log |det M| */
-	double log_transfer; /* log |det d x_{b-1} / d x_c| with all h held: prod |det a_j| / |det M| */
+	double log_transfer; /* log |det d x_{b-1} / d x_c| with all h held fixed: prod |det a_j| / |det M| */
 	union {
 		struct constraint_factors wide;
 		struct constraint_factors_single narrow;
 	};
 };
 
-/* One system in double, another with its matrices and vectors in float: derivatives, half vectors and what is solved
- * for are double for both. */
+/* There are two solvers, one in double and one whose matrices and vectors are float. Derivatives, half vectors and
+ * solutions are double for both. */
 struct constraint_solver {
 	enum constraint_end (*factor)(const struct constraint *k, unsigned b, unsigned c,
 				      struct constraint_system *out);
-	/* The same without the two logarithms, which only `factor` computes. */
+	/* Like factor, but without the two logarithms. */
 	enum constraint_end (*factor_to_solve)(const struct constraint *k, unsigned b, unsigned c,
 					       struct constraint_system *out);
-	/* dx for given dh, both by vertex index c+1..b-1. Finite or infinite; in float also where the solution is
-	 * out of range. */
+	/* Computes dx for a given dh, both indexed by vertex c+1..b-1. The result may be infinite but is never NaN; in
+	 * float it is also infinite where the solution is out of range. */
 	void (*solve)(const struct constraint *k, const struct constraint_system *m, const vec2 *dh, vec2 *dx);
-	/* Ray differentials (sec. 3.1): D_j = d x_{b-1} / d h_j, for j = c+1..b-1. CONSTRAINT_SINGULAR: not
-	 * available. */
+	/* Computes the ray differentials (sec. 3.1) D_j = d x_{b-1} / d h_j, for j = c+1..b-1.
+	 * CONSTRAINT_SINGULAR: they are not available. */
 	enum constraint_end (*differentials)(const struct constraint *k, unsigned b, unsigned c, mat2 *d);
 };
 

@@ -42,7 +42,7 @@ static enum constraint_end factor_single_to_solve(const struct constraint *k, un
 	return factor_to_solve(m->narrow.k, b, c, m);
 }
 
-/* Right sides have the range of doubles: they are solved for in units of their largest entry. */
+/* Right-hand sides have the range of doubles, so they are scaled by their largest entry. */
 static void solve_single(const struct constraint *k, const struct constraint_system *m, const vec2 *dh, vec2 *dx)
 {
 	(void)k;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The solver of constraint.h in double, and which of both the settings ask for. */
+/* The solver of constraint.h in double, and the choice of the solver by the settings. */
 #ifndef WORKER_RENDER_HALFVEC_CONSTRAINT_SYSTEM_H
 #define WORKER_RENDER_HALFVEC_CONSTRAINT_SYSTEM_H
 

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Manifold next event estimation's walk (Hanika, Droske and Fascione 2015, sec. 4): the straight line from z to y gives
- * the surfaces and a first guess, halfvec_walk moves the guess to where all half vectors are 0. Where that fails and z
- * lies in a denser medium, as under water beside a wall, a few more lines out of it are tried: that along which light
- * would arrive if the surface were a plane, and those to points of it (world/refracting.h).
+ * The walk of manifold next event estimation (Hanika, Droske and Fascione 2015, sec. 4). The straight line from z to y
+ * gives the surfaces and an initial guess, and halfvec_walk moves the guess to where all half vectors are 0. If that
+ * fails and z lies in a denser medium, as under water beside a wall, a few other lines from z are tried: the one along
+ * which light would arrive if the surface were a plane, and those to points of the surface (world/refracting.h).
  *
- * A guess fails where the line meets a surface that does not refract, or more than PATH_REFRACTED_MOST of them, where
- * the walk does not arrive (walk.h), and where the path is a caustic's edge, at which T is infinite. Paths that are not
- * found are left to the other techniques. So are those between points that see each other: there the connection is
+ * A guess fails if its line meets a surface that does not refract, or more than PATH_REFRACTED_MOST surfaces; if the
+ * walk does not converge (walk.h); or if the path is at the edge of a caustic, where T is infinite. Paths that are not
+ * found are left to the other techniques, as are paths between points that see each other, where the connection is
  * straight (path/connect.c).
  */
 #include "worker/render/halfvec/refract.h"
@@ -18,16 +18,16 @@
 #include "worker/render/path/visible.h"
 #include "worker/render/world/refracting.h"
 
-/* Beyond e^300 to either side T would over- or underflow once multiplied by densities. */
+/* Outside e^-300 .. e^300, T would over- or underflow when multiplied by densities. */
 #define LOG_TRANSFER_MOST 300
 
-/* Whether a ray along d passes v from the denser medium to the thinner. */
+/* Whether a ray along d passes v from the medium with the larger refractive index to the other one. */
 static bool leaves_denser(const struct path_vertex *v, vec3 d)
 {
 	return (vec3_dot(d, v->x.ng) > 0) == (v->bsdf->eta > 1);
 }
 
-/* The direction from `from` to y; returns the distance. */
+/* Sets *d to the direction from `from` to y and returns the distance. */
 static double distance_to(const struct path_vertex *from, const struct path_vertex *y, vec3 *d)
 {
 	double distance2;
@@ -35,9 +35,9 @@ static double distance_to(const struct path_vertex *from, const struct path_vert
 	return y->kind == VERTEX_INFINITE ? INFINITY : sqrt(distance2);
 }
 
-/* A first guess of what lies between z and y, the nearest to z first: surfaces on a line from z along d, no further
- * than at `end`, and behind the first of them straight to y. inside: z is in the denser medium, so light leaves it at
- * the first. false: something that does not refract, or nothing. */
+/* Makes an initial guess of the vertices between z and y, ordered from z: surfaces on a line from z along d, at most
+ * `end` away, and behind the first of them on the straight line to y. inside: z is in the denser medium, so the first
+ * surface must lead out of it. Returns false if the line meets nothing or a surface that does not refract. */
 static bool cross(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y, vec3 d, double end,
 		  bool inside, struct path_refraction *out)
 {
@@ -59,7 +59,7 @@ static bool cross(struct path_context *c, const struct path_vertex *z, const str
 	return false;
 }
 
-/* Moves the guess to where light is refracted. */
+/* Moves the guess to where light is refracted. Returns false if the walk fails. */
 static bool walk_to_refraction(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
 			       struct path_refraction *out)
 {
@@ -87,7 +87,7 @@ static bool walk_to_refraction(struct path_context *c, const struct path_vertex 
 	return fabs(out->log_transfer) < LOG_TRANSFER_MOST;
 }
 
-/* The direction from z in which light from y would arrive behind a plane through q: Snell's law. */
+/* Returns the direction from z in which light from y would arrive behind a plane through q, by Snell's law. */
 static vec3 bent_at(const struct refracting_point *q, const struct path_vertex *y)
 {
 	vec3 in = y->kind == VERTEX_INFINITE ? y->x.p : vec3_sub(y->x.p, q->p);
@@ -103,7 +103,7 @@ static bool refract_along(struct path_context *c, const struct path_vertex *z, c
 	return cross(c, z, y, d, INFINITY, true, out) && walk_to_refraction(c, z, y, out);
 }
 
-/* Where z is in a denser medium, light that was bent arrives from other directions. */
+/* Tries other guesses where z is in a denser medium: light that was bent arrives from other directions than y's. */
 static bool guess_bent(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
 		       struct path_refraction *out)
 {
@@ -118,7 +118,7 @@ static bool guess_bent(struct path_context *c, const struct path_vertex *z, cons
 	return false;
 }
 
-/* Whether z sees y along a straight line, perhaps through surfaces that let light straight through: then a connection
+/* Whether z sees y along a straight line, possibly through surfaces that let light straight through. Then a connection
  * is not refracted, and its paths must not be weighted as if it were. */
 static bool is_open(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y, vec3 d,
 		    double end)

@@ -2,11 +2,12 @@
 #include "worker/render/halfvec/stepsize.h"
 
 #include "worker/render/halfvec/constraint_system.h"
-/* Standard deviation on the film, of its smaller side. */
+/* Standard deviation of a step on the film, as a fraction of its smaller side. */
 #define FILM_STEP 0.02
-/* Minimum of sigma over the limit: a pixel that sees less than this of a lobe leaves no room for a walk in double. */
+/* Minimum of sigma relative to its limit: below it, a pixel sees so little of a lobe that a walk in double has no
+ * room. */
 #define SIGMA_LEAST 1e-6
-/* Smaller cosines and determinants count as zero: dividing by them would overflow. */
+/* Cosines and determinants below this count as zero, because dividing by them would overflow. */
 #define RATIO_LEAST 0x1p-500
 
 double halfvec_film_step(const struct camera *camera)
@@ -25,7 +26,7 @@ static double bsdf_limit(const struct path_context *c, const struct path_vertex 
 	return c->w->accuracy.step_scale * halfvec_lobe_width(v) / sqrt(M_PI);
 }
 
-/* d x_{k-1} / d pixel: rays through x_k meet the plane of the geometric normal. */
+/* Computes d x_{k-1} / d pixel, where rays through x_k meet the plane perpendicular to the geometric normal. */
 static bool pixel_footprint(const struct camera *camera, const struct full_path *x, mat2 *j)
 {
 	const struct full_path_edge *e = &x->edge[x->edges - 1];
@@ -42,7 +43,7 @@ static bool pixel_footprint(const struct camera *camera, const struct full_path 
 	return true;
 }
 
-/* d^-1 j, with both scaled to entries of at most 1 first. */
+/* Computes *e = d^-1 j, with both matrices scaled to entries of at most 1 first. */
 static bool solve(mat2 d, mat2 j, mat2 *e)
 {
 	double size_d = mat2_largest(d), size_j = mat2_largest(j);
@@ -72,7 +73,8 @@ struct halfvec_step halfvec_step_of(mat2 e, double scale, double limit)
 	if (!isfinite(size) || !(size > 0) || !isfinite(size * scale))
 		return s;
 	e = (mat2){e.xx / size, e.xy / size, e.yx / size, e.yy / size};
-	/* e e^T = U diag(s^2) U^T; the smaller one from the determinant, which keeps its precision. */
+	/* e e^T = U diag(s^2) U^T; the smaller singular value follows from the determinant, which keeps its
+	 * precision. */
 	double s00 = e.xx * e.xx + e.xy * e.xy, s11 = e.yx * e.yx + e.yy * e.yy, s01 = e.xx * e.yx + e.xy * e.yy;
 	double difference = s00 - s11, root = sqrt(difference * difference + 4 * s01 * s01);
 	double larger = sqrt(0.5 * (s00 + s11 + root)), smaller = fabs(mat2_det(e)) / larger;
@@ -101,7 +103,7 @@ void halfvec_steps(const struct path_context *c, const struct full_path *x, cons
 		double limit = bsdf_limit(c, &x->v[j]);
 		mat2 e;
 		step[j] = (struct halfvec_step){{1, 0, 0, 1}, {limit, limit}};
-		/* Each vertex takes its share of the pixels. */
+		/* Each vertex takes its share of the pixels, in proportion to its limit. */
 		if (differentials && solve(d[j], footprint, &e))
 			step[j] = halfvec_step_of(e, pixels * limit / sum, limit);
 	}

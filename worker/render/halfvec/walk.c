@@ -2,13 +2,13 @@
 /*
  * Finds vertices x_{b-1} .. x_{c+1} with given half vectors h*, by Newton's method (see walk.h).
  *
- * Each iteration solves M dx = h* - h, M = dh/dx block tridiagonal, moves every vertex by step * dx in its tangent
- * plane and puts it back onto the surface along the ray from the vertex before it. If the largest residual,
+ * Each iteration solves M dx = h* - h, where M = dh/dx is block tridiagonal, moves every vertex by step * dx in its
+ * tangent plane and projects it back onto the surface along the ray from the vertex before it. If the largest residual,
  * |h* - h|^2 / (1 + |h|^2), has shrunk, the trial is kept and the step doubled, up to 1; otherwise the vertices stay
- * and the step is halved. It ends well when each |h* - h| is within its vertex's tolerance and, unless the caller
- * knows it, every edge is unoccluded. At least one trial is made, as the path it starts with was never traced.
- * It fails when the step becomes too short (the reason is that of the last trial: missed, blocked, another mode,
- * residuals grew), when M is singular, or when the iterations run out.
+ * and the step is halved. The walk succeeds when each |h* - h| is within its vertex's tolerance and every edge is
+ * unoccluded, which is not tested if the caller knows it. At least one trial is made, because the rays of the initial
+ * path were never traced. The walk fails if the step becomes too short (the reason is that of the last trial: missed,
+ * blocked, another mode, or residuals grew), if M is singular, or if the iterations run out.
  */
 #include "worker/render/halfvec/walk.h"
 
@@ -21,18 +21,20 @@ struct walk_limits walk_limits_of(const struct accuracy_settings *k)
 				    k->reverse_tolerance,    constraint_solver_of(k)};
 }
 
-/* The state of a walk. Predictions start from the kept state only, so a rejected trial leaves nothing to undo. */
+/* The state of a walk. Trials start from the kept state, so a rejected trial leaves nothing to undo. */
 struct walk {
 	struct path_context *c;
-	struct full_path *y; /* the trial */
+	struct full_path *y; /* the path of the trial */
 	unsigned b, end;
 	const struct walk_target *target;
 	const struct constraint_solver *solver;
-	double scale; /* of the tolerances of a forward walk */
+	double scale; /* factor on the tolerances of a forward walk */
 	bool back;
 	struct walk_scratch *s;
-	uint64_t above;			   /* by vertex: light leaves on the side of the geometric normal */
-	uint64_t seen;			   /* by edge: a ray of this trial has hit the next vertex along it */
+	/* Bit j: light leaves vertex j on the side of the geometric normal. */
+	uint64_t above;
+	/* Bit e: a ray of this trial has hit the next vertex along edge e. */
+	uint64_t seen;
 	vec3 move[FULL_PATH_MAX_VERTICES]; /* a full Newton step from the kept state */
 };
 
@@ -51,8 +53,8 @@ static bool mode_holds(const struct full_path *y, unsigned j)
 	return full_path_mode(y, j) == (y->v[j].mode & (BSDF_REFLECT | BSDF_TRANSMIT));
 }
 
-/* Moves the vertex by a ray, onto another primitive of the same material, through surfaces that are no vertices
- * (path/media.h). */
+/* Moves the vertex to where a ray along d hits a surface of the same material, possibly another primitive. The ray
+ * passes surfaces that are not vertices (path/media.h). */
 static enum walk_end cast(struct walk *m, unsigned j, vec3 d)
 {
 	const struct world *w = m->c->w;
@@ -85,7 +87,8 @@ static enum walk_end cast(struct walk *m, unsigned j, vec3 d)
 	return WALK_OK;
 }
 
-/* Vertex j of the trial: along the ray from the previous one towards the prediction. */
+/* Projects vertex j of the trial onto the surface, along the ray from the previous vertex
+ * towards the predicted position. */
 static enum walk_end put_back(struct walk *m, unsigned j, double step)
 {
 	const struct path_vertex *from = &m->y->v[j + 1], *kept = &m->s->kept[j];
@@ -123,9 +126,9 @@ static enum walk_end trial(struct walk *m, double step)
 
 /* How near the half vectors s->k[].h are to the targets. */
 struct nearness {
-	double error; /* the largest distance, for step control */
+	double error; /* the largest residual, for step control */
 	bool forward; /* all are within the tolerances of a forward walk */
-	bool within;  /* ... of this one */
+	bool within;  /* all are within the tolerances of this walk */
 };
 
 static struct nearness residuals(struct walk *m)
@@ -145,7 +148,7 @@ static struct nearness residuals(struct walk *m)
 	return n;
 }
 
-/* The trial becomes the kept state: Newton's step from there, by the system of s->k. */
+/* Makes the trial the kept state and computes Newton's step from there. factored: s->system already belongs to s->k. */
 static enum walk_end accept_trial(struct walk *m, bool factored)
 {
 	struct walk_scratch *s = m->s;
@@ -179,7 +182,7 @@ static enum walk_end start(struct walk *m)
 	return WALK_OK;
 }
 
-/* Where media scatter, what an edge lets through is asked of each. */
+/* Whether all edges are unoccluded. Where media scatter, every edge is traced, because its transmittance is needed. */
 static bool all_visible(const struct walk *m)
 {
 	uint64_t seen = EFFECT_IS_ON(m->c->w, scattering) ? 0 : m->seen;
@@ -206,8 +209,8 @@ static void refresh_constraints(struct walk *m, unsigned stale)
 		compute_constraints(m, m->end + 2, m->end);
 }
 
-/* Evaluates the trial: half vectors alone are cheap, derivatives are only computed if the walk continues or the
- * caller needs them. */
+/* Evaluates the trial. Half vectors alone are cheap; derivatives are only computed if the walk continues
+ * or the caller needs them. */
 static struct nearness evaluate_trial(struct walk *m)
 {
 	for (unsigned j = m->end + 1; j < m->b; j++)

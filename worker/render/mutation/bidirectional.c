@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Independent proposals from all techniques at once: a pair of sub-paths is drawn, then one of the paths that it forms,
- * in proportion to its contribution by the balance heuristic. The weight of the current state is the sum over a pair of
- * sub-paths around it, drawn as if the state had been drawn from it: on pairs with a marked candidate this is an
- * independence sampler, whose target is the pair's density times the candidate's contribution. So chains change length
- * and class, and the sums estimate b with the variance of bdpt.
+ * in proportion to its contribution weighted by the balance heuristic. The weight of the current state is the sum over
+ * a pair of sub-paths around it, drawn as if the state had been drawn from that pair. On the space of pairs with a
+ * marked candidate this is an independence sampler whose target is the pair's density times the candidate's
+ * contribution. So chains change length and class, and the sums estimate b with the variance of bdpt.
  */
 #include "worker/render/mutation/mutation.h"
 #include "worker/render/path/ensemble.h"
@@ -50,15 +50,15 @@ static double log_weight(struct mutation_ctx *m, struct full_path *into, const s
 	return -move->log_density[direction];
 }
 
-/* Its cost grows with the length of sub-paths, that of a walk hardly does; it pays if it gets about a third of the
- * time. Cost of one relative to hslt's, and the shares with the least error at equal time: 2.8 and 0.15 to 0.4 in
- * displaced (at most 12 edges), 4 and 0.1 in the demo (16), 12.5 and 0.01 to 0.06 in veach-door (33). */
+/* The cost of this mutation grows with the length of sub-paths, whereas that of a walk hardly does; it pays if it gets
+ * about a third of the time. Its cost relative to hslt's, and the weights with the least error at equal time: 2.8 and
+ * 0.15 to 0.4 in displaced (at most 12 edges), 4 and 0.1 in the demo (16), 12.5 and 0.01 to 0.06 in veach-door (33). */
 static double useful(const struct render_summary *scene)
 {
 	const double pays = 2.4, least = 0.05, most = 0.3;
 	if (render_effect_on(scene, "half-vectors"))
 		return fmin(fmax(pays / scene->useful_depth, least), most);
-	/* Ten times the cost of `rejoin`: with half as many, cornell-box has 20 % less relMSE x time. */
+	/* It costs ten times as much as `rejoin`: with half the weight, cornell-box has 20 % less relMSE x time. */
 	return 0.05;
 }
 

@@ -1,20 +1,21 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Proposes a path y from x for a given b and c, and weighs it (Hanika, Kaplanyan, Dachsbacher 2015, sec. 4 and 5).
+ * Proposes a path y from x for a given b and c, and computes its weight (Hanika, Kaplanyan,
+ * Dachsbacher 2015, sec. 4 and 5).
  *
  * x_{k-1} .. x_b are traced. Between x_b and x_c each half vector that is not exactly specular takes a Gaussian step,
  * h' = h + dh, and the walk finds vertices that have the new half vectors; a second walk must lead from y back to x.
  * With c = b - 1 there is nothing to walk: x_b and x_c are joined. The logarithm of the weight is that of
  *
- *   prod_{j <= c, j = b} f_j  prod_{other j < k} f_j |d i_j^perp / d h_j|  G_b |det d x_{b-1} / d x_c|  /  q
+ * prod_{j <= c, j = b} f_j  prod_{other j < k} f_j |d i_j^perp / d h_j|  G_b |det d x_{b-1} / d x_c|  /  q
  *
  * with f_0 = L_e, i_j the direction from x_j towards the light, h in slopes, G_b the cosines, the distance and the
  * camera's Jacobian at the edge x_b x_{b-1}, and q the densities of the choice of b and c, of the steps and of the
- * point on the emitter; factors common to f and q are never computed. What media let through is a factor of each edge.
- * Where they scatter, x_j may be an event: f_j is then sigma_s times the phase function, without a half vector, and a
- * traced one has the factor |x_j - x_{j+1}|, as its distance takes steps in the logarithm. A proposal fails, with the
- * reason counted, where a ray misses, an edge is occluded, a vertex would scatter in another mode, the matrix is
- * singular, the walk does not converge or does not lead back, or the path leaves the film.
+ * point on the emitter; factors common to f and q are never computed. Each edge also has the transmittance of its media
+ * as a factor. Where media scatter, x_j may be an event: f_j is then sigma_s times the phase function, without a half
+ * vector, and if x_j was traced there is a factor |x_j - x_{j+1}|, because the logarithm of its distance takes the
+ * step. A proposal fails, with the reason counted, if a ray misses, an edge is occluded, a vertex would scatter in
+ * another mode, the matrix is singular, the walk does not converge or does not lead back, or the path leaves the film.
  */
 #include "worker/render/mutation/breakup.h"
 
@@ -23,12 +24,12 @@
 
 #include <string.h>
 
-/* Positions are rounded to this fraction of the adjacent edges. */
+/* Rounding of positions, as a fraction of the adjacent edges. */
 #define ROUNDING 0x1p-40
-/* Steps of x_0, in the numbers that make it. */
+/* Step of x_0, in the random numbers that produce it. */
 #define EMITTER_STEP 0.1
-/* Largest change of the number that determines the wavelengths in dispersive scenes (sec. 6: 50 nm of 470);
- * otherwise all are equally good. */
+/* Largest change of the number that determines the wavelengths in dispersive scenes (sec. 6: 50 nm of 470). In other
+ * scenes the number is drawn afresh, because all wavelengths are equally good. */
 #define WAVELENGTH_STEP (50.0 / 470)
 
 bool breakup_allows(const struct full_path *x, unsigned b, unsigned c)
@@ -42,7 +43,7 @@ bool breakup_allows(const struct full_path *x, unsigned b, unsigned c)
 	return b == 0 || (c < b && !(c > 0 && x->v[c].delta));
 }
 
-/* A symmetric step, reflected at the ends of the range. */
+/* Returns the number for the new wavelength: a symmetric step, reflected at the ends of the range. */
 static double move_wavelength(const struct path_context *c, double u, double r)
 {
 	if (!EFFECT_IS_ON(c->w, dispersion))
@@ -52,7 +53,7 @@ static double move_wavelength(const struct path_context *c, double u, double r)
 	return v < 1 ? v : u;
 }
 
-/* Whether a vertex that stays would have to move for another wavelength. */
+/* Whether a vertex that stays would have to move for another wavelength, so that the wavelength must be kept. */
 static bool holds_wavelength(const struct path_context *c, const struct full_path *x, unsigned b, unsigned c_end)
 {
 	if (!EFFECT_IS_ON(c->w, dispersion) || b == 0)
@@ -112,7 +113,7 @@ static double tolerance_of(const struct mutation_ctx *m, const struct path_verte
 	return m->limits.tolerance * fmin(halfvec_lobe_width(v), fmin(s->sigma[0], s->sigma[1]));
 }
 
-/* Steps of the half vectors, and their targets. */
+/* Draws the steps of the half vectors and sets their targets. */
 static void set_targets(struct mutation_ctx *m, const struct breakup *how, const struct full_path *x)
 {
 	struct mutation_scratch *s = &m->scratch;
@@ -143,7 +144,7 @@ static void add_step_densities(struct mutation_ctx *m, const struct breakup *how
 	}
 }
 
-/* What is stale of one path's constraints when the walk to the other starts from it. */
+/* Returns which constraints of one path are stale when the walk to the other starts from it. */
 static unsigned stale_of(const struct mutation_ctx *m, const struct breakup *how, const struct full_path *x,
 			 const struct full_path *y)
 {
@@ -154,8 +155,8 @@ static unsigned stale_of(const struct mutation_ctx *m, const struct breakup *how
 	return (b_moved ? WALK_STALE_B : 0) | (c_moved ? WALK_STALE_C : 0);
 }
 
-/* The walk from y must lead back to x: otherwise the proposal cannot be reversed, and detailed balance requires
- * rejecting it. */
+/* Whether the walk from y leads back to x. If it does not, the proposal cannot be reversed, and detailed
+ * balance requires rejecting it. */
 static bool leads_back(struct mutation_ctx *m, const struct breakup *how, const struct full_path *x,
 		       const struct full_path *y)
 {
@@ -190,7 +191,7 @@ static bool leads_back(struct mutation_ctx *m, const struct breakup *how, const 
 	return true;
 }
 
-/* Between x_b and x_c by half vectors. */
+/* Moves the vertices between x_b and x_c by half vectors. */
 static enum proposal_end walk_between(struct mutation_ctx *m, const struct breakup *how, struct full_path *x,
 				      struct full_path *y, struct move *move)
 {
@@ -222,7 +223,7 @@ static enum proposal_end join(struct mutation_ctx *m, unsigned e, struct full_pa
 	return full_path_join(y, e) && full_path_visible(m->path, y, e) ? PROPOSAL_MADE : PROPOSAL_BLOCKED;
 }
 
-/* How x_j scatters now that its neighbours have moved. */
+/* Sets the mode in which x_j scatters now that its neighbours have moved. Returns false if it cannot scatter. */
 static bool set_mode(struct full_path *y, unsigned j)
 {
 	if (j == 0 || j == y->edges)
@@ -231,8 +232,8 @@ static bool set_mode(struct full_path *y, unsigned j)
 	return y->v[j].mode != 0;
 }
 
-/* Whether x_c .. x_0 are in the media that they were in before. They are, unless x_c is reached through another medium
- * and lets it be. */
+/* Whether x_c .. x_0 are still in the same media. They are, unless x_c states no medium and is now
+ * reached through another one. */
 static bool media_hold(const struct path_context *c, const struct full_path *y, unsigned c_end)
 {
 	const struct path_vertex *v = &y->v[c_end];
@@ -242,7 +243,7 @@ static bool media_hold(const struct path_context *c, const struct full_path *y, 
 	return path_medium_after(c->w, v, v->edge.medium, to_light) == y->v[c_end - 1].edge.before;
 }
 
-/* At another wavelength, the media transmit another share of the light along each edge. */
+/* Recomputes the transmittance of all edges if the wavelength changed. Returns false if an edge is occluded. */
 static bool see_wavelength(struct path_context *c, const struct full_path *x, struct full_path *y, struct move *move)
 {
 	if (!EFFECT_IS_ON(c->w, scattering) || y->wavelength == x->wavelength)
@@ -251,7 +252,8 @@ static bool see_wavelength(struct path_context *c, const struct full_path *x, st
 	return full_path_see_media(c, y);
 }
 
-/* Half vectors do not describe it, and so it has no weight and no move. */
+/* Whether some vertex that would need a half vector scatters with a turned normal. Half vectors cannot describe such a
+ * vertex, so the path has no weight and no move. */
 static bool turned_beyond(const struct full_path *x, unsigned b, unsigned c)
 {
 	for (unsigned j = c + 1; j < x->edges; j++)
@@ -298,14 +300,16 @@ enum proposal_end breakup_propose(struct mutation_ctx *m, const struct breakup *
 	return b < k || full_path_project(c, y) ? PROPOSAL_MADE : PROPOSAL_OUTSIDE;
 }
 
-/* Cosines, distances and Jacobians that do not cancel between f and T, by sec. 5: one geometric normal, at x_{b-1}. */
+/* Returns the logarithm of the cosines, distances and Jacobians that do not cancel between f and T, by sec. 5. Only one
+ * geometric normal remains, at x_{b-1}. */
 static double log_geometry(const struct path_context *c, const struct full_path *x, unsigned b, unsigned c_end)
 {
 	if (b == 0 || b == c_end)
 		return 0;
 	const struct full_path_edge *e = &x->edge[b - 1];
 	double log_g = log(path_cosine(&x->v[b - 1], e->w) / e->distance2);
-	if (c_end > 0 && full_path_turned(x, c_end)) /* it does not move, but has the normal of x or of y */
+	if (c_end > 0 &&
+	    full_path_turned(x, c_end)) /* x_c does not move, but may use its own normal in x and the turned one in y */
 		log_g += log(full_path_cosine_to_light(x, c_end) /
 			     fabs(vec3_dot(x->v[c_end].x.sh.n, x->edge[c_end - 1].w)));
 	struct camera room;
@@ -314,7 +318,8 @@ static double log_geometry(const struct path_context *c, const struct full_path 
 	return log_g + log(full_path_cosine_to_light(x, b));
 }
 
-/* Distances of the traced part to events in media take steps in their logarithm. */
+/* Returns the logarithm of the Jacobians of the distances to events in the traced part, which take
+ * steps in their logarithm. */
 static double log_distances(const struct full_path *x, unsigned b)
 {
 	double sum = 0;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* All half vectors of a path move, its two ends stay (Kaplanyan, Hanika, Dachsbacher 2014). `hslt` does this where it
- * helps. */
+/* All half vectors of a path move while its two ends stay (Kaplanyan, Hanika, Dachsbacher 2014). `hslt` includes
+ * this move where it helps. */
 #include "worker/render/mutation/strategy.h"
 
 static const struct strategy strategy = {&heuristic_roughness, STRATEGY_CAMERA, 0, .halfvecs = true,

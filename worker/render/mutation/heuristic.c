@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/mutation/heuristic.h"
 
-/* Weight of the two extremes: half vectors only (b = k), tracing only (b = 0). */
+/* Weight of the two extremes: half vectors only (b = k) and tracing only (b = 0). */
 #define END_WEIGHT 0.1
 
 static double roughness(const struct path_vertex *v)
@@ -11,8 +11,8 @@ static double roughness(const struct path_vertex *v)
 	return v->delta ? 0 : fmin(v->bsdf->alpha_mean, 1);
 }
 
-/* P(b = i) ~ a_i, 0.1 for both ends. If all inner vertices are specular, or x_k has only the emitter beside it, half
- * vectors have nothing to move; an emitter that cannot be hit is not found by tracing. */
+/* P(b = i) ~ a_i, with weight 0.1 for both ends. If all inner vertices are specular, or there are none, half vectors
+ * have nothing to move; an emitter that cannot be hit is not found by tracing. */
 static void weigh_b(const struct path_context *c, const struct full_path *x, double *weight)
 {
 	unsigned k = x->edges;
@@ -25,11 +25,12 @@ static void weigh_b(const struct path_context *c, const struct full_path *x, dou
 	weight[k] = any ? END_WEIGHT : 0;
 }
 
-/* P(c = i | b) ~ a_i |x_i - x_{i+1}|^2; a of the emitter is 1, the scene's diameter is used for infinity. */
+/* P(c = i | b) ~ a_i |x_i - x_{i+1}|^2, where a of the emitter is 1 and the scene's diameter
+ * stands for infinite distances. */
 static void weigh_c(const struct path_context *c, const struct full_path *x, unsigned b, double *weight)
 {
-	/* Below b = k nothing moves before a vertex with a half vector does: c = k - 1 would be the identity for a
-	 * pinhole. */
+	/* For b = k, nothing moves unless some vertex with a half vector lies between: for a pinhole, c = k -
+	 * 1 would be the identity. */
 	bool moves = b < x->edges;
 	for (unsigned i = b; i-- > 0;) {
 		double distance2 =

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Where a path is broken up (Hanika, Kaplanyan, Dachsbacher 2015, sec. 5): x_k .. x_b is traced, x_b .. x_c moves by
- * half vectors, x_c .. x_0 stays. A heuristic gives the probability of each b, and of each c given b. It may depend on
- * the whole path, since the chain evaluates it for the proposal as well.
+ * Heuristics for where a path is broken up (Hanika, Kaplanyan, Dachsbacher 2015, sec. 5): x_k .. x_b is traced, x_b ..
+ * x_c moves by half vectors, x_c .. x_0 stays. A heuristic gives the probability of each b, and of each c given b. It
+ * may depend on the whole path, because it is evaluated for the proposal as well.
  */
 #ifndef WORKER_RENDER_MUTATION_HEURISTIC_H
 #define WORKER_RENDER_MUTATION_HEURISTIC_H
@@ -10,18 +10,18 @@
 #include "worker/render/path/full_path.h"
 
 struct heuristic {
-	/* weight[0..k], not normalised; 0: never chosen. */
+	/* Sets weight[0..k], not normalised; 0: never chosen. */
 	void (*weigh_b)(const struct path_context *c, const struct full_path *x, double *weight);
-	/* weight[0..b-1]. */
+	/* Sets weight[0..b-1] in the same way. */
 	void (*weigh_c)(const struct path_context *c, const struct full_path *x, unsigned b, double *weight);
 };
 
-/* By roughness, as in the paper. A specular vertex is never x_b or x_c. */
+/* Chooses by roughness, as in the paper. A specular vertex is never x_b or x_c. */
 extern const struct heuristic heuristic_roughness;
 
-/* Probability of entry i among n weights; 0 if all are 0. */
+/* Returns the probability of entry i among n weights; 0 if all are 0. */
 double heuristic_probability(const double *weight, unsigned n, unsigned i);
-/* The entry that u in [0,1) selects; n: all weights are 0. */
+/* Returns the entry that u in [0,1) selects; n if all weights are 0. */
 unsigned heuristic_choose(const double *weight, unsigned n, double u);
 
 #endif

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Improved half vector space light transport: the breakup by roughness (Hanika, Kaplanyan, Dachsbacher 2015, sec. 5).
- */
+/* Improved half vector space light transport: breakup by roughness (Hanika, Kaplanyan, Dachsbacher 2015, sec. 5). */
 #include "worker/render/mutation/strategy.h"
 #include "worker/render/world/effects_text.h"
 

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The point on the aperture moves; half vectors up to x_c stay the same. */
+/* The point on the aperture moves; the half vectors up to x_c are kept. */
 #include "worker/render/mutation/strategy.h"
 #include "worker/render/world/effects_text.h"
 
-/* Any vertex that is not specular is suitable: even x_{k-1}, which another x_k sees at another film point. */
+/* Any vertex that is not specular is suitable, even x_{k-1}: a new x_k sees it at another film point. */
 static void weigh_c(const struct path_context *c, const struct full_path *x, unsigned b, double *weight)
 {
 	(void)c;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The point on the emitter moves; half vectors up to it stay the same. */
+/* The point on the emitter moves; the half vectors up to it are kept. */
 #include "worker/render/mutation/strategy.h"
 #include "worker/render/world/effects_text.h"
 

@@ -8,10 +8,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Added to a list without independent proposals, without which chains never change the length of their paths. */
+/* Weight, relative to the others, of the independent proposals added to a list without any: chains would otherwise
+ * never change the length of their paths. */
 #define INDEPENDENT_SHARE 0.05
 
-/* "b3c1", "b3" or "c1". */
+/* Parses "b3c1", "b3" or "c1". */
 static bool parse_forced(const char *text, size_t length, struct mutation_setting *how)
 {
 	char copy[32];

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Which strategies a chain uses, and how often: "independent=0.1,hslt=0.9", as in a plan. Forced choices for tests:
- * "hslt@b3c1". Pure.
+ * The mixture of strategies that a chain uses: "independent=0.1,hslt=0.9", as in a plan. Tests can force
+ * choices: "hslt@b3c1". Pure.
  */
 #ifndef WORKER_RENDER_MUTATION_MIXTURE_H
 #define WORKER_RENDER_MUTATION_MIXTURE_H
@@ -15,19 +15,19 @@ struct mixture_entry {
 };
 
 struct mixture {
-	unsigned count, independent; /* index of the entry that makes independent proposals */
+	unsigned count, independent; /* independent: index of the entry that makes independent proposals */
 	double total;
 	struct mixture_entry entry[BATCH_STRATEGIES];
 };
 
-/* Adds independent proposals if the list has none. -EINVAL with a sentence: an unknown strategy, a weight that is
- * not above 0, too many entries. */
+/* Parses a mixture and adds independent proposals if it has none. Returns -EINVAL and an error message for an unknown
+ * strategy, a weight that is not above 0, or too many entries. */
 int mixture_parse(const char *text, struct mixture *out, struct error *e);
-/* As text; parsing and printing it again does not change it. */
+/* Writes a mixture as text; parsing and printing that again does not change it. */
 void mixture_print(const struct mixture *m, char text[PLAN_MUTATIONS_MAX]);
-/* The default for this scene. */
+/* Makes the default mixture for a scene. */
 void mixture_default(const struct render_summary *scene, struct mixture *out);
-/* The entry that u in [0,1) selects. */
+/* Returns the entry that u in [0,1) selects. */
 unsigned mixture_choose(const struct mixture *m, double u);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The whole path is traced by perturbed half vectors (Hanika, Kaplanyan, Dachsbacher 2015, sec. 4). `hslt` does this
- * where it helps. */
+/* The whole path is traced with perturbed half vectors (Hanika, Kaplanyan, Dachsbacher 2015, sec. 4). `hslt` includes
+ * this move where it helps. */
 #include "worker/render/mutation/strategy.h"
 
 static const struct strategy strategy = {&heuristic_roughness, 0, 0, .wavelength = true, .aperture = true};

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/mutation/strategy.h"
 
-/* Forced and drawn choices of one proposal. */
+/* The choices of b and c for one proposal, forced or to be drawn. */
 struct choice {
 	int b, c;
 };
@@ -11,7 +11,7 @@ static unsigned fixed_b(int b, unsigned k)
 	return b == STRATEGY_CAMERA ? k : (unsigned)b;
 }
 
-/* Probabilities of b: weights of the heuristic, without what the strategy cannot use. */
+/* Sets the weights of b: those of the heuristic, except for values that the strategy cannot use. */
 static void weigh_b(const struct strategy *s, const struct choice *forced, const struct mutation_ctx *m,
 		    const struct full_path *x, double *weight)
 {
@@ -21,7 +21,7 @@ static void weigh_b(const struct strategy *s, const struct choice *forced, const
 			weight[i] = 0;
 }
 
-/* Probabilities of c, the same way: nothing walks past an event in a medium. */
+/* Sets the weights of c in the same way: no walk passes an event in a medium. */
 static void weigh_c(const struct strategy *s, const struct mutation_ctx *m, const struct full_path *x, unsigned b,
 		    double *weight)
 {
@@ -33,7 +33,7 @@ static void weigh_c(const struct strategy *s, const struct mutation_ctx *m, cons
 	}
 }
 
-/* log P(b) P(c | b) of x by the heuristic; forced choices have probability 1. -INFINITY: never chosen. */
+/* Returns log P(b) P(c | b) of x by the heuristic; forced choices have probability 1. -INFINITY: never chosen. */
 static double log_choice(const struct strategy *s, const struct choice *forced, struct mutation_ctx *m,
 			 const struct full_path *x, unsigned b, unsigned c)
 {

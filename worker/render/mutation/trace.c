@@ -3,14 +3,14 @@
 
 #include "worker/render/path/media.h"
 
-/* Half vectors take steps of this many lobe widths. */
+/* Standard deviation of the steps of half vectors, in lobe widths. */
 #define HALFVEC_STEP 0.01
-/* Steps of x_k, in the numbers that make it. */
+/* Step of x_k, in the random numbers that produce it. */
 #define APERTURE_STEP 0.1
-/* Steps of the logarithm of the distance to an event in a medium, and of the direction in which it is left. */
+/* Steps of the logarithm of the distance to an event in a medium, and of the direction in which the path leaves it. */
 #define DISTANCE_STEP 0.02
 #define DIRECTION_STEP 0.02
-/* Minimum sine of the angle between the line and both normals, to be able to align frames by it. */
+/* Minimum sine of the angle between the line and each of the normals for which frames are aligned by the line. */
 #define LEAST_PROJECTION 1e-3
 
 bool trace_move_aperture(struct mutation_ctx *m, const struct full_path *x, struct full_path *y)
@@ -37,8 +37,8 @@ static bool move_film(struct mutation_ctx *m, const struct full_path *x, struct 
 	return film_window_holds(&m->path->window, y->film) && camera_has(&m->path->w->camera, y->film[0], y->film[1]);
 }
 
-/* The rotation that maps half vectors from x_j's frame into y_j's, by the line between the two as seen in both
- * frames (sec. 4). It is its own inverse: from y to x both angles gain pi. */
+/* Rotates a half vector from x_j's frame into y_j's, using the line between the two vertices as seen in both frames
+ * (sec. 4). The rotation is reversible: from y to x, both angles gain pi. */
 static void rotate_half_vector(const struct path_vertex *from, const struct path_vertex *to, vec2 *h)
 {
 	vec3 d = vec3_sub(to->x.p, from->x.p);
@@ -50,10 +50,11 @@ static void rotate_half_vector(const struct path_vertex *from, const struct path
 	*h = (vec2){c * h->x - s * h->y, s * h->x + c * h->y};
 }
 
-/* The direction to the light for light leaving along o with half vector h; eta = n_o / n_i. false: total reflection. */
+/* Computes the direction to the light for light that leaves along o with half vector h; eta = n_o / n_i. Returns
+ * false for total reflection. */
 static bool direction_of_halfvec(vec3 o, vec2 h, bool transmit, double eta, vec3 *i)
 {
-	if (transmit && eta == 1) { /* matched: h is (i + o)_xy */
+	if (transmit && eta == 1) { /* index-matched: h is (i + o)_xy */
 		double x = h.x - o.x, y = h.y - o.y, z2 = 1 - x * x - y * y;
 		*i = (vec3){x, y, copysign(sqrt(fmax(z2, 0)), -o.z)};
 		return z2 > 0;
@@ -75,7 +76,8 @@ static bool direction_of_halfvec(vec3 o, vec2 h, bool transmit, double eta, vec3
 	return o.z * i->z < 0;
 }
 
-/* Turns with the direction that the path comes from, and takes a step that is as likely back. */
+/* Returns the direction in which the path leaves an event: the old direction, turned with the one from which the path
+ * comes, plus a symmetric step. */
 static vec3 scatter_in_medium(struct mutation_ctx *m, unsigned j, const struct full_path *x, const struct full_path *y,
 			      struct move *move)
 {
@@ -91,7 +93,7 @@ static vec3 scatter_in_medium(struct mutation_ctx *m, unsigned j, const struct f
 	return vec3_normalize(frame_to_world(&around, (vec3){DIRECTION_STEP * g[0], DIRECTION_STEP * g[1], 1}));
 }
 
-/* The direction in which the path continues from y_j. */
+/* Computes the direction *d in which the path continues from y_j. Returns false if it cannot scatter like x_j. */
 static bool scatter_on(struct mutation_ctx *m, unsigned j, const struct full_path *x, struct full_path *y,
 		       struct move *move, vec3 *d)
 {
@@ -125,7 +127,7 @@ static bool scatter_on(struct mutation_ctx *m, unsigned j, const struct full_pat
 	return true;
 }
 
-/* y_b as the end of the traced part. */
+/* Makes y_b the end of the traced part. */
 static enum proposal_end end_trace(struct path_context *c, unsigned b, struct path_vertex *v)
 {
 	v->delta = false;
@@ -139,7 +141,7 @@ static enum proposal_end end_trace(struct path_context *c, unsigned b, struct pa
 	return path_can_be_hit(c, v) ? PROPOSAL_MADE : PROPOSAL_EMITTER;
 }
 
-/* To an event in a medium that is about as far away as x's. */
+/* Goes to an event in a medium at about the distance of x's event. */
 static bool go_to_event(struct mutation_ctx *m, unsigned j, vec3 d, double t_min, double t_max,
 			const struct full_path *x, struct full_path *y, struct move *move)
 {
@@ -155,7 +157,7 @@ static bool go_to_event(struct mutation_ctx *m, unsigned j, vec3 d, double t_min
 	return full_path_join(y, j - 1) && full_path_visible(m->path, y, j - 1);
 }
 
-/* From y_j along d to y_{j-1}, which is of x_{j-1}'s kind, except at the end. */
+/* Goes from y_j along d to y_{j-1}, which is of the same kind as x_{j-1}, except at the end of the traced part. */
 static bool go_on(struct mutation_ctx *m, unsigned j, vec3 d, const struct full_path *x, struct full_path *y,
 		  struct move *move)
 {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Another wavelength for the same path (sec. 6). If specular vertices are dispersive, the path has to move: all half
- * vectors are kept, and the walk finds the path that has them at the new wavelength.
+ * Proposes another wavelength for the same path (sec. 6). If specular vertices are dispersive, the path has to move:
+ * all half vectors are kept, and the walk finds the path that has them at the new wavelength.
  */
 #include "worker/render/mutation/strategy.h"
 #include "worker/render/world/effects_text.h"
