@@ -4,12 +4,12 @@
  *
  * render_choose makes a map of brightness from samples of `path`, then a second set of samples of `path` relative to
  * this map. If a lobe of the scene is narrow, it merges light with sub-paths of the camera. If that leaves the choice
- * open, it takes samples of `bdpt`: a quarter of them first, the rest unless the quarter is clear. render_choice_of
- * then compares the figures with the thresholds below. They were set from pilots of 16,384 samples, 40 in each scene
- * of tests/bench/choices.md.
+ * open, it takes samples of `bdpt`: a quarter of them first, and the rest unless the quarter is clear. render_choice_of
+ * then compares the measurements with the thresholds below, which were set from pilots of 16,384 samples, 40 in each
+ * scene of tests/bench/choices.md.
  *
- * If `path` finds no light, the map is made again by `bdpt`. -ENOMEM: no memory for the pilot. -EINVAL: the request
- * has no valid film.
+ * If `path` cannot find the light, the map is made by `bdpt` instead. -ENOMEM: no memory for the pilot. -EINVAL: the
+ * request has no valid film.
  */
 #include "worker/render/choose.h"
 
@@ -31,35 +31,36 @@ enum {
 	MERGED = 4,    /* merging has 1/4 of the samples, within the two bounds below */
 	MERGED_LEAST = 1 << 12,
 	MERGED_MOST = 1 << 16, /* photons take memory */
-	BESIDE = 128,	       /* at most 1/128 as many splats as samples are compared with their pixels */
-	DROPPED = 1 << 12,     /* the variance leaves out the largest terms, one for 4,096 samples */
+	BESIDE = 128,	       /* at most 1/128 of the samples have a splat that is compared with its pixel */
+	DROPPED = 1 << 12,     /* the variance omits the largest terms, one per 4,096 samples */
 };
 
 /* If path finds a larger share of rare light, or a smaller tail index (no finite mean), chains may be needed. */
 static const double rare_hint = 0.03, tail_mean = 1;
-/* Share of rare light, of bdpt or of path, from which chains are needed. For bdpt it is 0.16 or more in the scenes
+/* Share of rare light, for bdpt or for path, from which chains are needed. For bdpt it is 0.16 or more in the scenes
  * where chains win by factors, except torus; in the others 0.12 or less, except veach-door with 0.05 to 0.33. */
 static const double rare_some = 0.12;
-/* Then the smaller of bdpt's two tail indices must be below this. It is at most 1.2 where chains win, and 1.23 to 2.0
- * in veach-door. */
+/* If the share exceeds rare_some, the smaller of bdpt's two tail indices must also be below this for chains to be
+ * needed. It is at most 1.2 where chains win, and 1.23 to 2.0 in veach-door. */
 static const double heavy_most = 1.25;
-/* And the tail index of path's extremes must be below this, whatever the share of rare light. It is 0.3 to 0.6 in
+/* The tail index of path's extremes must also be below this, whatever the share of rare light. It is 0.3 to 0.6 in
  * window, pane and frosted: there camera sub-paths rarely meet the light, so too few samples of bdpt begin a chain. It
  * is 1.5 to 2.6 in water, pool and torus: there light sub-paths find the rest, and the chains of erpt need 0.01 to 0.9
  * of the time of those of hslt. */
 static const double lucky_extreme = 1;
-/* Share of the light that merging finds and that is rare for bdpt: 0.05 to 0.35 in water, frosted, pane, torus and
- * pool, 0.02 to 0.03 in half-sunk, at most 0.008 where chains lose. */
+/* Limit on the share of the light that merging finds to be rare for bdpt; above it, chains may be needed. The share
+ * is 0.05 to 0.35 in water, frosted, pane, torus and pool, 0.02 to 0.03 in half-sunk, and at most 0.008 where chains
+ * lose. */
 static const double merged_rare = 0.03;
 /* If merging finds more than merged_seen of all light, and less than merged_none of it is rare for bdpt, chains are not
  * needed, even if light is rare for path. In kitchen, where short pilots of path find almost nothing, these are 0.62 to
  * 0.84 and 0.003 to 0.006. */
 static const double merged_none = 0.01, merged_seen = 0.4;
-/* A quarter of bdpt's samples is enough if it finds more rare light than this, and a tail without a mean; */
+/* A quarter of bdpt's samples is enough if bdpt finds more rare light than this, and a tail without a mean. */
 static const double rare_clear = 0.4;
-/* or if it finds less rare light than rare_none and path little, the extremes of both have a tail index near 1 or
- * above, and no single sample has more than most_clear of the light. In jewel, the rest of bdpt's samples found a third
- * of the light, of which the first quarter had found nothing. */
+/* It is also enough if bdpt finds less rare light than rare_none and path finds little, the extremes of both have a
+ * tail index of at least extreme_clear, and no single sample has more than most_clear of the light. In jewel, the rest
+ * of bdpt's samples found a third of the light, of which the first quarter had found nothing. */
 static const double rare_none = 0.01, extreme_clear = 0.9, most_clear = 0.05;
 /* The tail index of path from which its variance is taken to be finite. It is 2.0 to 2.8 in cornell-box and veach-mis
  * and more in box, where path wins by 1.1 to 2.4 x. It is 0.9 to 2.1 in rough-caustic, three-spheres, demo, displaced
@@ -75,8 +76,9 @@ static const double bright = 8;
  * in effects-glass, where the tail index is 1.0 to 1.3 because the contributions have a broad but bounded range, and
  * where erpt4 needs 0.7 of the time of erpt. */
 static const double evi_most = 0.5;
-/* Where path cannot find all light it must find more of it than this share. It is 0.97 and 0.98 in random scenes where
- * erpt4 needs 0.50 and 0.90 of the time of erpt, and 0.90 in one where it needs 1.2 times that. */
+/* Where path cannot find all light, `erpt4` is chosen only if path finds more than this fraction of it. The
+ * fraction is 0.97 and 0.98 in random scenes where erpt4 needs 0.50 and 0.90 of the time of erpt, and 0.90 in one
+ * where it needs 1.2 times that. */
 static const double missed_little = 0.9;
 
 /* ---- contributions of samples */
@@ -84,12 +86,13 @@ static const double missed_little = 0.9;
 /* Sums over samples of one kind, relative to the brightness of their places. */
 struct tally {
 	double samples, rays;
-	size_t lit;		       /* terms that bring light */
-	double variance, energy, rare; /* the variance: summed over pixels, and of what lands anywhere the squares */
+	size_t lit; /* terms that are not 0 */
+	double variance, energy,
+		rare; /* variance: sum of the variances within pixels, and of the squares of what lands elsewhere */
 	struct tail *tail;
 };
 
-/* One sample of a pixel: its contribution to this pixel, and those to other places. */
+/* The contributions of one sample of a pixel: to this pixel, and to other places. */
 struct parts {
 	double here;
 	uint32_t count;
@@ -104,9 +107,10 @@ static void add_term(struct tally *t, double y)
 	tail_add(t->tail, y);
 }
 
-/* A pixel may be brighter than the map says, such as one of a small lamp. Then all of its samples are: each is divided
- * by the mean of the others if that exceeds 1. What these samples bring their own pixel varies around its mean; what
- * they bring other places falls there as rain does, and varies by its square. */
+/* Adds the samples of a pixel. A pixel may be brighter than the map says, for example if it shows a small lamp.
+ * Then all of its samples are too bright, so each is divided by the mean of the others if that exceeds 1.
+ * Contributions to the pixel itself vary around its mean; contributions to other places land there at random, so
+ * their variance is their square. */
 static void add_pixel(struct tally *t, const struct parts *of)
 {
 	double all = 0, sum = 0, squares = 0;
@@ -144,7 +148,8 @@ static struct render_found found_light(const struct tally *t)
 	f.extreme = tail_index(tail, (size_t)t->samples / RENDER_EXTREME);
 	f.evi = tail_evi(tail, (size_t)t->samples / RENDER_EVI);
 	f.most = tail->y[0] / t->energy;
-	/* One sample alone proves no rare light: the edge of a lamp that the pixel's others missed. */
+	/* A single sample does not prove rare light: it may show the edge of a lamp that the
+	 * pixel's other samples missed. */
 	double most = tail->y[0], energy = t->energy - most;
 	if (energy > 0)
 		f.rare = fmax(t->rare - fmax(most - RENDER_RARE, 0), 0) / energy;
@@ -153,13 +158,13 @@ static struct render_found found_light(const struct tally *t)
 
 /* ---- the choice */
 
-/* Light that only chains find cannot be ruled out from the samples of path. */
+/* Whether the samples of path leave it possible that there is light that only chains find. */
 static bool is_doubtful(const struct render_choice *c)
 {
 	return c->misses || c->path.rare > rare_hint || c->path.tail < tail_mean;
 }
 
-/* The largest samples of path agree with a finite variance. */
+/* Whether the largest samples of path agree with a finite variance. */
 static bool is_tame(const struct render_found *path)
 {
 	return path->tail >= tail_least || (path->evi < evi_most && path->rare <= rare_hint);
@@ -170,13 +175,14 @@ bool render_choice_is_settled(const struct render_choice *c)
 	return c->merged.share > merged_rare || (!is_doubtful(c) && !is_tame(&c->path));
 }
 
-/* Merging finds most of the light, and hardly any of that is rare for bdpt. */
+/* Whether merging finds most of the light and hardly any of that is rare for bdpt. */
 static bool is_seen(const struct render_choice *c)
 {
 	return c->merged.seen > merged_seen && c->merged.share < merged_none;
 }
 
-/* The chains of hslt, not those of erpt. If path cannot find all light, bdpt's samples are judged instead. */
+/* Whether the chains of hslt (not those of erpt) are needed. If path cannot find all light, bdpt's samples are
+ * judged instead of path's. */
 static bool wants_chains(const struct render_choice *c)
 {
 	const struct render_found *b = &c->bdpt, *p = c->misses ? b : &c->path;
@@ -189,11 +195,11 @@ static bool wants_chains(const struct render_choice *c)
 	if (render_choice_is_settled(c))
 		return false;
 	if (isinf(p->cost))
-		return true; /* where there is no light at all the bootstrap of chains looks for it much longer */
+		return true; /* if there is no light at all, the bootstrap of chains looks for it much longer */
 	return p->extreme < lucky_extreme && b->rare > rare_some && fmin(b->tail, b->extreme) < heavy_most;
 }
 
-/* More samples of bdpt would hardly change the choice. */
+/* Whether more samples of bdpt would hardly change the choice. */
 static bool is_clear(const struct render_choice *c)
 {
 	const struct render_found *b = &c->bdpt, *p = &c->path;
@@ -203,19 +209,19 @@ static bool is_clear(const struct render_choice *c)
 	       fmax(p->most, b->most) <= most_clear && fmin(p->extreme, b->extreme) >= extreme_clear;
 }
 
-/* A finite variance, and no single bright sample. */
+/* Whether path has a finite variance, and no single bright sample. */
 static bool has_no_fireflies(const struct render_found *path)
 {
 	return is_tame(path) && path->most <= most_tame;
 }
 
-/* Too much light is rare for path, and for erpt4. */
+/* Whether too much light is rare for path and for erpt4. */
 static bool has_rare_light(const struct render_choice *c)
 {
 	return c->bdpt.rare > rare_some || (c->path.rare > rare_some && c->bdpt.extreme < lucky_extreme);
 }
 
-/* What path misses is little, and bdpt finds it evenly. */
+/* Whether path misses little of the light and bdpt finds it evenly. */
 static bool misses_little(const struct render_choice *c)
 {
 	return c->found > missed_little && has_no_fireflies(&c->bdpt);
@@ -249,18 +255,18 @@ const char *render_choice_of(const struct render_choice *c)
 struct pilot {
 	const struct world *w;
 	uint64_t seed, samples;
-	double path_mean; /* contribution of a sample, relative to the brightness there */
+	double path_mean; /* mean contribution of a sample, relative to the brightness of its place */
 	struct path_context context;
 	struct path_sample sample;
 	struct brightness map;
 	struct parts parts[IN_PIXEL];
 	struct path_sample beside;
-	uint64_t besides; /* splats of this kind that were compared with their pixels */
+	uint64_t besides; /* splats of the current kind of samples that were compared with their pixels */
 	struct tail tail;
 	uint64_t counters[BATCH_COUNTERS], uncounted[BATCH_COUNTERS];
 };
 
-/* Film points within one pixel of the window. */
+/* A sampler with film points within one pixel of the window. */
 struct pixel_sampler {
 	struct sampler_random random;
 	double corner[2], size[2];
@@ -278,14 +284,14 @@ static const double *pixel_block(struct sampler *base, enum sampler_side side, u
 	return u;
 }
 
-/* By `path`, which is cheaper, unless it misses some light. */
+/* Makes the map from samples of `path`, which are cheaper, unless it misses some light. */
 static int make_map(struct pilot *p, bool misses, struct error *e)
 {
 	return brightness_of_samples(&p->map, &p->context, misses ? path_trace_candidates : path_trace, p->seed,
 				     RNG_CHOICE, PILOT_MAP, p->samples, e);
 }
 
-/* One sample of the pixel in that column and row of the window. */
+/* Evaluates one sample of the pixel in that column and row of the window. */
 static void trace_pixel(struct pilot *p, const double at[2], uint64_t index, uint64_t stream, path_tracer *trace,
 			struct path_sample *out)
 {
@@ -302,8 +308,9 @@ static double relative(const struct pilot *p, const struct splat *s)
 	return (s->xyz[0] + s->xyz[1] + s->xyz[2]) * brightness_scale(&p->map, s->x, s->y);
 }
 
-/* Light sub-paths hit lamps, and mirror images of lamps, that are too small for the map. These look like caustics that
- * need chains, but samples of `path` in the same pixel find them, too. */
+/* Compares a splat with samples of `path` in the same pixel, and returns y relative to their mean if the pixel is
+ * brighter than the map says. Light sub-paths hit lamps, and mirror images of lamps, that are too small for the map.
+ * These look like caustics that need chains, but samples of `path` find them, too. */
 static double held_against_its_pixel(struct pilot *p, const struct splat *s, double y)
 {
 	const struct film_window *w = &p->context.window;
@@ -321,7 +328,8 @@ static double held_against_its_pixel(struct pilot *p, const struct splat *s, dou
 	return mean > bright ? y / mean : y;
 }
 
-/* The camera's sub-path brings its pixel one splat, the first; those of light sub-paths land anywhere. */
+/* Sorts the splats of a sample. The first one is that of the camera's sub-path, in its pixel; those of light
+ * sub-paths land anywhere. */
 static void take_parts(struct pilot *p, const struct film_window *pixel, struct parts *out)
 {
 	out->here = 0;
@@ -339,7 +347,7 @@ static void take_parts(struct pilot *p, const struct film_window *pixel, struct 
 	}
 }
 
-/* From sample first to sample end of the stream, on top of what the tally has. */
+/* Evaluates the samples from `first` to `end` of the stream and adds them to the tally. Returns the measurements. */
 static struct render_found look_on(struct pilot *p, uint64_t stream, uint64_t first, uint64_t end, path_tracer *trace,
 				   struct tally *t)
 {
@@ -347,7 +355,7 @@ static struct render_found look_on(struct pilot *p, uint64_t stream, uint64_t fi
 	for (uint64_t i = first / IN_PIXEL; i < end / IN_PIXEL; i++) {
 		double u[4];
 		tick();
-		rng_uniform4(p->seed, RNG_CHOICE, i, PILOT_PIXEL, stream, u); /* pixels of its own */
+		rng_uniform4(p->seed, RNG_CHOICE, i, PILOT_PIXEL, stream, u); /* random pixels */
 		const double at[2] = {floor(u[0] * w->width), floor(u[1] * w->height)};
 		struct film_window pixel = {w->x + at[0], w->y + at[1], 1, 1};
 		for (unsigned k = 0; k < IN_PIXEL; k++) {
@@ -390,7 +398,8 @@ static void look_at_bdpt(struct pilot *p, struct render_choice *out)
 	out->samples += p->samples - few;
 }
 
-/* Where no lobe is narrow nothing is hidden from bdpt. Merging knows no media that scatter. */
+/* Measures rare light by merging. Not needed if no lobe is narrow, because nothing is hidden from bdpt then; not
+ * possible if media scatter. */
 static int look_at_merged(struct pilot *p, struct render_choice *out)
 {
 	uint64_t n = p->samples / MERGED;
@@ -404,9 +413,10 @@ static int look_at_merged(struct pilot *p, struct render_choice *out)
 	return rc;
 }
 
-/* Where path finds next to nothing all light comes through narrow lobes, and its map is black. In bulb, where bdpt
- * finds what falls on the walls and not what a mirror shows of them, merging calls for chains, which are better by
- * 1,300 x; in kitchen, where short pilots of path find nothing, for none. */
+/* Called if path finds almost nothing: all light comes through narrow lobes, and the map is black, so it is made
+ * again by bdpt. In bulb, where bdpt finds the light on the walls but not their images in a mirror, merging calls
+ * for chains, which are better by 1,300 x; in kitchen, where short pilots of path find nothing, merging does not
+ * call for chains. */
 static int see_what_path_misses(struct pilot *p, struct render_choice *out, struct error *e)
 {
 	out->misses = out->dark = true;
@@ -437,8 +447,8 @@ static int run_pilot(struct pilot *p, const struct plan *film, struct render_cho
 	return rc;
 }
 
-/* A path from the camera never meets a delta emitter, and is not joined to one through an exactly specular lobe, nor to
- * a beam. */
+/* Whether path cannot find all light: a path from the camera never hits a delta emitter, and is not joined to one
+ * through an exactly specular lobe, nor to a beam. */
 static bool path_misses(const struct world *w)
 {
 	bool emitter = false, lobe = world_has_beam(w);
@@ -449,7 +459,8 @@ static bool path_misses(const struct world *w)
 	return emitter && lobe;
 }
 
-/* Where media scatter, faces of `null` are no vertices, and neither focus nor refract. */
+/* Determines whether there are narrow lobes and refracting ones. Where media scatter, faces of `null` are not vertices,
+ * so they neither focus nor refract. */
 static void find_lobes(const struct world *w, const struct render_summary *s, struct render_choice *out)
 {
 	bool narrow = false, transmits = false;

@@ -72,7 +72,7 @@ static void find_note(const char *at, size_t size, struct build_id *id)
 	}
 }
 
-/* The first object is the program itself. */
+/* Only looks at the first object, which is the program itself. */
 static int look_at_program(struct dl_phdr_info *info, size_t size, void *user)
 {
 	(void)size;
@@ -101,7 +101,7 @@ const char *fingerprint_embree(void)
 void fingerprint_make(char text[FINGERPRINT_MAX])
 {
 	struct build_id id = {.size = 0};
-	char build[2 * ID_BYTES + 1] = HSLT_VERSION; /* linked without a build id: better than nothing */
+	char build[2 * ID_BYTES + 1] = HSLT_VERSION; /* fallback for a program linked without a build id */
 	dl_iterate_phdr(look_at_program, &id);
 	for (size_t i = 0; i < id.size; i++)
 		snprintf(build + 2 * i, 3, "%02x", id.bytes[i]);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The integrators by name and in order. Pure; any thread. */
+/* Finds integrators by name or by index. Pure; any thread. */
 #ifndef WORKER_RENDER_INTEGRATOR_LOOKUP_H
 #define WORKER_RENDER_INTEGRATOR_LOOKUP_H
 
@@ -7,7 +7,7 @@
 
 #include <stddef.h>
 
-/* NULL when there is none of that name; index from 0, NULL at the end. */
+/* Returns NULL if there is none of that name, or at the end; the index counts from 0. */
 const struct render_integrator *render_integrator_find(const char *name);
 const struct render_integrator *render_integrator_at(size_t index);
 

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * check asks whether plan, key and input fit, prepare takes all memory that the lease needs, run_job draws samples or
- * walks chains into the film of the lease (film/sums.h), whose touched tiles are the batch. Samples are numbered by
- * pixel and round, chains by their index, so that any thread on any machine draws the same random numbers.
+ * Runs leases. check() tests whether plan, key and input fit, prepare() allocates all memory that the lease needs,
+ * and run_job() draws samples or runs chains into the film of the lease (film/sums.h), whose touched tiles make up
+ * the batch. Samples are numbered by pixel and round, chains by their index, so that any thread on any machine draws
+ * the same random numbers.
  *
- * Failures: -EINVAL where things do not fit, -EILSEQ for states that are none, -EDOM where an invalid operation was
- * trapped (the place in the sentence); nothing of the batch is kept.
+ * Failures: -EINVAL if the inputs do not fit, -EILSEQ for invalid states, -EDOM if an invalid operation was trapped
+ * (the error message gives the place), -ENOMEM. Nothing of the batch is kept.
  */
 #include "worker/render/lease.h"
 
@@ -27,7 +28,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Everything one lease works with. */
+/* The working state of one lease. */
 struct job {
 	const struct plan *plan;
 	const struct lease_key *key;
@@ -37,15 +38,18 @@ struct job {
 	struct path_sample sample;
 	struct film_sums film;
 	struct chain *chain;
-	struct redistribution *redistribution; /* NULL: the integrator has none */
+	struct redistribution *redistribution; /* NULL: the integrator does not redistribute */
 	struct brightness *own_map;
 	struct batch *out;
 	struct error *e;
-	uint64_t sequence, index; /* where it is: row and column, or chain and mutation; of a bootstrap the sample */
+	/* Current position: row and column, or chain and mutation; for a bootstrap, index is the sample. */
+	uint64_t sequence, index;
 };
 
-enum { STOP_INTERVAL = 16 };   /* samples between looks at the stop flag; one may take 10 ms */
-enum { BEYOND_INTERVAL = 16 }; /* one bootstrap sample in so many also estimates paths that are too long to simulate */
+enum { STOP_INTERVAL = 16 }; /* samples or mutations between checks of the stop flag; one sample may take 10 ms */
+enum {
+	BEYOND_INTERVAL = 16
+}; /* one in this many bootstrap samples also estimates paths that are too long to simulate */
 
 static bool is_stopped(const struct job *j)
 {
@@ -53,10 +57,10 @@ static bool is_stopped(const struct job *j)
 	return j->stop && atomic_load_explicit(j->stop, memory_order_relaxed);
 }
 
-/* Stratified over pixels: block 0 of the camera with the film point moved into one pixel. */
+/* A sampler stratified over pixels: in block 0 of the camera, the film point is moved into one pixel. */
 struct pixel_sampler {
 	struct sampler_sobol sobol;
-	double x, y, width, height; /* the pixel in units of the window, and a pixel's size */
+	double x, y, width, height; /* position of the pixel and size of a pixel, in units of the window */
 };
 
 static const double *pixel_block(struct sampler *base, enum sampler_side side, unsigned vertex)
@@ -70,7 +74,8 @@ static const double *pixel_block(struct sampler *base, enum sampler_side side, u
 	return u;
 }
 
-/* A pixel's number does not depend on the crop, so that a crop has the full render's samples. */
+/* Returns the number of a pixel. It does not depend on the crop, so that a crop has the same
+ * samples as the full render. */
 static uint64_t pixel_index(const struct film_window *w, uint64_t column, uint64_t row)
 {
 	enum { BORDER = 1 << 10 };
@@ -78,7 +83,7 @@ static uint64_t pixel_index(const struct film_window *w, uint64_t column, uint64
 	return y << 32 | x;
 }
 
-/* Sample i of the group in that pixel. */
+/* Evaluates sample i of the group in that pixel. */
 static void take_sample(struct job *j, struct sampler *s, uint64_t pixel, uint64_t i)
 {
 	const struct film_window *w = &j->context.window;
@@ -178,7 +183,7 @@ static int run_chain(struct job *j, const struct lease_input *in, uint32_t k, ui
 		return error_set(j->e, EILSEQ,
 				 "chain %llu of group %u does not resume: its state is not one of this plan",
 				 (unsigned long long)id, j->key->group);
-	if (!ok) { /* a seed that carries no light: the bootstrap's weights were not ours */
+	if (!ok) { /* the seed carries no light: the bootstrap's weights were not ours */
 		j->out->counters[COUNT_STATES_LOST]++;
 		ops->start(c, UINT64_MAX);
 	}
@@ -325,7 +330,8 @@ static int invalid_operation(const struct job *j)
 			 j->plan->integrator);
 }
 
-/* All memory is the job's, so that nothing is lost when an invalid operation leaves in the middle. */
+/* Runs a job and catches invalid operations. All memory belongs to the job, so that nothing leaks when an invalid
+ * operation leaves it in the middle. */
 static int run_caught(struct job *j, const struct lease_input *in, enum lease_end *end)
 {
 	jmp_buf back;

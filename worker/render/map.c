@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Makes the map of brightness that all leases of a job share, in two steps. The first map is sampled by bdpt, which
- * finds all light that the render finds. Where most of that is in few bright samples, such a map is as noisy as an
- * image of bdpt, however many samples it has. So the second map, which is the one in use, is made of the render's own
- * samples and chains, guided by the first.
+ * Makes the map of brightness that all leases of a job share, in two steps. The first map is made from samples of bdpt,
+ * which finds all light that the render finds. If most of that light is in few bright samples, such a map is as noisy
+ * as an image of bdpt, however many samples it has. So the second map, which is the one in use, is made from the
+ * render's own samples and chains, guided by the first map.
  *
- * -ENOMEM; -EDOM after an invalid floating-point operation. Nothing is left allocated then.
+ * Failures: -ENOMEM; -EDOM after an invalid floating-point operation. Nothing stays allocated then.
  */
 #include "worker/render/map.h"
 
@@ -24,17 +24,17 @@ enum {
 	SECOND_LEAST = 1 << 12,
 	SECOND_MOST = 1 << 17,
 	SHARE_FIRST = 4, /* the first map has a quarter of the samples */
-	/* A bootstrap has 1/64 of the render's samples, but no more than this (plan.c): a map has 1/32 in short
-	 * renders, at most 1/16, or one a pixel, in longer ones. */
+	/* A bootstrap has 1/64 of the render's samples, but no more than BOOTSTRAP_LONG (plan.c). So a map has 1/32 of
+	 * the samples of a short render; of a longer one at most 1/16, or one sample per pixel. */
 	BOOTSTRAP_LONG = 1 << 14,
 	TIMES_SHORT = 2,
 	TIMES_LONG = 4,
-	A_CELL = 1, /* samples in a cell, which takes the mean of its neighbourhood */
+	A_CELL = 1, /* samples per cell; a cell takes the mean of its neighbourhood */
 	STEP_FIRST = 0,
 	STEP_SECOND, /* steps of RNG_BRIGHTNESS */
 };
 
-/* Samples of the second map: the nearest power of two. */
+/* Returns the number of samples of the second map, rounded to a power of two. */
 static uint64_t samples_of(const struct film_window *w, const struct plan *p)
 {
 	uint64_t n = SECOND_LEAST;
@@ -45,9 +45,9 @@ static uint64_t samples_of(const struct film_window *w, const struct plan *p)
 	return n;
 }
 
-#define NO_PIXEL UINT64_MAX /* tells the map's chains from the render's */
+#define NO_PIXEL UINT64_MAX /* distinguishes the map's chains from the render's */
 
-/* What both maps are made with. */
+/* The state from which both maps are made. */
 struct map_maker {
 	struct path_context context;
 	struct path_sample sample;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What all leases of a plan share besides the world: the map of brightness if the integrator redistributes. It follows
- * from the plan's seed, film and depths, so every machine makes the same. One thread makes it, all read it.
+ * What all leases of a plan share besides the world: the map of brightness, if the integrator redistributes energy. It
+ * follows from the plan's seed, film and depths, so every machine makes the same map. One thread makes it, all read it.
  */
 #ifndef WORKER_RENDER_MAP_H
 #define WORKER_RENDER_MAP_H
@@ -12,8 +12,8 @@
 struct brightness;
 struct world;
 
-/* *out: NULL if the integrator does not redistribute. Ticks. -ENOMEM, -EINVAL, -EDOM */
+/* Makes the map; *out is NULL if the integrator does not redistribute. Ticks. Returns -ENOMEM, -EINVAL or -EDOM. */
 int render_map_new(const struct world *w, const struct plan *p, struct brightness **out, struct error *e);
-void render_map_free(struct brightness *map); /* takes NULL */
+void render_map_free(struct brightness *map); /* accepts NULL */
 
 #endif

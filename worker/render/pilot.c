@@ -8,10 +8,11 @@ enum {
 	SAMPLES_LEAST = 1 << 12,
 	SAMPLES_LONG = 1 << 18,
 	SAMPLES_MOST = 1 << 20,
-	SHARE_SHORT = 32,  /* a pilot has 1/32 of the samples of the render, of each kind, up to PILOT_SAMPLES */
-	SHARE_LONG = 128,  /* 1/128 from there to SAMPLES_LONG: the pilot has one thread, the render may have many */
-	SHARE_HOURS = 512, /* 1/512 beyond */
-	A_SECOND = 100000, /* assumed samples a second, for a render bounded by time */
+	SHARE_SHORT = 32, /* a pilot has 1/32 of the render's samples, for each kind, up to PILOT_SAMPLES */
+	SHARE_LONG =
+		128, /* 1/128 from there to SAMPLES_LONG: the pilot has one thread, whereas the render may have many */
+	SHARE_HOURS = 512, /* 1/512 beyond that */
+	A_SECOND = 100000, /* assumed samples per second, for a render limited by time */
 };
 
 uint64_t pilot_samples(const struct plan_request *r, uint64_t pixels)
@@ -41,8 +42,8 @@ int pilot_film(const struct plan_request *r, struct plan *p, struct error *e)
 	of.kind = PLAN_SAMPLES;
 	of.chains = 0;
 	of.groups = of.parts = 1;
-	of.target_error = 0;		   /* a bound of renders, with groups */
-	if (!plan_request_is_bounded(&of)) /* estimates what errors will cost */
+	of.target_error = 0;		   /* only for renders with groups */
+	if (!plan_request_is_bounded(&of)) /* plan_make needs some bound */
 		of.spp = 1;
 	int rc = plan_make(&of, p, e);
 	p->crop_x = p->crop_y = 0;

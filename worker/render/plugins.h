@@ -5,7 +5,7 @@
 
 #include "worker/render/world/build.h"
 
-/* All plug-in declarations, for scene_read. */
+/* Returns all plug-in declarations, for scene_read. */
 const struct plugin_decl *render_plugins(void);
 
 /* Reads a scene with all plug-ins: scene_read, or scene_read_lenient if the options have RENDER_LENIENT. */

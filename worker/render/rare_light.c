@@ -1,20 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * rare_light traces light sub-paths, then samples of the camera, each of which is merged with the photons around it.
- * Contributions beyond RENDER_RARE times the brightness of their place count.
+ * rare_light traces light sub-paths, then camera sub-paths, each of which is merged with the photons around it.
+ * Contributions count as far as they exceed RENDER_RARE times the brightness of their place.
  *
- * The map of brightness is made of few samples: where they did not find light it is too dark, and a bright spot in a
- * dark corner would be called rare however easily it is found, but for its photons (merging_scale). Light that no
- * photon brings to a rough surface visible to the camera is not detected: light through a keyhole, or seen in a mirror
- * by a mirror.
+ * The map of brightness is made from few samples: where they found no light it is too dark. A bright spot in a dark
+ * corner would then be called rare however easily it is found, so its photons correct the map (merging_scale). Light
+ * that no photon brings to a rough surface visible to the camera is not detected: light through a keyhole, or light
+ * from a mirror that is seen in a mirror.
  */
 #include "worker/render/rare_light.h"
 
 #include "worker/render/path/merging.h"
 
 struct sums {
-	double scale;	     /* of the place */
-	double here, beyond; /* of its photons */
+	double scale;	     /* 1 / the brightness of the place */
+	double here, beyond; /* light of its photons, and the rare part of it */
 };
 
 static void add_beyond(void *user, const struct merged *m)

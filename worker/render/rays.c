@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * One group after the other: a short lease of the bootstrap, then a lease of a single chain that starts from one of its
- * samples. The start of a chain is as much work as a bootstrap sample, so only its second epoch is counted. Samples are
- * as much work as those of their bootstrap.
+ * Counts the rays of a pilot, one group after the other: a short bootstrap lease, then a lease of a single chain that
+ * starts from one of the bootstrap's samples. Starting a chain is as much work as a bootstrap sample, so only the
+ * chain's second epoch is counted. For samples, the bootstrap alone is counted, because its samples are as much work.
  *
- * Failures: those of a lease; what was counted is lost.
+ * Failures: those of a lease; the counts are lost.
  */
 #include "worker/render/rays.h"
 
@@ -12,9 +12,9 @@
 
 enum {
 	GROUPS = PLAN_MAX_GROUPS,
-	SAMPLES = 16, /* of a group's bootstrap; one of them also looks for paths that are too long */
+	SAMPLES = 16, /* samples of a group's bootstrap; one of them also looks for paths that are too long */
 	MUTATIONS = 32,
-	ENOUGH = 1 << 18, /* rays, of bootstrap samples and of mutations each */
+	ENOUGH = 1 << 18, /* rays that are enough, for bootstrap samples and for mutations each */
 	LEAST_GROUPS = 2,
 };
 
@@ -29,7 +29,8 @@ struct counter {
 	struct error *e;
 };
 
-/* Random numbers that the render does not draw, so that a render is independent of its pilot. */
+/* Makes the pilot's plan. Its random numbers are not drawn by the render, so that a render is independent of its
+ * pilot. */
 static int make_plan(const struct plan_request *r, struct plan *p, struct error *e)
 {
 	struct plan_request q = *r;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The renderer: a library without network code. This is its public header; it declares nothing itself. The daemon and
- * the command line also include, by name, what only some of them need: accuracy_settings.h, choose.h, fingerprint.h,
- * rays.h, unseen_light.h, and of scene/ how files are opened and what is supported. A world is immutable and shared by
- * all threads; a lease is run by one thread.
+ * The renderer: a library without network code. This is its public header; it declares no functions itself. The daemon
+ * and the command line also include, by name, headers that only some of them need: accuracy_settings.h, choose.h,
+ * fingerprint.h, rays.h, unseen_light.h, and from scene/ those for opening files and listing supported features. A
+ * world is immutable and shared by all threads; a lease is run by one thread.
  */
 #ifndef WORKER_RENDER_RENDER_H
 #define WORKER_RENDER_RENDER_H
@@ -18,7 +18,7 @@
 #include "worker/render/world/effects_text.h"
 #include "worker/render/world/summary.h"
 
-/* Stands for the integrator that worker/render/choose.h selects for the scene, before the plan is made. */
+/* Placeholder for the integrator that worker/render/choose.h selects for the scene before the plan is made. */
 #define RENDER_INTEGRATOR_DEFAULT "auto"
 #define RENDER_INTEGRATOR_CHAINS "hslt"
 

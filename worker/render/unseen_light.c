@@ -1,17 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A path of merging brings b, relative to the brightness of its place. If a sample of the integrator brings c when it
- * finds that path, then b / c is how often one does: the rarer, the brighter. Paths are sorted into classes of c, each
- * four times as bright as the one before. N samples find the classes from the k-th on
+ * A path made by merging contributes b, relative to the brightness of its place. If a sample of the integrator that
+ * finds the path contributes c, then b / c is the expected number of times that a sample finds it: the brighter c,
+ * the rarer. Paths are sorted into classes of c, each four times as bright as the one before. N samples find the
+ * classes from the k-th on
  *
  *     N sum_{i >= k} sum b / c
  *
- * times, and light is unseen if its class is among the brightest that are found at most `few` times in all. Once it has
- * been found more often, different groups of samples have found it, and the spread between them tells.
+ * times. Light is unseen if its class is among the brightest ones that are together found at most `few` times. Light
+ * that has been found more often was found by different groups of samples, and the spread between them shows it.
  *
- * What is missing, squared and averaged over the film, is what it adds to relMSE. The square of a sum over few photons
- * would be too large by its noise, so two sets of photons are multiplied, in each of ACROSS x ACROSS cells; where light
- * is missing from a part of a cell, the mean over the cell is too small.
+ * The unseen light, squared and averaged over the film, is its contribution to relMSE. The square of a sum
+ * over few photons would be too large by the variance of the sum, so the sums of two independent sets of
+ * photons are multiplied, in each of ACROSS x ACROSS cells. If light is missing from only a part of a cell,
+ * the mean over the cell is too small.
  *
  * Failures: -ENOMEM. A scene without light has no unseen light.
  */
@@ -26,17 +28,18 @@
 
 #include <string.h>
 
-/* However long the render is: a job that is extended has what a longer one has. */
+/* The number does not depend on the length of the render, so that a job that is extended has the
+ * same value as a longer one. */
 enum { SAMPLES = 1 << 13 };
 
 enum { SETS = 2, ACROSS = 8, CELLS = ACROSS * ACROSS, CLASSES = 24 };
 static const double few = 3;
 
-/* What one set of photons has found. */
+/* The results of one set of photons. */
 struct seen_by_merging {
-	double light[CELLS][CLASSES]; /* relative, summed over the samples of the camera */
-	double finds[CLASSES];	      /* by a sample of the integrator */
-	double samples[CELLS];	      /* of the camera */
+	double light[CELLS][CLASSES]; /* relative light, summed over the camera's samples */
+	double finds[CLASSES];	      /* expected number of finds by one sample of the integrator */
+	double samples[CELLS];	      /* samples of the camera */
 };
 
 struct place {
@@ -84,7 +87,7 @@ static int merge_one_set(struct path_context *c, const struct brightness *map, d
 	return rc;
 }
 
-/* The dimmest of the classes that so many samples find at most a few times together. */
+/* Returns the index of the dimmest of the brightest classes that so many samples find at most a few times in all. */
 static int first_unseen(const struct seen_by_merging *s, double samples)
 {
 	double finds = 0;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Where the chains of one lease spend their time: within-chain moments by tile, and the time of each path class (struct
- * batch in common/film/batch.h defines both). A state is added when it is splatted, with the weight that it has
- * gathered. One thread. Memory: 36 bytes per tile; allocates nothing after init.
+ * Where the chains of one lease spend their time: within-chain moments by tile, and the time spent in each path class
+ * (struct batch in common/film/batch.h defines both). A state is added when it is splatted, with its accumulated
+ * weight. One thread. Memory: 36 bytes per tile; allocates nothing after init.
  */
 #ifndef WORKER_RENDER_FILM_MOMENTS_H
 #define WORKER_RENDER_FILM_MOMENTS_H
@@ -11,18 +11,18 @@
 
 struct chain_moments {
 	uint32_t x, y, width, height; /* the crop */
-	uint32_t tiles_x, tiles;      /* 0 tiles: not wanted, nothing is stored */
-	double *first, *second;	      /* by tile; first: of the current sequence */
-	double *share;		      /* by tile, of the current state; 0 between states */
-	uint32_t *touched;	      /* tiles with a share */
+	uint32_t tiles_x, tiles;      /* 0 tiles: moments are not wanted, and nothing is stored */
+	double *first, *second;	      /* by tile; `first` is that of the current sequence */
+	double *share;		      /* share of the current state in each tile; 0 between states */
+	uint32_t *touched;	      /* the tiles where `share` is not 0 */
 	double classes[PATH_CLASSES];
 };
 
 int chain_moments_init(struct chain_moments *m, const struct plan *p, struct error *e);
 void chain_moments_fini(struct chain_moments *m);
 
-/* Adds the weight of a state with these film points and colours, of intensity I = X+Y+Z in total.
- * chain_moments_class adds its classes: the state's share of I in each. */
+/* Adds the weight of a state with these film points and colours, whose total intensity is I = X+Y+Z.
+ * chain_moments_class adds to a class: the state's share of I in that class, times the weight. */
 void chain_moments_state(struct chain_moments *m, const struct splat *splats, uint32_t count, double intensity,
 			 double weight);
 static inline void chain_moments_class(struct chain_moments *m, unsigned path_class, double weight)
@@ -30,9 +30,9 @@ static inline void chain_moments_class(struct chain_moments *m, unsigned path_cl
 	m->classes[path_class] += weight;
 }
 
-/* The sequence has ended: its first moments, rounded to float; the next one starts. */
+/* Ends a sequence: writes its first moments, rounded to float, and starts the next one. */
 void chain_moments_end_sequence(struct chain_moments *m, float *first);
-/* The lease has ended. */
+/* Ends the lease: writes the second moments and the classes. */
 void chain_moments_end(const struct chain_moments *m, float *second, double classes[PATH_CLASSES]);
 
 #endif

@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Kernels are products of one in x and one in y, whose values are computed once a splat for all pixels in reach. On a
- * panorama a splat is made again on the other side of each edge that its kernel may reach. -ENOMEM; -EINVAL: a filter
- * that vanishes, a window that cuts a panorama's edge.
+ * Splats samples on the film of a lease. A kernel is the product of one in x and one in y; their values are computed
+ * once per splat for all pixels in reach. On a panorama, a splat is repeated beyond each edge, so that a kernel that
+ * reaches over an edge continues on the other side.
+ *
+ * Failures: -ENOMEM; -EINVAL for a filter that vanishes, or a window that cuts off a panorama's edge.
  */
 #include "worker/render/film/sums.h"
 
@@ -28,7 +30,7 @@ static double windowed_sinc(double radius, double d)
 	return d < radius ? sinc(d) * sinc(d / radius) : 0;
 }
 
-/* By Simpson's rule: smooth except for the ends, where it is 0. */
+/* Uses Simpson's rule; the function is smooth except at the ends, where it is 0. */
 static double windowed_sinc_integral(double radius)
 {
 	enum { STEPS = 4096 };
@@ -43,7 +45,7 @@ static void splat_on_film(struct splat_target *to, const struct splat *s, double
 	film_sums_splat((struct film_sums *)(void *)to, s, weight);
 }
 
-/* Samples on the other side of a panorama's edge are taken if they are in the window. */
+/* Checks the window of a panorama. Samples beyond its edge are only taken if they are in the window. */
 static int check_around(const struct plan *p, const struct scene_settings *s, struct error *e)
 {
 	uint32_t b = s->border;
@@ -142,7 +144,8 @@ static void add_pixel(struct film_sums *f, uint32_t i, uint32_t j, const double 
 	f->touched[(size_t)(j / TILE_SIZE) * f->tiles_x + i / TILE_SIZE] = 1;
 }
 
-/* First and last pixel (relative to the crop) whose centre is within the radius; false: none inside the crop. */
+/* Finds the first and last pixel (relative to the crop) whose centre is within the radius. Returns false if there
+ * is none inside the crop. */
 static bool pixels_within(double position, double radius, uint32_t size, uint32_t *first, uint32_t *last)
 {
 	double lo = fmax(ceil(position - radius - 0.5), 0), hi = fmin(floor(position + radius - 0.5), (double)size - 1);
@@ -153,12 +156,12 @@ static bool pixels_within(double position, double radius, uint32_t size, uint32_
 	return true;
 }
 
-enum { KERNEL_MAX = 130 }; /* pixels that a kernel may span: settings limit its radius to 64 */
+enum { KERNEL_MAX = 130 }; /* most pixels that a kernel spans: settings limit its radius to 64 */
 
 static void splat_at(struct film_sums *f, double x, double y, const struct splat *s, double weight)
 {
 	if (f->filter == FILTER_BOX && f->radius == 0.5) {
-		/* A point on the border of two pixels belongs to one. */
+		/* A point on the border of two pixels belongs to only one. */
 		if (x >= 0 && y >= 0 && x < f->width && y < f->height)
 			add_pixel(f, (uint32_t)x, (uint32_t)y, s->xyz, weight);
 		return;
@@ -178,7 +181,8 @@ static void splat_at(struct film_sums *f, double x, double y, const struct splat
 	}
 }
 
-/* Beyond the left edge is the right one; beyond a pole is the meridian half a turn away. */
+/* Splats on a panorama: beyond its left edge follows the right one; beyond a pole follows the
+ * meridian half a turn away. */
 static void splat_around(struct film_sums *f, const struct splat *s, double weight)
 {
 	double w = f->around[0], h = f->around[1];

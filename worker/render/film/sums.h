@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The film of one lease: per pixel of the crop a sum in double, rounded once when the tiles are taken. Every integrator
- * splats with the continuous filter kernel, normalised to integral 1 over the plane (docs/design.md, rules 3). One
- * thread. Memory: 24 bytes per pixel, of which only touched pages cost anything; splatting allocates nothing.
+ * The film of one lease: a sum in double for each pixel of the crop, rounded once when the tiles are taken. Every
+ * integrator splats with the continuous filter kernel, normalised to integral 1 over the plane (docs/design.md, rules
+ * 3). One thread. Memory: 24 bytes per pixel, of which only touched pages cost anything; splatting allocates nothing.
  */
 #ifndef WORKER_RENDER_FILM_SUMS_H
 #define WORKER_RENDER_FILM_SUMS_H
@@ -12,27 +12,29 @@
 #include "worker/render/film/moments.h"
 
 struct film_sums {
-	struct splat_target target;   /* film_sums_splat */
+	struct splat_target target;   /* splats by film_sums_splat() */
 	uint32_t x, y, width, height; /* the crop */
 	uint32_t tiles_x, tiles_y;
-	double around[2]; /* width and height of a panorama, around which the kernel reaches; 0: of another film */
+	/* Width and height of a panorama, where kernels reach around the edges; 0 for other films. */
+	double around[2];
 	enum filter_kind filter;
 	double radius;
-	double inverse, floor, scale; /* gaussian: scale (exp(-inverse d^2) - floor) */
-	double b, c;		      /* cubic; scale: also of lanczos */
+	double inverse, floor, scale; /* Gaussian: scale (exp(-inverse d^2) - floor) */
+	double b, c;		      /* cubic; Lanczos uses `scale` */
 	double *xyz;
-	uint8_t *touched; /* one a tile */
+	uint8_t *touched; /* one per tile */
 	struct chain_moments moments;
 };
 
-/* -EINVAL: also a window that cuts off a part of a panorama into which kernels reach from the other side. */
+/* Returns -ENOMEM or -EINVAL, the latter also for a window that cuts off a part of a panorama into which kernels
+ * reach from the other side. */
 int film_sums_init(struct film_sums *f, const struct plan *p, const struct scene_settings *s, struct error *e);
 void film_sums_fini(struct film_sums *f);
 void film_sums_splat(struct film_sums *f, const struct splat *s, double weight);
-/* The touched tiles in row-major order, rounded to float. */
+/* Adds the touched tiles to the batch in row-major order, rounded to float. Returns -ENOMEM if out of memory. */
 int film_sums_take(const struct film_sums *f, struct batch *out, struct error *e);
 
-/* The kernel's value at a distance from the pixel's centre, in one dimension. */
+/* Returns the kernel's value at a distance from the pixel's centre, in one dimension. */
 double film_kernel(const struct film_sums *f, double distance);
 
 #endif

@@ -7,18 +7,18 @@
 #define WORKER_RENDER_MATH_CIE_H
 
 enum { CIE_FIRST_NM = 360, CIE_LAST_NM = 830, CIE_COUNT = CIE_LAST_NM - CIE_FIRST_NM + 1 };
-#define CIE_Y_SUM 106.857 /* nm: the integral of y_bar */
+#define CIE_Y_SUM 106.857 /* integral of y_bar, in nm */
 
 extern const double cie_observer[CIE_COUNT][3];
 extern const double cie_d65[CIE_COUNT];
 
-/* For the nanometre from CIE_FIRST_NM + i on: the share of all wavelengths drawn below it, and in it (which is also
- * the density per nm). */
+/* For the nanometre that starts at CIE_FIRST_NM + i: the fraction of all drawn wavelengths that are below it, and the
+ * fraction within it (which is also the density per nm). */
 struct wavelength_cell {
 	double below, share;
 };
 extern const struct wavelength_cell wavelength_cells[CIE_COUNT - 1];
-/* The cell that contains the share k / WAVELENGTH_GUIDE. */
+/* Entry k is the cell that contains the fraction k / WAVELENGTH_GUIDE. */
 enum { WAVELENGTH_GUIDE = 512 };
 extern const unsigned short wavelength_guide[WAVELENGTH_GUIDE];
 

@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Invalid floating-point operations (0/0, inf - inf, sqrt of a negative). A fault of ours jumps back to where the
- * thread asked for that (fptrap_catch), or ends the program by SIGFPE; a library that raises INVALID on ordinary input
- * does no harm.
+ * Detection of invalid floating-point operations (0/0, inf - inf, sqrt of a negative number). A fault in our code jumps
+ * to where the thread asked for it (fptrap_catch), or ends the program by SIGFPE; a library that raises INVALID on
+ * ordinary input does no harm.
  *
- * The processor's own traps would have to be masked around every ray, and changing that mask empties the pipeline
- * twice: 16 % of a path tracer's time. So the traps stay masked, and the sticky flag is checked where our code ends:
- * before a call into the library and at the end of the watch. What the library raised is cleared, which costs something
- * only if it did. Faults are detected only at these places, none of which is inside a library, so leaving by longjmp
- * skips only frames of ours: between catch and fault, nobody may hold a lock or memory that only that frame knows.
- * State of the calling thread. Works on x86-64; no effect elsewhere.
+ * The processor's own traps would have to be masked around every ray, and changing that mask drains the pipeline twice,
+ * which costs 16 % of a path tracer's time. So the traps stay masked, and the sticky flag is checked where our code
+ * ends: before a call into a library and at the end of the watch. Flags raised by the library are cleared, which costs
+ * something only if there are any. Faults are detected only at these places, none of which is inside a library, so the
+ * longjmp skips only frames of ours: between catch and fault, no frame may hold a lock or memory that only it knows of.
+ * The state belongs to the calling thread. Works on x86-64; has no effect elsewhere.
  */
 #ifndef WORKER_RENDER_MATH_FPTRAP_H
 #define WORKER_RENDER_MATH_FPTRAP_H
@@ -17,10 +17,10 @@
 #include <setjmp.h>
 #include <stdbool.h>
 
-/* From here on, a fault of this thread is a longjmp to `back` (with 1; watching and catching then end); NULL: it is
- * a signal again. Returns the previous value. */
+/* From now on, a fault of this thread is a longjmp to `back` with the value 1, which ends watching and catching. NULL:
+ * faults are signals again. Returns the previous value. */
 jmp_buf *fptrap_catch(jmp_buf *back);
-/* Arguments that a library cannot handle: a fault, watched or not. */
+/* Reports a fault, watched or not; for arguments that a library cannot handle. */
 void fptrap_fault(void) __attribute__((noreturn));
 
 #if defined(__x86_64__)
@@ -28,7 +28,7 @@ void fptrap_fault(void) __attribute__((noreturn));
 
 extern _Thread_local bool fptrap_watching;
 
-/* From here on, INVALID is a fault; returns the previous state. */
+/* From now on, INVALID is a fault. Returns the previous state, for fptrap_unwatch. */
 static inline bool fptrap_watch(void)
 {
 	bool before = fptrap_watching;
@@ -37,7 +37,7 @@ static inline bool fptrap_watch(void)
 	return before;
 }
 
-/* Our code ends here, and a library's begins. */
+/* Call when our code ends and a library's begins. Returns the flags, for fptrap_return. */
 static inline unsigned fptrap_leave(void)
 {
 	unsigned flags = _mm_getcsr();

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* An orthonormal frame; local z is n. */
+/* An orthonormal frame; its local z axis is n. */
 #ifndef WORKER_RENDER_MATH_FRAME_H
 #define WORKER_RENDER_MATH_FRAME_H
 
@@ -19,13 +19,13 @@ static inline vec3 frame_to_world(const struct frame *f, vec3 v)
 	return vec3_madd(vec3_madd(vec3_scale(v.x, f->s), v.y, f->t), v.z, f->n);
 }
 
-/* A frame, in the coordinates of another. */
+/* Returns a frame expressed in the coordinates of another one. */
 static inline struct frame frame_within(const struct frame *outer, const struct frame *f)
 {
 	return (struct frame){frame_to_local(outer, f->s), frame_to_local(outer, f->t), frame_to_local(outer, f->n)};
 }
 
-/* Any frame around the unit vector n (Duff et al. 2017, Building an Orthonormal Basis, Revisited, sec. 3). */
+/* Returns some frame around the unit vector n (Duff et al. 2017, Building an Orthonormal Basis, Revisited, sec. 3). */
 static inline struct frame frame_around(vec3 n)
 {
 	double sign = copysign(1.0, n.z);
@@ -33,8 +33,8 @@ static inline struct frame frame_around(vec3 n)
 	return (struct frame){{1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x}, {b, sign + n.y * n.y * a, -n.y}, n};
 }
 
-/* The shading frame of constraints: s is du made orthogonal to n (with a fallback where du is parallel to n, or its
- * square underflows: within 1e-150 of a sphere's pole). */
+/* Returns the shading frame of constraints: s is du made orthogonal to n. There is a fallback if du is parallel to n,
+ * or its square underflows, which happens within 1e-150 of a sphere's pole. */
 static inline struct frame frame_along(vec3 n, vec3 du)
 {
 	vec3 s = vec3_madd(du, -vec3_dot(n, du), n);

@@ -5,7 +5,7 @@
 
 #include <math.h>
 
-/* log of the sum of exp(v[i]); -INFINITY if there are none, or only zeros. */
+/* Returns the logarithm of the sum of exp(v[i]); -INFINITY if there are no terms or all are zero. */
 static inline double log_sum_exp(const double *v, unsigned n)
 {
 	double most = -INFINITY, sum = 0;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Pairs and 2x2 matrices, passed by value: tangent coordinates, half vectors, blocks of constraint derivatives. In
- * double, and in float under names ending in _single.
+ * double, and in float with names that end in _single.
  */
 #ifndef WORKER_RENDER_MATH_MAT2_H
 #define WORKER_RENDER_MATH_MAT2_H

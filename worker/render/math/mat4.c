@@ -30,7 +30,8 @@ static void swap_rows(double a[4], double b[4])
 	}
 }
 
-/* Gauss-Jordan with partial pivoting: adjugates lose all precision for transforms with a large translation. */
+/* Uses Gauss-Jordan elimination with partial pivoting; adjugates lose all precision for transforms
+ * with a large translation. */
 bool mat4_invert(mat4 a, mat4 *inverse)
 {
 	mat4 r = mat4_identity();
@@ -84,7 +85,7 @@ mat4 mat4_scale(vec3 s)
 	return r;
 }
 
-/* Quarter turns are the most common rotations in scene files, and are exact. */
+/* Computes sine and cosine; exact for quarter turns, which are the most common rotations in scene files. */
 static void sine_cosine(double degrees, double *s, double *c)
 {
 	double turn = remainder(degrees, 360.0);

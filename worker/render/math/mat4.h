@@ -13,23 +13,24 @@ typedef struct {
 
 mat4 mat4_identity(void);
 mat4 mat4_mul(mat4 a, mat4 b);		 /* b is applied first */
-bool mat4_invert(mat4 a, mat4 *inverse); /* false when singular or not finite */
+bool mat4_invert(mat4 a, mat4 *inverse); /* returns false if a is singular or not finite */
 mat4 mat4_translate(vec3 t);
 mat4 mat4_scale(vec3 s);
 mat4 mat4_rotate(vec3 axis, double degrees);
 mat4 mat4_look_at(vec3 origin, vec3 target,
-		  vec3 up); /* camera to world: +z to the target, +x to the LEFT, as Mitsuba */
-double mat4_det3(mat4 a);   /* of the upper left 3x3 block */
-/* Whether it rotates, mirrors, moves and scales evenly, and no more, to the four digits that files give. */
+		  /* Camera to world: +z points to the target, +x to the LEFT, as in Mitsuba. */
+		  vec3 up);
+double mat4_det3(mat4 a); /* determinant of the upper left 3x3 block */
+/* Whether a only rotates, mirrors, translates and scales evenly, to the four digits that files give. */
 bool mat4_keeps_angles(const mat4 *a);
 
-/* Where it takes the unit vector of axis k; 3: the origin. */
+/* Returns the image of the unit vector of axis k, or of the origin for k = 3. */
 static inline vec3 mat4_column(const mat4 *a, int k)
 {
 	return (vec3){a->m[0][k], a->m[1][k], a->m[2][k]};
 }
 vec3 mat4_point(const mat4 *a, vec3 p);
 vec3 mat4_vector(const mat4 *a, vec3 v);
-vec3 mat4_normal(const mat4 *inverse, vec3 n); /* by the transpose of the INVERSE; not normalised */
+vec3 mat4_normal(const mat4 *inverse, vec3 n); /* multiplies by the transpose of the INVERSE; not normalised */
 
 #endif

@@ -5,8 +5,8 @@
 
 #include <strings.h>
 
-/* Of chicken, Mitsuba 0.6 has a tenth of the published absorption of red (0.015 and 0.018), and its images are due
- * here. */
+/* For chicken, Mitsuba 0.6 has a tenth of the published absorption of red (0.015 and 0.018); its values are used so
+ * that its images are reproduced. */
 static const struct measured_medium media[] = {
 	{"apple", {2.29, 2.39, 1.97}, {0.0030, 0.0034, 0.046}, {0, 0, 0}},
 	{"chicken1", {0.15, 0.21, 0.38}, {0.0015, 0.077, 0.19}, {0, 0, 0}},

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Measured media by the names that Mitsuba 0.6 has for them, per millimetre, for R, G and B. The first are of Jensen,
- * Marschner, Levoy and Hanrahan 2001, A Practical Model for Subsurface Light Transport, fig. 5, whose scattering
- * coefficients are reduced ones: with them light scatters evenly in all directions. Those from `lowfat milk` on are of
- * Narasimhan et al. 2006, Acquiring Scattering Properties of Participating Media by Dilution, table 3, with their mean
- * cosine g. Pure.
+ * Measured media with the names of Mitsuba 0.6, per millimetre, for R, G and B. The first ones are from Jensen,
+ * Marschner, Levoy and Hanrahan 2001, A Practical Model for Subsurface Light Transport, fig. 5; their scattering
+ * coefficients are reduced ones, with which light scatters evenly in all directions. Those from `lowfat milk` on are
+ * from Narasimhan et al. 2006, Acquiring Scattering Properties of Participating Media by Dilution, table 3, with
+ * their mean cosine g. Pure.
  */
 #ifndef WORKER_RENDER_MATH_MEASURED_MEDIA_H
 #define WORKER_RENDER_MATH_MEASURED_MEDIA_H
@@ -16,12 +16,12 @@ struct measured_medium {
 	double sigma_s[3], sigma_a[3], g[3];
 };
 
-#define MEASURED_DEFAULT "skin1" /* of 0.6, where a file says nothing else */
+#define MEASURED_DEFAULT "skin1" /* 0.6's medium for a file that names none */
 
-/* What 0.6 multiplies the coefficients by, though its manual takes a scene unit for a millimetre. */
+/* The factor by which 0.6 multiplies the coefficients, although its manual equates a scene unit with a millimetre. */
 #define MEASURED_SCALE 100.0
 
-/* By its name in any case; NULL: there is none, and list has the names. */
+/* Finds a medium by its name, ignoring case. Returns NULL if there is none; then `list` has the names. */
 const struct measured_medium *measured_find(const char *name, char *list, size_t size);
 
 #endif

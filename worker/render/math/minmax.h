@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The smaller and the larger of two numbers that are not NaN: one instruction, where fmin and fmax, which must look
- * for NaN, are calls into libm. Functions that run at every vertex of a path use these. Pure; any thread. */
+/* The smaller and the larger of two numbers, which must not be NaN. They take one instruction, whereas fmin and fmax,
+ * which check for NaN, are calls into libm. Used in functions that run at every vertex of a path. Pure; any thread. */
 #ifndef WORKER_RENDER_MATH_MINMAX_H
 #define WORKER_RENDER_MATH_MINMAX_H
 

@@ -1,17 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * motion_make takes the keyframes that matter and decomposes each: the orthogonal factor by Newton's iteration, as a
- * quaternion, and what is left, which is symmetric. motion_at finds the two keys around a time and puts them together
- * again. motion_bounds divides the way between two keys into parts and bounds what a point does within one.
+ * Motion between keyframes. motion_make selects the keyframes that matter and decomposes each: the orthogonal factor,
+ * by Newton's iteration, becomes a quaternion; the remaining factor is symmetric. motion_at finds the two keys around a
+ * time, interpolates and multiplies the factors. motion_bounds divides the motion between two keys into parts and
+ * bounds how far a point moves within each.
  *
- * Nothing fails: keyframes without an inverse, or with one that doubles cannot hold, are refused where they are read
- * (worker/render/scene/animation.c), and the iteration ends after POLAR_STEPS steps at the latest.
+ * Nothing fails: keyframes without an inverse, or with one that exceeds the range of doubles, are refused where they
+ * are read (worker/render/scene/animation.c), and the iteration ends after at most POLAR_STEPS steps.
  */
 #include "worker/render/math/motion.h"
 
 #include <string.h>
 
-/* Newton's iteration at least halves the error: some 20 steps for lengths that differ by 2^16. */
+/* Newton's iteration at least halves the error: it takes some 20 steps for scales that differ by 2^16. */
 enum { POLAR_STEPS = 100 };
 
 static double norm3(const double a[3][3])
@@ -23,7 +24,7 @@ static double norm3(const double a[3][3])
 	return sqrt(sum);
 }
 
-/* The inverse of the transpose. */
+/* Computes the inverse of the transpose. */
 static void invert_transpose(const double a[3][3], double out[3][3])
 {
 	for (int i = 0; i < 3; i++)
@@ -37,7 +38,7 @@ static void invert_transpose(const double a[3][3], double out[3][3])
 			out[i][k] /= det;
 }
 
-/* The orthogonal factor of a (Higham 1986, Computing the Polar Decomposition). */
+/* Computes the orthogonal factor of a (Higham 1986, Computing the Polar Decomposition). */
 static void orthogonal_factor(const double a[3][3], double q[3][3])
 {
 	double scale = 1 / norm3(a), change = INFINITY;
@@ -58,7 +59,8 @@ static void orthogonal_factor(const double a[3][3], double q[3][3])
 	}
 }
 
-/* The largest of the four is computed first, so that the others are not divided by a small number. */
+/* Converts a rotation to a quaternion. The largest component is computed first, so that the others are not
+ * divided by a small number. */
 static void quaternion_of(const double r[3][3], double q[4])
 {
 	double trace = r[0][0] + r[1][1] + r[2][2];
@@ -105,7 +107,8 @@ static void decompose(const struct keyframe *from, struct motion_key *k)
 	k->angle = 0;
 }
 
-/* Of the two quaternions that are the same rotation, the one nearer to the key before. */
+/* Replaces next->turn by its negative, which is the same rotation, if that is nearer to k's, and
+ * sets the angle between them. */
 static void set_angle(struct motion_key *k, struct motion_key *next)
 {
 	double apart = 0, together = 0;
@@ -124,7 +127,7 @@ static bool same_place(const struct keyframe *a, const struct keyframe *b)
 	return memcmp(&a->place, &b->place, sizeof a->place) == 0;
 }
 
-/* The shutter is not open if it is for less: times in units of that would not be finite. */
+/* Shorter exposures count as closed, because times in units of the exposure would not be finite. */
 #define LEAST_OPEN 1e-30
 
 bool motion_make(struct motion *m, const struct animation *a, double open, double close, struct motion_key *room)
@@ -160,7 +163,7 @@ void motion_rescale(struct motion *m, vec3 center, double scale)
 	}
 }
 
-/* The last key that is not after that time; the first one if there is none. */
+/* Returns the index of the last key that is not after that time; 0 if there is none. */
 static uint32_t key_before(const struct motion *m, double time)
 {
 	uint32_t low = 0, high = m->count;
@@ -194,7 +197,7 @@ static void turn_at(const struct motion_key *a, const struct motion_key *b, doub
 		q[i] = from * a->turn[i] + to * b->turn[i];
 }
 
-/* Without `before`. */
+/* Returns the transform between two keys, without `before`. */
 static mat4 place_at(const struct motion_key *a, const struct motion_key *b, double s)
 {
 	double q[4], r[3][3];
@@ -222,13 +225,13 @@ mat4 motion_at(const struct motion *m, double time)
 	return mat4_mul(place_at(a, b, s), m->before);
 }
 
-/* A turn is bounded in parts of at most this angle. */
+/* The motion is bounded in parts that turn by at most this angle. */
 #define PART (M_PI / 32)
 
 struct sweep {
 	const mat4 *before;
 	vec3 middle, half; /* the box */
-	double far;	   /* how far from the origin its points are after `before`, at most */
+	double far;	   /* largest distance of its points from the origin, after `before` */
 	vec3 low, high;
 };
 
@@ -246,9 +249,10 @@ static void grow_sweep(struct sweep *w, const mat4 *m, double off)
 	}
 }
 
-/* From s = begin to end between two keys. A point is p = R q + c, where q = S x and c are linear in s. Over a part in
- * which R turns by f, and q changes by dq, |p''| <= f^2 |q| + 2 f |dq| per square of that part, and p is off the chord
- * between its ends by at most an eighth of that. The chord is in the hull of the boxes at the ends. */
+/* Bounds the motion from s = begin to end between two keys. A point is p = R q + c, where q = S x and c are
+ * linear in s. Over a part in which R turns by f and q changes by dq, |p''| <= f^2 |q| + 2 f |dq| with s in
+ * units of that part, so p is off the chord between its ends by at most an eighth of that. The chord is in the
+ * hull of the boxes at the ends. */
 static void sweep_between(struct sweep *w, const struct motion_key *a, const struct motion_key *b, double begin,
 			  double end)
 {
@@ -282,7 +286,7 @@ void motion_bounds(const struct motion *m, vec3 low, vec3 high, vec3 *all_low, v
 	for (uint32_t i = 0; i + 1 < m->count; i++) {
 		const struct motion_key *a = &m->key[i], *b = a + 1;
 		double length = b->time - a->time;
-		if (!(length > 0)) { /* their times round to the same */
+		if (!(length > 0)) { /* both times round to the same value */
 			sweep_between(&w, a, b, 0, 1);
 			continue;
 		}

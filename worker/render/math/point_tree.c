@@ -10,7 +10,7 @@ static void exchange(node *a, node *b)
 	*b = t;
 }
 
-/* Hoare 1961, Algorithm 65. */
+/* Quickselect (Hoare 1961, Algorithm 65). */
 void point_tree_partition(node *nodes, size_t count, size_t middle, unsigned axis)
 {
 	size_t low = 0, high = count - 1;
@@ -33,7 +33,7 @@ void point_tree_partition(node *nodes, size_t count, size_t middle, unsigned axi
 	}
 }
 
-/* The axis changes from level to level; the middle of a range is the node that divides it. */
+/* Builds a subtree. The axis changes from level to level; the middle node of a range divides it. */
 static void build(node *nodes, size_t count, unsigned axis)
 {
 	while (count > 1) {

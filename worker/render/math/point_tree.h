@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Points in space, and which of them are within a distance (Bentley 1975, k-d trees). The order in which they are found
- * depends on the points only, so that sums over them have the same bits on every machine.
+ * A tree of points in space, to find those within a distance (Bentley 1975, k-d trees). The order in which they are
+ * found depends on the points only, so that sums over them have the same bits on every machine.
  */
 #ifndef WORKER_RENDER_MATH_POINT_TREE_H
 #define WORKER_RENDER_MATH_POINT_TREE_H
@@ -19,13 +19,14 @@ struct point_tree {
 	size_t count;
 };
 
-/* Makes nodes[middle] what it would be if all were sorted along the axis, with none before it above and none after it
- * below. count > 0. */
+/* Reorders the nodes so that nodes[middle] is the one that sorting along the axis would put there, with no larger node
+ * before it and no smaller one after it. count > 0. */
 void point_tree_partition(struct point_tree_node *nodes, size_t count, size_t middle, unsigned axis);
 
-/* Reorders nodes[0..count), whose memory remains the caller's; at most 2^32 of them, finite. */
+/* Builds the tree by reordering nodes[0..count), whose memory remains the caller's; at most 2^32
+ * nodes with finite positions. */
 void point_tree_build(struct point_tree *t);
-/* Calls found for each node at most `radius` away from `at`. */
+/* Calls `found` for each node at most `radius` away from `at`. */
 void point_tree_within(const struct point_tree *t, vec3 at, double radius, void (*found)(void *user, uint32_t id),
 		       void *user);
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Counter-based random numbers: (seed, stream, index, step, dimension) -> value, by Threefry-4x64-20 (Salmon et al.
- * 2011, through Random123). Each use has a stream constant of its own, so no two uses share numbers. Values are
+ * 2011, as implemented in Random123). Each use has its own stream constant, so no two uses share numbers. Values are
  * multiples of 2^-53 in [0,1). Any thread; no state.
  */
 #ifndef WORKER_RENDER_MATH_RNG_H
@@ -9,7 +9,8 @@
 
 #include <stdint.h>
 
-/* Numbers are never reused for something else, because jobs that continue depend on them: add new ones at the end. */
+/* Constants are never reused for another purpose, because jobs that continue depend on them: add new ones at the
+ * end. */
 enum rng_stream {
 	RNG_PATH = 1,
 	RNG_BDPT = 2,
@@ -29,9 +30,9 @@ enum rng_stream {
 	RNG_EMITTERS = 16,
 };
 
-/* Four values: dimensions 4*block .. 4*block+3 of one (stream, index, step). */
+/* Computes four values: dimensions 4*block .. 4*block+3 of one (stream, index, step). */
 void rng_uniform4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block, double out[4]);
-/* The 256 random bits that these are made from. */
+/* Computes the 256 random bits from which rng_uniform4 makes its values. */
 void rng_bits4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block, uint64_t out[4]);
 
 #endif

@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-/* The last index i < n with edge[i] <= x, or 0; n > 0 cells lie between ascending edges. */
+/* Returns the last index i < n with edge[i] <= x, or 0. The n > 0 cells lie between ascending edges. */
 #define SEARCH(name, type)                                                  \
 	static inline uint32_t name(const type *edge, uint32_t n, double x) \
 	{                                                                   \

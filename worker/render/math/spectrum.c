@@ -10,7 +10,7 @@ static int cell_of(double nm)
 	return cell < 0 ? 0 : cell > CIE_COUNT - 2 ? CIE_COUNT - 2 : cell;
 }
 
-/* The wavelength below which the share u of all wavelengths lies. */
+/* Returns the wavelength below which the fraction u of all drawn wavelengths lies. */
 static double wavelength_at(double u)
 {
 	int part = (int)(u * WAVELENGTH_GUIDE); /* u may be 1 by rounding */
@@ -41,7 +41,8 @@ struct wavelengths wavelengths_sample_few(double u, unsigned count)
 	return w;
 }
 
-/* Lane i's contribution to the three integrals for a value of 1; none of the fourth where the lanes are R, G and B. */
+/* Computes lane i's contribution to X, Y and Z for a value of 1; the fourth lane has none where
+ * the lanes are R, G and B. */
 static void lane_weights(const struct wavelengths *w, int i, double xyz[3])
 {
 	if (w->rgb) {

@@ -1,18 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Radiance, reflectance or importance at the wavelengths a path carries: four lanes that travel together where
- * nothing disperses (hero wavelength, Wilkie et al. 2014).
+ * Radiance, reflectance or importance at the wavelengths that a path carries: four lanes that travel together unless
+ * something disperses them (hero wavelength, Wilkie et al. 2014).
  *
- * A path's wavelengths are made of one number u in [0,1), and all of a path's densities are taken with respect to u.
- * Lane i has the wavelength at which the cumulative distribution is u + i/4 (mod 1): each lane alone has density
- * wavelength_pdf, any lane as the hero gives the same four, and equal weights are those of the balance heuristic. The
- * density follows |r| + |g| + |b|, the matching functions of linear Rec. 709, plus a uniform share of 5 %, so that no
- * wavelength has density 0. The relative variance of R, G, B for white (D65) is then 0.07, 0.03, 0.02; with uniform
- * wavelengths it is 0.61, 0.17, 0.67. Times D65 it would be 0.10, 0.03, 0.04.
+ * A path's wavelengths are computed from one number u in [0,1), and all of a path's densities are with respect to
+ * u. Lane i has the wavelength at which the cumulative distribution is u + i/4 (mod 1): each lane alone has
+ * density wavelength_pdf, any lane as the hero gives the same four, and equal weights are those of the balance
+ * heuristic. The density is proportional to |r| + |g| + |b|, the matching functions of linear Rec. 709, mixed with
+ * a uniform density of weight 5 %, so that no wavelength has density 0. The relative variance of R, G, B for white
+ * (D65) is then 0.07, 0.03, 0.02; with uniform wavelengths it is 0.61, 0.17, 0.67. Multiplying the density by D65
+ * would give 0.10, 0.03, 0.04.
  *
- * In a grey scene (struct wavelengths.grey) all lanes are equal and stand for the common illuminant's shape. Where
- * colours are rgb (struct wavelengths.rgb) the lanes are R, G and B of linear Rec. 709 and once more G, so that a mean
- * over the lanes is near to a luminance; the fourth is not part of any colour.
+ * In a grey scene (struct wavelengths.grey) all lanes are equal and multiply the emitters' common spectrum. Where
+ * colours are rgb (struct wavelengths.rgb) the lanes are R, G and B of linear Rec. 709 and G once more, so that the
+ * mean over the lanes is close to a luminance; the fourth lane is not part of any colour.
  */
 #ifndef WORKER_RENDER_MATH_SPECTRUM_H
 #define WORKER_RENDER_MATH_SPECTRUM_H
@@ -30,10 +31,11 @@ typedef struct {
 
 struct wavelengths {
 	double nm[SPECTRUM_LANES];
-	bool grey;    /* the scene has no colour: nm is undefined */
-	bool rgb;     /* the lanes are no wavelengths: nm is undefined */
-	double u;     /* the number that nm was made from; 0 if grey or rgb */
-	unsigned few; /* 0: all differ; 1 or 2: nm repeats after this many, for the same mean from fewer wavelengths */
+	bool grey; /* the scene has no colour: nm is undefined */
+	bool rgb;  /* the lanes are not wavelengths: nm is undefined */
+	double u;  /* the number from which nm was computed; 0 if grey or rgb */
+	/* 0: all wavelengths differ; 1 or 2: nm repeats after this many, for the same mean from fewer wavelengths. */
+	unsigned few;
 };
 
 /* See EFFECT_IS_ON in worker/render/world/world.h. */
@@ -67,7 +69,7 @@ static inline spectrum spectrum_mul(spectrum a, spectrum b)
 	return a;
 }
 
-/* The transmittance of an optical depth. */
+/* Returns the transmittance of an optical depth. */
 static inline spectrum spectrum_attenuation(spectrum depth)
 {
 	for (int i = 0; i < SPECTRUM_LANES; i++)
@@ -98,7 +100,7 @@ static inline double spectrum_max(spectrum a)
 	return m;
 }
 
-/* Divided before they are added, so that the mean of lanes near the largest double is finite. */
+/* Divides before adding, so that the mean of lanes near the largest double is finite. */
 static inline double spectrum_mean(spectrum a)
 {
 	double m = 0;
@@ -115,14 +117,14 @@ static inline bool spectrum_is_valid(spectrum a) /* finite and non-negative */
 	return true;
 }
 
-/* Density of one lane's wavelength, per nm; positive from WAVELENGTH_MIN to WAVELENGTH_MAX. */
+/* Returns the density of one lane's wavelength, per nm; positive from WAVELENGTH_MIN to WAVELENGTH_MAX. */
 double wavelength_pdf(double nm);
-/* u in [0,1) -> the four wavelengths described above. */
+/* Returns the four wavelengths described above for u in [0,1). */
 struct wavelengths wavelengths_sample(double u);
-/* 1, 2 or 4 wavelengths, evenly rotated in the cumulative distribution. */
+/* Returns 1, 2 or 4 wavelengths, spaced evenly in the cumulative distribution. */
 struct wavelengths wavelengths_sample_few(double u, unsigned count);
 
-/* Repeats the first `lanes`. */
+/* Fills all lanes by repeating the first `lanes`. */
 static inline spectrum spectrum_repeat(spectrum s, int lanes)
 {
 	for (int i = lanes; i < SPECTRUM_LANES; i++)
@@ -130,11 +132,11 @@ static inline spectrum spectrum_repeat(spectrum s, int lanes)
 	return s;
 }
 
-/* The CIE 1931 colour of a spectrum estimated from its four lanes (one-sample estimate of the integral of
- * L x_bar / 106.857 nm, each lane over its density, so that an emitter of rgb 1 has Y = 1), or that of rgb. Not for
- * grey: the film has its own factor. */
+/* Computes the CIE 1931 colour of a spectrum from its four lanes (a one-sample estimate of the integral of L x_bar /
+ * 106.857 nm, with each lane divided by its density, so that an emitter of rgb 1 has Y = 1), or that of rgb. Not for
+ * grey, for which the film has its own factor. */
 void spectrum_to_xyz(spectrum l, const struct wavelengths *w, double xyz[3]);
-/* X + Y + Z of that is the sum of l times these, lane by lane. */
+/* Returns weights whose sum of products with the lanes of l is X + Y + Z of spectrum_to_xyz(). */
 spectrum spectrum_intensity_weights(const struct wavelengths *w);
 
 #endif

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The (u, v) of a sphere: longitude from s around the axes' n, and the angle from n, each divided by its range. */
+/* The (u, v) of a sphere: the longitude around the axes' n, counted from s, and the angle from n,
+ * each divided by its range. */
 #ifndef WORKER_RENDER_MATH_SPHERE_H
 #define WORKER_RENDER_MATH_SPHERE_H
 
 #include "worker/render/math/frame.h"
 
-/* w: unit, from the centre. u in [0,1), v in [0,1]. */
+/* w: unit direction from the centre. Sets u in [0,1) and v in [0,1]. */
 static inline void sphere_uv(const struct frame *axes, vec3 w, double *u, double *v)
 {
 	vec3 l = frame_to_local(axes, w);

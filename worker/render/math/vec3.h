@@ -54,13 +54,13 @@ static inline vec3 vec3_normalize(vec3 a)
 	return vec3_scale(1.0 / vec3_length(a), a);
 }
 
-/* In [0, pi], exact also for small ones; neither needs unit length. */
+/* Returns the angle in [0, pi], accurate for small angles, too. The vectors need not have unit length. */
 static inline double vec3_angle(vec3 a, vec3 b)
 {
 	return atan2(vec3_length(vec3_cross(a, b)), vec3_dot(a, b));
 }
 
-/* The coordinate along axis 0, 1 or 2. */
+/* Returns the coordinate along axis 0, 1 or 2. */
 static inline double vec3_along(vec3 v, unsigned axis)
 {
 	return axis == 0 ? v.x : axis == 1 ? v.y : v.z;

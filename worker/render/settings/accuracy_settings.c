@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The list of settings (setting_list.h) is read into one table; texts are parsed against it entry by entry and printed
- * from it in its order, which is what makes a text canonical.
+ * The list of settings (setting_list.h) is read into one table. Texts are parsed against it entry by entry and printed
+ * in its order, which makes them canonical.
  *
- * Failures: a name that is none (with the nearest), a value outside its range or choices.
+ * Failures: an unknown name (the message suggests the nearest one), or a value outside its range or choices.
  */
 #include "worker/render/settings/accuracy_settings.h"
 
@@ -60,7 +60,7 @@ static void set_value(struct accuracy_settings *k, size_t index, double value)
 	memcpy((char *)k + offset[index], &value, sizeof value);
 }
 
-/* The choice at the place, or worth the value when place is -1; false: there are not so many. */
+/* Copies the choice at index `place`, or, if place is -1, the choice worth `value`. Returns false if there is none. */
 static bool choice_at(const char *choices, int place, double value, char *text, size_t size)
 {
 	const char *at = choices;
@@ -113,7 +113,7 @@ static int name_error(const char *name, struct error *e)
 			 spelling_hint(&s, hint, sizeof hint), known);
 }
 
-/* A hint about a setting that is written without a value; "" if only the value is missing. */
+/* Returns a hint about a setting that is written without a value; "" if only the value is missing. */
 static const char *name_hint(const char *name, char *text, size_t size)
 {
 	struct spelling s = {.wanted = name};
@@ -132,7 +132,7 @@ static int find(const char *name, size_t *index, struct error *e)
 	return name_error(name, e);
 }
 
-/* "; did you mean `double`?" of a choice that there is not; otherwise "". */
+/* Returns "; did you mean `double`?" for an unknown choice; otherwise "". */
 static const char *value_hint(const struct render_setting *k, const char *wanted, char *text, size_t size)
 {
 	char choice[VALUE_BYTES];
@@ -142,7 +142,8 @@ static const char *value_hint(const struct render_setting *k, const char *wanted
 	return spelling_hint(&s, text, size);
 }
 
-/* Numbers are rounded to what a plan's text holds of them, so that a text and its canonical form mean the same. */
+/* Parses a value. Numbers are rounded to the digits of a plan's text, so that a text and its
+ * canonical form mean the same. */
 static bool parse_value(const struct render_setting *k, const char *text, double *value)
 {
 	char *end, choice[VALUE_BYTES], digits[VALUE_BYTES];

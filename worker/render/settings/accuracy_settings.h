@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The settings that trade accuracy for time (tolerances, limits, precision), each with a name, a range and a default: a
- * line in setting_list.h. A plan carries those that differ from the default as text, "tolerance=1e-05,iterations=30"; a
- * world is built by them, and everything that runs in it reads them there. Pure; any thread; nothing allocates.
+ * The settings that trade accuracy for time (tolerances, limits, precision), each with a name, a range and a default.
+ * Each is a line in setting_list.h. A plan carries those that differ from the default as text,
+ * "tolerance=1e-05,iterations=30". A world is built with the settings, and everything that runs in it reads them there.
+ * Pure; any thread; nothing allocates.
  */
 #ifndef WORKER_RENDER_SETTINGS_ACCURACY_SETTINGS_H
 #define WORKER_RENDER_SETTINGS_ACCURACY_SETTINGS_H
@@ -12,11 +13,11 @@
 
 enum setting_kind { SETTING_REAL, SETTING_WHOLE, SETTING_CHOICE };
 
-/* What another value changes. */
+/* What a setting affects. */
 enum setting_place {
-	SETTING_WORLD,	/* the world that is built */
+	SETTING_WORLD,	/* the world as it is built */
 	SETTING_PATHS,	/* every path */
-	SETTING_CHAINS, /* what chains of whole paths propose */
+	SETTING_CHAINS, /* the proposals of chains of whole paths */
 };
 
 enum { SETTING_SWEEP_MAX = 8 };
@@ -25,14 +26,15 @@ struct render_setting {
 	const char *name, *summary;
 	enum setting_kind kind;
 	enum setting_place place;
-	double standard, least, greatest; /* standard: the default */
-	const char *choices; /* of SETTING_CHOICE, with spaces between; a choice that is a number is worth that number,
-				another one its place from 0 on */
-	const char *sweep[SETTING_SWEEP_MAX + 1]; /* values worth comparing, NULL at the end; none: it is no matter
-						   * of accuracy */
+	double standard, least, greatest; /* standard is the default */
+	/* For SETTING_CHOICE: the choices, separated by spaces. A numeric choice has that number as its value, any
+	 * other its index from 0 on. */
+	const char *choices;
+	/* Values worth comparing, terminated by NULL; empty if the setting does not affect accuracy. */
+	const char *sweep[SETTING_SWEEP_MAX + 1];
 };
 
-/* NULL at the end. */
+/* Returns NULL at the end of the list. */
 const struct render_setting *render_setting_at(size_t index);
 
 enum { SETTING_DOUBLE, SETTING_SINGLE };			      /* precision */
@@ -47,18 +49,18 @@ struct accuracy_settings {
 };
 extern const struct accuracy_settings accuracy_settings_default;
 
-/* text: NAME=VALUE with commas between, the last of a name counts; NULL or "": all defaults. -EINVAL with a sentence
- * that names the range, or the nearest name. */
+/* Reads NAME=VALUE pairs separated by commas; the last pair of a name counts. NULL or "": all defaults. Returns -EINVAL
+ * and an error message that gives the range, or the nearest name. */
 int accuracy_settings_read(const char *text, struct accuracy_settings *out, struct error *e);
 
-/* The canonical text, as in a plan: what differs from the default, in the order of the list, padded with zeros. A
- * canonical text is returned unchanged. */
+/* Write the canonical text, as in a plan: the settings that differ from the default, in the order of the list, padded
+ * with zero bytes. A canonical text is returned unchanged. */
 void accuracy_settings_print(const struct accuracy_settings *k, char text[PLAN_ACCURACY_MAX]);
 int render_settings_canonical(const char *text, char canonical[PLAN_ACCURACY_MAX], struct error *e);
 
-/* The value of the setting of that index as --set takes it. */
+/* Writes the value of the setting with that index as --set takes it. */
 void accuracy_settings_value(const struct accuracy_settings *k, size_t index, char *text, size_t size);
-/* "1e-09 to 1", "double or single". */
+/* Writes "1e-09 to 1", or "double or single". */
 void render_setting_range(const struct render_setting *k, char *text, size_t size);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* One line per setting: field of struct accuracy_settings, name, kind, where it acts; the default, the least and the
- * greatest value; choices, the first of them worth 0 unless they are numbers; what it does, in one sentence; values
- * worth a sweep. */
+/* One line per setting: field of struct accuracy_settings; name; kind; what it affects; default, least and greatest
+ * value; choices, of which the first has the value 0 unless they are numbers; what the setting does, in one
+ * sentence; values worth a sweep. */
 SETTING(tolerance, "tolerance", SETTING_REAL, SETTING_CHAINS, 1e-3, 1e-9, 1, NULL,
 	"Residual at which a walk has reached its half vectors, relative to the lobe or the step, whichever is smaller",
 	"0.1", "0.01", "0.001", "0.0001", "1e-05", "1e-06", "1e-08")
