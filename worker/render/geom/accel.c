@@ -7,8 +7,8 @@
  * enters the scene's box in double, Embree proposes hits in float, the filter accepts or rejects them, and the caller
  * computes the hit again (surface.h).
  *
- * Only building can fail: out of memory, or with an error that Embree reports. Tracing
- * never returns an error; a ray that is not finite is a fault (worker/render/math/fptrap.h).
+ * Only building can fail: out of memory, or with an error that Embree reports. Tracing never returns an error; a ray
+ * that is not finite is a fault (worker/render/math/fptrap.h).
  */
 #include "worker/render/geom/accel.h"
 

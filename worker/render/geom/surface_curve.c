@@ -154,7 +154,7 @@ bool curve_near(const struct geom_shape *s, struct prim_ref prim, vec3 p, struct
 
 /* Derivatives as the point moves by a unit length along a tangent. */
 struct motion_step {
-	/* Turn: of e around the axis, in radians; s: along the axis, in units of the cone's length. */
+	/* turn: of e around the axis, in radians; s: along the axis, in units of the cone's length. */
 	double turn, s;
 	vec3 dn, dside;
 };

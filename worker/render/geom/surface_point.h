@@ -26,7 +26,7 @@ struct geom_shape {
 	const struct relief *relief; /* bends shading normals; NULL: none */
 	/* The shape consists of these curves, oriented by normal_sign; NULL: it has no curves. */
 	const struct curves *curves;
-	/* For curves: rays do not meet them from the side to which the normals do not point. */
+	/* For curves: rays do not meet them from inside; normals point outwards. */
 	bool culled;
 	/* For instances and for spheres that move; NULL: positions and normals are in world space. */
 	const struct placement *place;

@@ -16,7 +16,7 @@
 
 struct candidate {
 	double intensity;
-	/* Passed: number of vertices that the joint passes (transparent.h) or at which it is refracted;
+	/* passed: number of vertices that the joint passes (transparent.h) or at which it is refracted;
 	 * `edges` includes theirs. */
 	unsigned s, passed, edges;
 };

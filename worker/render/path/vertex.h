@@ -29,8 +29,8 @@ struct path_edge {
 	uint32_t medium;
 	/* The other members are only set where media scatter. */
 	uint32_t before; /* medium of the edge at the preceding vertex */
-	/* Every `null` face along the edge states, on the side from which the edge reaches it,
-	 * the medium the edge is in. */
+	/* Every `null` face along the edge that states media has the edge's medium on the side from which the edge
+	 * reaches it. */
 	bool fits;
 	spectrum free; /* exp(-optical depth) of the scattering media along the edge */
 	vec3 d;	       /* unit direction of the edge; either orientation */

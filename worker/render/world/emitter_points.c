@@ -29,7 +29,7 @@ static const double GLOSS = 0.1, /* fraction of the light that glossy reflection
 	FAINT = 0.01;		 /* fraction of the light that has arrived, below which an offer is not tested */
 
 struct point {
-	/* Ng: on the side from which the walk came; 0 in a medium. */
+	/* ng: on the side from which the walk came; 0 in a medium. */
 	vec3 p, ng;
 	struct prim_ref prim;
 	bool opaque;

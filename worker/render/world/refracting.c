@@ -20,7 +20,7 @@ enum {
 /* State of the systematic sampling. */
 struct spread {
 	struct world *w;
-	/* Area: total area passed so far; step: area between two points, or 0 to only sum the areas. */
+	/* area: total area passed so far; step: area between two points, or 0 to only sum the areas. */
 	double area, step;
 	uint32_t triangles; /* most triangles that are used of a mesh */
 };

@@ -16,7 +16,7 @@ struct world;
 
 struct refracting_point {
 	vec3 p, n;  /* n: unit normal, on the side of the smaller refractive index */
-	double eta; /* refractive index behind the surface divided by that in front of it; at least 1 */
+	double eta; /* refractive index behind the surface divided by that in front of it; above 1 */
 };
 
 /* Sets w->refracting_points and their count. Their density is proportional to area; moving shapes are taken halfway

@@ -40,7 +40,7 @@ struct world {
 	struct accuracy_settings accuracy;
 	struct camera camera;
 	vec3 center;
-	/* Scale: factor from scene to world lengths; radius: that of the rescaled bounding sphere around the origin. */
+	/* scale: factor from scene to world lengths; radius: that of the rescaled bounding sphere around the origin. */
 	double scale, radius;
 	uint32_t shape_count, bsdf_count, emitter_count;
 	uint32_t instance_count; /* number of instances in the scene, whether or not they share meshes */
