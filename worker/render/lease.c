@@ -210,7 +210,7 @@ static int run_chains(struct job *j, const struct lease_input *in, enum lease_en
 {
 	struct plan_range r = plan_chain_range(j->plan, j->key->part);
 	if (!in || in->chain_count != r.end - r.begin || (!in->seeds && !in->states))
-		return error_set(j->e, EINVAL, "a lease of %llu chains came without as many states",
+		return error_set(j->e, EINVAL, "a lease of %llu chains came with another number of states or seeds",
 				 (unsigned long long)(r.end - r.begin));
 	*end = LEASE_DONE;
 	for (uint64_t k = r.begin; k < r.end && *end == LEASE_DONE; k++) {
@@ -250,7 +250,8 @@ static int check(const struct world *w, const struct plan *p, const struct integ
 	if (i->face.has_mutations && mixture_parse(p->mutations, &unused, e))
 		return -EINVAL;
 	if (p->max_depth < 1 || p->max_depth > PATH_MAX_EDGES)
-		return error_set(e, EINVAL, "a depth of %u edges is not within 1 and %d", p->max_depth, PATH_MAX_EDGES);
+		return error_set(e, EINVAL, "a depth of %u edges is not between 1 and %d", p->max_depth,
+				 PATH_MAX_EDGES);
 	return 0;
 }
 

@@ -56,8 +56,8 @@ static int check_around(const struct plan *p, const struct scene_settings *s, st
 	if (p->crop_width < s->width)
 		return error_set(
 			e, EINVAL,
-			"a window of a panorama that comes within %u pixels of its edges must be as wide as it, "
-			"because its filter reaches around",
+			"a window of a panorama that comes within %u pixels of its edges must be as wide as the "
+			"panorama, because the filter reaches across its edges",
 			b);
 	return s->filter_radius <= s->width / 2.0 && s->filter_radius <= p->crop_height
 		       ? 0

@@ -16,9 +16,9 @@ struct render_integrator {
 	bool to_emitters; /* its paths end on emitters, so it finds no light of media */
 };
 /* Error for an integrator with from_camera in a scene with a beam. Argument: the integrator's name. */
-#define RENDER_NO_BEAMS                                                                                                \
-	"the integrator %s finds no light of `collimated`, a beam without width: paths must begin there, as those of " \
-	"bdpt, erpt, pssmlt and hslt do"
+#define RENDER_NO_BEAMS                                                                                              \
+	"the integrator %s cannot find the light of `collimated`, a beam without width: paths must start at it, as " \
+	"those of bdpt, erpt, pssmlt and hslt do"
 
 /* Error for an integrator without from_camera in a scene with a rolling shutter. Argument: the integrator's name. */
 #define RENDER_NO_ROLL                                                                                                \
@@ -27,7 +27,7 @@ struct render_integrator {
 
 /* Error for an integrator with to_emitters in a scene with a medium that emits. Argument: the integrator's name. */
 #define RENDER_NO_GLOW                                                                                            \
-	"the integrator %s finds no light of `volumelight`, that of media: its chains move the ends of paths on " \
+	"the integrator %s cannot find the light of media (`volumelight`): its chains move the ends of paths on " \
 	"surfaces; path, bdpt, bdpt8, erpt, erpt4 and pssmlt find it"
 
 #endif

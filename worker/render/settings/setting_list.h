@@ -28,7 +28,7 @@ SETTING(colour, "colour", SETTING_CHOICE, SETTING_WORLD, 0, 0, 1, "spectral rgb"
 	"Light and colours are spectra, or R, G and B as in most renderers: then nothing disperses", NULL)
 SETTING(emitter_choice, "emitter-choice", SETTING_CHOICE, SETTING_WORLD, SETTING_BY_PLACE, SETTING_BY_PLACE,
 	SETTING_BY_POWER, "place power",
-	"How one of several emitters is chosen: by what arrives from each at the place it is to light, or by power",
+	"How one of several emitters is chosen: by the light that arrives from each at the lit place, or by power",
 	NULL)
 SETTING(backs, "backs", SETTING_CHOICE, SETTING_WORLD, SETTING_BACKS_AUTO, SETTING_BACKS_AUTO, SETTING_BACKS_BLACK,
 	"auto lit black",
@@ -38,6 +38,7 @@ SETTING(media, "media", SETTING_CHOICE, SETTING_WORLD, SETTING_MEDIA_AUTO, SETTI
 	"auto shown none",
 	"Whether media are shown; auto: not where the scene's own integrator leaves them out, such as path", NULL)
 SETTING(lenient, "lenient", SETTING_CHOICE, SETTING_WORLD, 0, 0, 1, "no yes",
-	"Whether unsupported features are left out or replaced by what is nearest, with a note for each", NULL)
+	"Whether unsupported features are left out or replaced by the nearest supported ones, with a note for each",
+	NULL)
 SETTING(sensor, "sensor", SETTING_WHOLE, SETTING_WORLD, 1, 1, 1000, NULL,
 	"Which of the scene's sensors is used, counted from 1", NULL)

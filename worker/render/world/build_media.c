@@ -30,10 +30,10 @@ static int light_media(struct builder *b, const struct scene_node **lights)
 		if (!n || !emitter_is_in_medium(n) || (medium && lights[medium - 1] == n))
 			continue;
 		if (!medium)
-			rc = node_error(n, b->e, EINVAL, "\"%s\" must be inside a shape that has a medium inside",
+			rc = node_error(n, b->e, EINVAL, "\"%s\" must be inside a shape with an interior medium",
 					n->type);
 		else if (lights[medium - 1])
-			rc = node_error(n, b->e, EINVAL, "a medium may shine by one \"%s\" only", n->type);
+			rc = node_error(n, b->e, EINVAL, "a medium may have only one \"%s\"", n->type);
 		else
 			rc = medium_light(&w->media[medium - 1], n, &b->volumes, b->e);
 		if (medium)

@@ -74,7 +74,7 @@ static void describe_pair(struct render_coincident *out, const struct coincide_s
 			node_title(nodes[c->hidden], hidden), node_title(nodes[c->by], by),
 			reason(s[c->hidden].rank, s[c->by].rank),
 			shine && !c->same_side
-				? "; light to the other side is lost: for a lamp with two sides use two, slightly apart"
+				? "; light to the other side is lost: for a lamp with two sides use two surfaces, slightly apart"
 			: refract ? "; where two media touch, use one surface with the int_ior and ext_ior of both"
 				  : "");
 	}

@@ -355,8 +355,8 @@ static void surfaces(struct report *r, const struct census *c, const struct worl
 {
 	char text[NAMES_MAX], more[NAMES_MAX];
 	if (c->textured.count && c->textured_light.count)
-		line(r, EFFECT_TEXTURES, true, "%s and, of emitters, %s are textured", names_of(&c->textured, text),
-		     names_of(&c->textured_light, more));
+		line(r, EFFECT_TEXTURES, true, "%s and, among the emitters, %s are textured",
+		     names_of(&c->textured, text), names_of(&c->textured_light, more));
 	else if (c->textured.count + c->textured_light.count)
 		line(r, EFFECT_TEXTURES, true, "textured: %s",
 		     names_of(c->textured.count ? &c->textured : &c->textured_light, text));
@@ -385,7 +385,7 @@ static void surfaces(struct report *r, const struct census *c, const struct worl
 		     "no mesh is shared: copies of what the %u instance%s show%s are as fast", w->instance_count,
 		     w->instance_count == 1 ? "" : "s", w->instance_count == 1 ? "s" : "");
 	else
-		line(r, EFFECT_INSTANCING, false, "no mesh stands in several places");
+		line(r, EFFECT_INSTANCING, false, "no mesh is used in several places");
 	struct tally moving = {0};
 	for (uint32_t i = 0; i < w->shape_count; i++)
 		if (surface_moves(&w->shapes[i]))
@@ -402,7 +402,7 @@ static void surfaces(struct report *r, const struct census *c, const struct worl
 		r->fx->motion = line(r, EFFECT_MOTION, false, "%s",
 				     w->settings.shutter_open < w->settings.shutter_close
 					     ? "nothing moves while the shutter is open"
-					     : "the shutter is open for no time");
+					     : "the exposure time is zero");
 	const struct render_coincident *k = &w->coincident;
 	if (k->total > 1)
 		line(r, EFFECT_COINCIDENCE, true, "%zu pairs of shapes coincide visibly", k->total);
@@ -411,7 +411,7 @@ static void surfaces(struct report *r, const struct census *c, const struct worl
 	else if (w->coincidence)
 		line(r, EFFECT_COINCIDENCE, true, "only opaque bodies touch");
 	else
-		line(r, EFFECT_COINCIDENCE, false, "no surfaces lie in one place");
+		line(r, EFFECT_COINCIDENCE, false, "no surfaces coincide");
 }
 
 static void emitter_moves(struct report *r, const struct census *c)
@@ -472,7 +472,7 @@ void effects_analyse(struct world *w, const struct effects_source *src, const st
 	emitter_moves(&r, &c);
 	lobes(&r, &c);
 	surfaces(&r, &c, w, src);
-	add_tally_line(&r, EFFECT_ENVIRONMENT, &c.environment, "shines on everything that escapes", "",
+	add_tally_line(&r, EFFECT_ENVIRONMENT, &c.environment, "is met by every ray that escapes", "",
 		       "rays that escape meet nothing");
 	add_tally_line(&r, EFFECT_AREA_LIGHT, &c.area, "shines from its surface", "shine from their surfaces",
 		       "no surface shines");

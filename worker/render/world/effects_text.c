@@ -151,8 +151,9 @@ bool render_scene_note(const struct render_summary *scene, size_t i, char *text,
 		snprintf(text, size, "%zu more pairs of shapes coincide", c->total - c->count);
 		return true;
 	}
-	snprintf(text, size,
-		 "more surfaces coincide than were searched for: of the others, it is undefined which one a ray hits");
+	snprintf(
+		text, size,
+		"the search for coinciding surfaces stopped at its limit: where others coincide, it is undefined which one a ray hits");
 	return c->incomplete && i == 0;
 }
 

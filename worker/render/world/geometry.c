@@ -78,7 +78,7 @@ static void note_materials(struct world *w, const struct counted *c)
 	if (c->materials)
 		snprintf(w->notes.materials, sizeof w->notes.materials,
 			 "the files of %u mesh%s without a bsdf (first: %s) name materials, but no .mtl file that "
-			 "has them: diffuse and grey",
+			 "has them; they are rendered in diffuse grey",
 			 c->materials, c->materials == 1 ? "" : "es", node_title(c->first_material, first));
 }
 
@@ -115,7 +115,8 @@ static int take_geometry(struct builder *b, const struct scene_node *n, const st
 	b->triangles += g->mesh.triangle_count + g->curve.chain_points;
 	return b->triangles <= TRIANGLES_MAX
 		       ? 0
-		       : node_error(n, b->e, E2BIG, "the scene has more than %d triangles with it", TRIANGLES_MAX);
+		       : node_error(n, b->e, E2BIG, "with this shape, the scene has more than %d triangles",
+				    TRIANGLES_MAX);
 }
 
 /* Finds the mesh that an instance shares; the first instance that needs it reads it. *out is NULL if the
@@ -236,7 +237,7 @@ static void note_scales(struct builder *b)
 	}
 	if (b->w->shape_count > 0 && box_extent(&b->boxes[small]) < LEAST_SCALE * box_extent(&b->all))
 		snprintf(b->w->notes.scales, sizeof b->w->notes.scales,
-			 "%s is too small for the scene, with %s: double precision does not suffice for both, and its "
+			 "%s is too small for a scene with %s: double precision does not suffice for both, and its "
 			 "image may be wrong",
 			 node_title(b->shape_nodes[small], little), node_title(b->shape_nodes[large], big));
 }

@@ -50,7 +50,7 @@ static int make_motion(struct builder *b, const struct scene_node *n, const stru
 	bool one = fabs(s->shutter_close - s->shutter_open - 1) < 1e-9;
 	return *moves && s->roll != ROLL_NONE && !one
 		       ? node_error(n, b->e, ENOTSUP,
-				    "it moves, and a rolling shutter is only supported where shutter_close is 1 after "
+				    "it moves, and a rolling shutter is only supported if shutter_close is 1 after "
 				    "shutter_open")
 		       : 0;
 }
@@ -99,7 +99,7 @@ int moving_place_sphere(struct builder *b, uint32_t id)
 	if (rc == -ENOMEM)
 		return build_out_of_memory(b->e);
 	if (rc)
-		return node_error(b->shape_nodes[id], b->e, EINVAL, "it is too small somewhere on its way");
+		return node_error(b->shape_nodes[id], b->e, EINVAL, "it becomes too small while it moves");
 	p->first = id;
 	g->place = p;
 	return 0;

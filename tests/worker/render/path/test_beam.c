@@ -175,7 +175,7 @@ static void test_refused(void **state)
 	struct render_arguments a = {.plan = {.spp = 4, .integrator = "path"}};
 	struct error e = {""};
 	assert_int_equal(render_plan_from_scene(&a, &summary, &e), -EINVAL);
-	assert_non_null(strstr(e.text, "the integrator path finds no light of `collimated`"));
+	assert_non_null(strstr(e.text, "the integrator path cannot find the light of `collimated`"));
 	strcpy(a.plan.integrator, "bdpt");
 	assert_int_equal(render_plan_from_scene(&a, &summary, &e), 0);
 	world_free(w);

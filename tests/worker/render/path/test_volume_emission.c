@@ -449,10 +449,11 @@ static void test_refused(void **state)
 {
 	(void)state;
 	world_refused("<emitter type='volumelight'/>", "\"volumelight\" must be inside a shape");
-	world_refused(BALL(SHINES("1")), "\"volumelight\" must be inside a shape that has a medium inside");
-	world_refused(BALL("<medium type='homogeneous' name='exterior'/>" SHINES("1")), "that has a medium inside");
+	world_refused(BALL(SHINES("1")), "\"volumelight\" must be inside a shape with an interior medium");
+	world_refused(BALL("<medium type='homogeneous' name='exterior'/>" SHINES("1")),
+		      "a shape with an interior medium");
 	world_refused(BALL(FOG("1", "0") SHINES("1")) BALL("<ref name='interior' id='fog'/>" SHINES("2")),
-		      "a medium may shine by one \"volumelight\" only");
+		      "a medium may have only one \"volumelight\"");
 	world_refused(BALL(FOG("1", "0") SHINES("-1")), "radiance");
 	world_refused(BALL(FOG("1", "0") "<emitter type='volumelight'><texture name='radiance' type='checkerboard'/>"
 					 "</emitter>"),
@@ -494,7 +495,8 @@ static void test_who_finds_it(void **state)
 		bool hslt = strcmp(name, "hslt") == 0;
 		assert_int_equal(render_plan_from_scene(&a, &summary, &e), hslt ? -EINVAL : 0);
 		if (hslt)
-			assert_non_null(strstr(e.text, "the integrator hslt finds no light of `volumelight`"));
+			assert_non_null(
+				strstr(e.text, "the integrator hslt cannot find the light of media (`volumelight`)"));
 	}
 	world_free(w);
 	worlds_effects = "-medium-light";

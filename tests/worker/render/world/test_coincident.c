@@ -85,8 +85,8 @@ static void test_notes(void **state)
 		       "<scale value='0.3'/><rotate y='1' angle='180'/><translate z='0.5' y='0.5'/>") SHINES
 	       "</shape>\n",
 	       "`back` (test.xml:3) and `lamp` (test.xml:2) coincide: where they overlap, only the latter is present, "
-	       "because it comes first in the file; light to the other side is lost: for a lamp with two sides use two, "
-	       "slightly apart",
+	       "because it comes first in the file; light to the other side is lost: for a lamp with two sides use two "
+	       "surfaces, slightly apart",
 	       NULL, true);
 	expect(VIEW LAMP "<shape type='rectangle' id='twin'>" AT("<scale value='0.3'/><translate z='0.5' y='0.5'/>")
 		       SHINES "</shape>\n",
@@ -117,7 +117,7 @@ static void test_scales(void **state)
 		if (far)
 			assert_string_equal(
 				note,
-				"`block` (test.xml:2) is too small for the scene, with the rectangle in test.xml:3: double precision does "
+				"`block` (test.xml:2) is too small for a scene with the rectangle in test.xml:3: double precision does "
 				"not suffice for both, and its image may be wrong");
 		world_free(w);
 	}

@@ -169,7 +169,7 @@ static void test_surfaces(void **state)
 	expect(VIEW LAMP BALL("1", ""), "displacement", false, "no shape is displaced");
 	expect(VIEW LAMP BALL("1", ""), "bump", false, "bump and normal maps cost nothing where no material has one");
 	expect(VIEW LAMP BALL("1", ""), "alpha", false, "masks are specular lobes");
-	expect(VIEW LAMP BALL("1", ""), "instancing", false, "no mesh stands in several places");
+	expect(VIEW LAMP BALL("1", ""), "instancing", false, "no mesh is used in several places");
 }
 
 static void test_forced(void **state)

@@ -105,7 +105,7 @@ static void test_refused(void **state)
 	refused(VIEW(OPEN("0", "1") ROLL("top", "1.5")) CUBE, "rolling_shutter_duration=1.5 is outside [0, 1]");
 	refused(VIEW(OPEN("0", "1") ROLL("top", "-1")) CUBE, "rolling_shutter_duration=-1 is outside [0, 1]");
 	refused(VIEW(OPEN("0", "0.5") ROLL("top", "0.2")) CUBE,
-		"it moves, and a rolling shutter is only supported where shutter_close is 1 after shutter_open");
+		"it moves, and a rolling shutter is only supported if shutter_close is 1 after shutter_open");
 	refused(VIEW(OPEN("0", "1")) "<shape type='sphere'><animation name='to_world'><transform time='0'/>"
 				     "<transform time='1'><scale x='2'/></transform></animation></shape>",
 		"a sphere that moves may not be stretched in one direction");
