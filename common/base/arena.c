@@ -37,7 +37,7 @@ void *arena_alloc(struct arena *a, size_t count, size_t size)
 			return NULL;
 		b->bytes = aligned((char *)(b + 1));
 		b->size = room;
-		/* A large block is linked second, so that the room left in the first one stays in use. */
+		/* A block for one large request goes second: later small requests still use the room in the first. */
 		if (need > BLOCK && a->blocks) {
 			b->next = a->blocks->next;
 			a->blocks->next = b;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * An arena: memory that is freed all at once, one for each scene description and one for each world. Not thread-safe.
+ * An arena: memory that is freed all at once. Each scene description has one, and each world. Not thread-safe.
  * Memory is zeroed and aligned to 64 bytes.
  */
 #ifndef COMMON_BASE_ARENA_H
@@ -12,11 +12,14 @@ struct arena_block;
 struct arena {
 	struct arena_block *blocks;
 	size_t used;  /* bytes handed out */
-	size_t limit; /* 0: unlimited; otherwise arena_alloc returns NULL beyond it */
+	size_t limit; /* bytes that may be handed out at most; 0: unlimited */
 };
 
-void *arena_alloc(struct arena *a, size_t count, size_t size); /* NULL: out of memory, or the limit is reached */
+/* Returns room for `count` items of `size` bytes; NULL if memory is out or the limit is reached. */
+void *arena_alloc(struct arena *a, size_t count, size_t size);
+/* Returns a copy of s; NULL as for arena_alloc. */
 char *arena_strdup(struct arena *a, const char *s);
+/* Frees all blocks; the arena is then empty and has no limit. */
 void arena_fini(struct arena *a);
 
 #endif

@@ -14,9 +14,12 @@ struct buf {
 	size_t limit; /* the buffer never holds more */
 };
 
-/* Makes room for `count` more bytes. false: the limit is reached or memory is out; the buffer is unchanged. */
+/* Makes room for `count` more bytes. Returns false if they would exceed the limit or memory is out; the buffer is then
+ * unchanged. */
 bool buf_reserve(struct buf *b, size_t count);
+/* Appends `count` bytes; false as for buf_reserve. */
 bool buf_append(struct buf *b, const void *bytes, size_t count);
-void buf_fini(struct buf *b); /* keeps the limit */
+/* Frees the bytes. The buffer is empty then, keeps its limit and can be used again. */
+void buf_fini(struct buf *b);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Little-endian numbers in files, messages and chain states, on any machine. Floating point numbers are IEEE 754, by
- * their bits. */
+/* Numbers in files, messages and chain states: little endian on any machine, floating point numbers as the bits of
+ * their IEEE 754 representation. */
 #ifndef COMMON_BASE_BYTES_H
 #define COMMON_BASE_BYTES_H
 
@@ -88,7 +88,7 @@ static inline bool is_little_endian(void)
 	return first == 1;
 }
 
-/* Each number with its bytes in the opposite order; to and from may be the same. */
+/* Copies `count` numbers of `width` bytes, each with its bytes in reverse order; to and from may be the same. */
 static inline void reverse_numbers(uint8_t *to, const uint8_t *from, size_t width, size_t count)
 {
 	for (; count; count--, to += width, from += width)
@@ -99,7 +99,8 @@ static inline void reverse_numbers(uint8_t *to, const uint8_t *from, size_t widt
 		}
 }
 
-/* From memory to little-endian bytes, or back; to and from are the same, or do not overlap. */
+/* Converts `count` numbers of `width` bytes from the machine's byte order to little endian, or back. `to` and `from`
+ * are either the same or do not overlap. */
 static inline void copy_numbers(void *to, const void *from, size_t width, size_t count)
 {
 	if (!is_little_endian())

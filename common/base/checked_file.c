@@ -40,7 +40,7 @@ static int flush(struct checked_file *s, struct error *e)
 	return rc ? set_file_error(s, -rc, e) : 0;
 }
 
-/* A number does not lie across two buffers. */
+/* Flushes the buffer when the next number would not fit, so that no number is split between two buffers. */
 int checked_file_write_numbers(struct checked_file *s, const void *numbers, size_t width, size_t count, struct error *e)
 {
 	for (const unsigned char *p = numbers; count;) {
@@ -81,7 +81,7 @@ int checked_file_finish(struct checked_file *s, struct error *e)
 	return rc;
 }
 
-/* Refills the buffer; at the end of the file it stays empty. */
+/* Reads the next bytes of the file into the buffer, which stays empty at the end of the file. */
 static int refill_buffer(struct checked_file *s, struct error *e)
 {
 	ssize_t n;
@@ -113,6 +113,7 @@ static int read_bytes(struct checked_file *s, void *bytes, size_t size, struct e
 	return 0;
 }
 
+/* Reads the whole file and compares the CRC at its end. Sets the number of bytes before the CRC. */
 static int check(struct checked_file *s, struct error *e)
 {
 	struct stat st;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Clocks, in seconds. All but the wall clock start at an unspecified time: only differences mean something. Any thread.
- */
+/* Clocks, in seconds. All but the wall clock start at an unspecified time, so only differences of their values have a
+ * meaning. Any thread. */
 #ifndef COMMON_BASE_CLOCK_H
 #define COMMON_BASE_CLOCK_H
 
@@ -13,7 +13,7 @@ static inline double clock_seconds_of(clockid_t clock)
 	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* Since 1970. */
+/* Seconds since 1970-01-01 UTC. */
 static inline double clock_wall_seconds(void)
 {
 	return clock_seconds_of(CLOCK_REALTIME);

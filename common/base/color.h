@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Linear Rec. 709 (IEC 61966-2-1 primaries, D65) from CIE XYZ, where values outside the gamut stay negative, the
- * inverse, and luminance. Pure. */
+/* Converts CIE XYZ to linear Rec. 709 (IEC 61966-2-1 primaries, D65) and back, and computes luminance. Colours outside
+ * the gamut keep their negative values. Pure. */
 #ifndef COMMON_BASE_COLOR_H
 #define COMMON_BASE_COLOR_H
 

@@ -84,13 +84,13 @@ void crash_thread(void)
 {
 	sigset_t all;
 	stack_t now;
-	/* Sanitizers install a stack of their own in each thread and remove it at the end; that one is used. */
+	/* Sanitizers install an alternate stack in each thread and remove it when the thread ends: keep theirs. */
 	if (sigaltstack(NULL, &now) || (now.ss_flags & SS_DISABLE))
 		sigaltstack(&(stack_t){.ss_sp = stack, .ss_size = sizeof stack}, NULL);
 	sigemptyset(&all);
 	for (int i = 0; i < SIGNALS; i++)
 		sigaddset(&all, signals[i].number);
-	pthread_sigmask(SIG_UNBLOCK, &all, NULL); /* while blocked, they end a program without a message */
+	pthread_sigmask(SIG_UNBLOCK, &all, NULL); /* a blocked signal would end the program without a message */
 }
 
 void crash_catch(void (*last_words)(int number, const char *text))

@@ -1,29 +1,31 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The last message of a program that a signal ends (SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT: our fault or a library's,
- * or an assertion): which signal it was and what the thread was doing. The handler neither allocates nor locks.
+ * The last message of a program that SIGSEGV, SIGBUS, SIGFPE, SIGILL or SIGABRT ends (a fault of the program or of a
+ * library, or a failed assertion): which signal it was and what the thread was doing. The handler neither allocates nor
+ * locks.
  */
 #ifndef COMMON_BASE_CRASH_H
 #define COMMON_BASE_CRASH_H
 
 enum { CRASH_TEXT = 256 };
 
-/* Sets what the calling thread is doing, and for which line of which file (NULL: none). The texts are not copied and
- * must stay valid until the next call. doing NULL: nothing. */
+/* Records what the calling thread is doing ("building the scene"; NULL: nothing worth reporting), and for which line of
+ * which file (NULL: none). The texts are not copied and must stay valid until the next call. */
 void crash_place(const char *doing, const char *file, int line);
 
-/* "SIGSEGV"; of signals that are not listed above SIGKILL is "SIGKILL", others are "a signal". */
+/* Returns the name of one of the signals listed above or of SIGKILL, such as "SIGSEGV"; "a signal" for any other. */
 const char *crash_signal_name(int number);
 
 /* last_words is called on the thread that received the signal, with a text such as "SIGABRT while building the
  * scene: scene.xml:12". When it returns, the signal takes its default action. Call once, before threads are started. */
 void crash_catch(void (*last_words)(int number, const char *text));
 
-/* For each further thread: also handles a signal caused by a stack overflow. */
+/* Call at the start of each further thread: gives the thread a stack of its own for the handler, so that stack
+ * overflows are reported, and unblocks the signals. crash_catch does this for the calling thread. */
 void crash_thread(void);
 
-/* The same for a command-line program: prints its name, the text, and "it is a fault of the program or of a library"
- * on stderr, then exits with 1. */
+/* Like crash_catch, for a command-line program: prints its name, the text, and that this is a fault of the program or
+ * of a library on stderr, then exits with 1. */
 void crash_exit(const char *program);
 
 #endif

@@ -91,14 +91,14 @@ int disk_write_all(int fd, const void *bytes, size_t size)
 	return 0;
 }
 
-/* Creates a new file and never writes into an existing one, which may be a link to somebody else's file, or open in
- * another process with fewer restrictions: that one is unlinked first. */
+/* Creates a new file. An existing file of that name is unlinked first, never written to: it may be a link to a file of
+ * another user, or another process may have it open with wider permissions. */
 static int open_new(const char *path, mode_t mode)
 {
 	int fd = disk_open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
 	if (fd < 0 && errno == EEXIST && disk_unlink(path) == 0)
 		fd = disk_open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
-	if (fd >= 0 && (mode & 077) && fchmod(fd, mode)) { /* the umask may have left others out */
+	if (fd >= 0 && (mode & 077) && fchmod(fd, mode)) { /* the umask may have removed permissions */
 		int code = errno;
 		disk_close(fd);
 		disk_unlink(path);
@@ -141,8 +141,7 @@ int disk_sync_folder(const char *path, struct error *e)
 int disk_make_folder(const char *path, struct error *e)
 {
 	char parent[4096];
-	bool there =
-		disk_mkdir(path, 0700) != 0; /* perhaps by a start that was interrupted: its name is flushed again */
+	bool there = disk_mkdir(path, 0700) != 0; /* flushed again: an interrupted start may have left it not durable */
 	if (there && errno != EEXIST)
 		return error_file(e, errno, path);
 	int n = snprintf(parent, sizeof parent, "%s", path);
@@ -156,7 +155,7 @@ int disk_make_folder(const char *path, struct error *e)
 	else if (slash)
 		*slash = 0;
 	int rc = disk_sync_folder(slash ? parent : ".", e);
-	return there && rc == -EACCES ? 0 : rc; /* exists, but we may not look inside */
+	return there && rc == -EACCES ? 0 : rc; /* the folder exists; its parent cannot be opened to be flushed */
 }
 
 void disk_list_begin(struct disk_list *l, const char *path)

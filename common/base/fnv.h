@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* FNV-1a of 64 bits (Fowler, Noll and Vo): a hash of bytes that nobody chooses to collide. Pure. */
+/* The 64-bit hash FNV-1a (Fowler, Noll and Vo), for input that no adversary chooses. Pure. */
 #ifndef COMMON_BASE_FNV_H
 #define COMMON_BASE_FNV_H
 
@@ -8,7 +8,7 @@
 
 #define FNV_BEGIN 0xcbf29ce484222325u
 
-/* On from the hash of what was before. */
+/* Continues `hash`, the hash of the preceding bytes or FNV_BEGIN, with `size` more bytes. */
 static inline uint64_t fnv_add(uint64_t hash, const void *bytes, size_t size)
 {
 	const unsigned char *p = bytes;

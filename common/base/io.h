@@ -1,14 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Reads and writes all of it, whatever signals come. Not of files that must survive: disk.h. Any thread. */
+/* Reads and writes that continue after signals and partial transfers. Files that must survive a crash use disk.h
+ * instead. Any thread. */
 #ifndef COMMON_BASE_IO_H
 #define COMMON_BASE_IO_H
 
 #include <stddef.h>
 #include <sys/types.h>
 
-/* 0; -errno, which is left in errno, too: only a part was written. */
+/* Returns 0, or -errno if not all bytes could be written; errno is set, too. */
 int io_write_all(int fd, const void *bytes, size_t size);
-/* The number of bytes; fewer than `size`: the file ends there. -errno */
+/* Returns the number of bytes read, fewer than `size` only at the end of the file, or -errno. */
 ssize_t io_read_all(int fd, void *bytes, size_t size);
 
 #endif

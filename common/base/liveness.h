@@ -2,7 +2,7 @@
 /*
  * Lets a watchdog see that a thread makes progress: tick() increments the thread's counter, and a counter that stands
  * still means that the thread hangs. Code that may run for long calls tick() more than once a second. In threads
- * without a watchdog it costs one load.
+ * without a watchdog, tick() costs one load.
  */
 #ifndef COMMON_BASE_LIVENESS_H
 #define COMMON_BASE_LIVENESS_H
@@ -11,7 +11,7 @@
 
 extern _Thread_local atomic_ullong *tick_counter; /* NULL: this thread is not watched */
 
-/* One thread counts, others read. */
+/* Increments the counter (NULL: does nothing). Only one thread may increment it; any thread may read it. */
 static inline void tick_on(atomic_ullong *counter)
 {
 	if (counter)

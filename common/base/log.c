@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Lines are formatted in memory and written at once. Whoever reads stderr may stop: a terminal after Ctrl-S or at the
- * end of a connection that hangs, a pipe to a program that was stopped. A line waits for that for a moment; once a wait
- * was in vain, lines are dropped and counted until stderr takes one again. Errors of writing are ignored.
+ * Each line is formatted in memory and written by a single call. The reader of stderr may stop reading: a terminal
+ * after Ctrl-S or behind a hanging connection, or a pipe to a stopped program. A daemon must not hang with it: a line
+ * waits for at most 100 ms, and once a wait has been in vain, lines are dropped and counted until stderr accepts one
+ * again. The number of dropped lines is logged then. Errors of write are ignored.
  */
 #include "common/base/log.h"
 
@@ -23,7 +24,7 @@
 
 enum {
 	LINE_MAX_BYTES = 2048,
-	PATIENCE_MS = 100, /* for a reader of stderr that is slow */
+	PATIENCE_MS = 100, /* the longest wait for a slow reader of stderr */
 };
 
 static const struct {
@@ -35,7 +36,7 @@ static const struct {
 #undef LOG_ROW
 };
 
-/* Events that anyone who reaches the port can cause, or a worker by a message. */
+/* Rate-limited events: anyone who can connect to the port, or a worker by its messages, can cause them. */
 static const enum log_event limited[] = {LOG_PEER_ACCEPT,  LOG_PEER_HELLO,     LOG_PEER_REFUSED,
 					 LOG_PEER_CLOSED,  LOG_PEER_FAULT,     LOG_PEER_GARBLED,
 					 LOG_LEASE_FAILED, LOG_BATCH_REPEATED, LOG_BATCH_REFUSED};
@@ -106,10 +107,11 @@ static bool may_say(enum log_event event)
 static pthread_mutex_t output_lock = PTHREAD_MUTEX_INITIALIZER;
 static int output = -1;
 static bool stuck;	 /* the last line was dropped */
-static uint64_t dropped; /* lines, since the last that was written */
+static uint64_t dropped; /* lines dropped since the last line that was written */
 
-/* Pipes and terminals are opened again, so that writing never blocks here and still does for the other programs that
- * have them. What cannot be opened (a socket) blocks only if poll is wrong about it. */
+/* Pipes and terminals are opened a second time, because O_NONBLOCK on the inherited descriptor would also apply to the
+ * other programs that share it. A file that cannot be reopened (a socket) is used as it is; write then blocks only if
+ * poll was wrong. */
 static int open_output(void)
 {
 	struct stat st;
@@ -119,7 +121,7 @@ static int open_output(void)
 	return fd >= 0 ? fd : STDERR_FILENO;
 }
 
-/* false: dropped. *before: lines that were dropped before this one was written. */
+/* Writes one line. Returns false if it was dropped; otherwise *before is the number of lines dropped just before. */
 static bool write_out(const char *line, size_t size, uint64_t *before)
 {
 	pthread_mutex_lock(&output_lock);
@@ -158,7 +160,7 @@ static void write_line(const char *line, size_t size)
 		return;
 	size_t n = print_dropped(more, sizeof more, before);
 	if (!write_out(more, n, &none))
-		put_back(before - 1); /* this line was counted, and is not one that anybody misses */
+		put_back(before - 1); /* write_out has counted the report itself as a dropped line */
 }
 
 void log_tick(void)

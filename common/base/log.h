@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Log lines of the daemons: one logfmt line per event on stderr, "time=... level=... event=... key=value ...". All
- * events are in the table below, so every line can be searched for by name. Any thread (one write per line). If stderr
- * takes no more, lines are dropped, and their number is logged later. Libraries do not log.
+ * events are in the table below, so every line can be found by the event's name. Any thread (one write per line). If
+ * stderr cannot take a line, the line is dropped, and the number of dropped lines is logged later. Libraries do not
+ * log.
  */
 #ifndef COMMON_BASE_LOG_H
 #define COMMON_BASE_LOG_H
@@ -69,29 +70,31 @@ enum log_event {
 
 enum log_level { LOG_LEVEL_DEBUG, LOG_LEVEL_INFO, LOG_LEVEL_WARN, LOG_LEVEL_ERROR };
 
-void log_set_level(enum log_level least); /* default: INFO */
+/* Suppresses events below this level. The default is INFO. */
+void log_set_level(enum log_level least);
 
-/* fields: "job=j%llu name=%s"; text from outside must go through log_quote. A line has at most 2,047 bytes.
- * false: it was left out, for too many of its kind come. */
+/* Writes one line. `fields` is a format such as "job=j%llu name=%s"; text from outside must go through log_quote. A
+ * line has at most 2,047 bytes. Returns false if the rate limit of its kind suppressed it (see log_tick). */
 __attribute__((format(printf, 2, 3))) bool log_event(enum log_event event, const char *fields, ...);
 
 enum { LOG_VALUE_MAX = 512 };
 struct log_value {
 	char text[LOG_VALUE_MAX];
 };
-/* "text" in quotes, without control characters, cut to fit. */
+/* Returns the text in double quotes, escaped, without control characters, cut to fit. */
 struct log_value log_quote(const char *text);
-/* For %llu, whatever type uint64_t is. */
+/* Converts for %llu, whatever type uint64_t is. */
 static inline unsigned long long log_u64(uint64_t n)
 {
 	return n;
 }
 
-/* Lines about connections are rate-limited by kind: 100 at once and 5 a second, the others are counted (log_limit.h;
- * with LOG_LEVEL_DEBUG all are written). Call this now and then: it logs how many of which kind were left out. */
+/* Events that a peer can cause are rate-limited, each kind on its own: a burst of 100 lines, then 5 a second; the rest
+ * are only counted (log_limit.h). With LOG_LEVEL_DEBUG all are written. Call log_tick regularly: it logs how
+ * many lines of each kind were suppressed. */
 void log_tick(void);
 
-/* The line as log_event writes it, without the newline, for the logs of jobs. Returns its length. */
+/* Formats the line that log_event would write, without the newline, for the logs of jobs. Returns its length. */
 size_t log_format(char *line, size_t size, enum log_event event, const char *fields);
 
 #endif

@@ -2,11 +2,11 @@
 /*
  * Parses a command line by a program's tables.
  *
- * Happy path: defaults and environment variables are stored by the same function as arguments (put). Then argv is
- * scanned once: each option is looked up among all rows (find), its argument is checked by its kind and stored in the
- * struct that its table fills. Checks that involve several options come last.
+ * Happy path: defaults and environment variables are stored by the same function as arguments (store_argument). Then
+ * argv is scanned once (read_all): each option is looked up among all rows (find), its argument is checked by its kind
+ * and stored in the struct that its table fills. Checks that involve several options come last (check).
  *
- * Failures: one sentence in struct error and -EINVAL. An unknown name is answered with the nearest one.
+ * Failures: one sentence in struct error and -EINVAL. For an unknown name, the sentence suggests the nearest known one.
  */
 #include "common/base/option.h"
 
@@ -33,7 +33,8 @@ static const struct option_group general_groups[] = {{NULL, general_rows}, {0}};
 
 /* ---- the rows of a program, one after the other ---- */
 
-/* The i-th row of t. If i is beyond its end, it becomes the index into what follows t. */
+/* Returns the *i-th row of these groups and its group. If there are fewer rows, returns NULL and reduces *i by their
+ * number: it is then the index into the next table. */
 static const struct option_row *row_of(const struct option_group *groups, size_t *i, const struct option_group **group)
 {
 	for (const struct option_group *g = groups; g && g->rows; g++)
@@ -60,7 +61,8 @@ const struct option_row *option_at(const struct program *p, size_t i, const stru
 
 /* ---- arguments ---- */
 
-/* what: "a number"; more: what else may be given, after the range: "of at least 0 and below 1", "from 1 to 1024". */
+/* Sets the error "--NAME takes WHAT RANGE MORE, not 'ARG'", where RANGE is such as "of at least 0 and below 1" or "from
+ * 1 to 1024". */
 static int out_of_range(const struct option_row *r, const char *what, const char *more, const char *arg,
 			struct error *e)
 {
@@ -171,7 +173,7 @@ static int take_ratio(const struct option_row *r, void *field, const char *arg, 
 	return 0;
 }
 
-/* "; did you mean `fetch`?", or a list of all */
+/* Returns 0 if arg is among the values. Otherwise the error suggests the nearest value or lists them all. */
 static int check_value(const char *noun, option_values *values, const char *arg, struct error *e)
 {
 	char hint[128], list[512] = "";
@@ -242,11 +244,11 @@ int option_defaults(const struct option_table *t, void *target, struct error *e)
 
 struct reader {
 	const struct program *program;
-	int argc, at; /* argv[at] is the next to read */
+	int argc, at; /* argv[at] is being read */
 	char **argv;
 	void *target;
-	size_t words;
-	enum option_kind asked;
+	size_t words;		/* words read that are not options */
+	enum option_kind asked; /* as for options_parse */
 	struct error *e;
 };
 
@@ -272,7 +274,7 @@ static int refuse_unknown(const struct reader *x, const char *dashes, const char
 			 s.best ? s.best : "", s.best ? "'?" : "");
 }
 
-/* The row of a name or of an unambiguous prefix; NULL: an error. */
+/* Returns the row of a name or of an unambiguous prefix; NULL, with the error set, if there is none. */
 static const struct option_row *find(const struct reader *x, const char *name)
 {
 	const struct option_row *r, *found = NULL;

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The options of a program as rows of a table. The command line is parsed by it (options_parse), and --help, the manual
- * page and shell completion are printed from it (option_print.h). One thread.
+ * The options of a program as rows of a table. options_parse reads the command line by this table; --help, the manual
+ * page and the shell completion are printed from it (option_print.h). One thread.
  *
  * As with getopt_long, options and other words may be mixed, names may be abbreviated as long as they are unambiguous,
  * arguments are written `--name=ARG`, `--name ARG`, `-n ARG` or `-nARG`, one-letter flags may be joined, and nothing
- * after `--` is an option. A word such as -5 is not an option.
+ * after `--` is an option. A word such as -5 is not an option, unless the program has a one-letter option `5`.
  */
 #ifndef COMMON_BASE_OPTION_H
 #define COMMON_BASE_OPTION_H
@@ -16,19 +16,19 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* The kind of an option's argument; the last ones are the options that every program has. */
+/* The kind of an option's argument. From OPTION_IS_HELP on: the options that every program has. */
 enum option_kind {
-	OPTION_IS_END,	  /* no row: the table ends */
-	OPTION_IS_FLAG,	  /* takes none */
-	OPTION_IS_TEXT,	  /* borrowed from argv */
-	OPTION_IS_OUTPUT, /* likewise, but "-" is /dev/stdout */
-	OPTION_IS_NAME,	  /* a text to be displayed: up to `most` bytes without control characters */
-	OPTION_IS_NUMBER, /* from least to most */
+	OPTION_IS_END,	  /* no option: marks the end of a table */
+	OPTION_IS_FLAG,	  /* no argument */
+	OPTION_IS_TEXT,	  /* any text; points into argv */
+	OPTION_IS_OUTPUT, /* the path of an output file, like a text, but "-" becomes /dev/stdout */
+	OPTION_IS_NAME,	  /* a text to be displayed: 1 to `most` bytes of UTF-8 without control characters */
+	OPTION_IS_NUMBER, /* a floating point number from least to most */
 	OPTION_IS_COUNT,  /* a whole number: 4000, 1.5k */
 	OPTION_IS_SIZE,	  /* a number of `unit` bytes, or 500k, 64M, 20G, 2T; stored in bytes */
 	OPTION_IS_TIME,	  /* a number of `unit` seconds, or 90s, 5m, 2h, 3d; stored in seconds */
-	OPTION_IS_RATIO,  /* 0.05, 5%; above 1 as percent only */
-	OPTION_IS_OTHER,  /* converted by `take` */
+	OPTION_IS_RATIO,  /* 0.05 or 5%, at most 1 */
+	OPTION_IS_OTHER,  /* converted by the row's function `take` */
 	OPTION_IS_HELP,
 	OPTION_IS_USAGE,
 	OPTION_IS_VERSION,
@@ -38,27 +38,27 @@ enum option_kind {
 
 enum option_store { OPTION_BOOL, OPTION_STRING, OPTION_DOUBLE, OPTION_UINT64, OPTION_UINT32, OPTION_INT };
 
-/* The i-th accepted name, NULL after the last. */
+/* Returns the i-th accepted name; NULL after the last. */
 typedef const char *option_values(size_t i);
 
-/* A `most` of DBL_MAX means no upper bound. The argument's name has a meaning: FILE and PATH are completed by files,
- * DIR and FOLDER by folders; the argument of +N may begin with a plus sign. */
+/* One option. The name of the argument has a meaning: FILE and PATH are completed by files, DIR and FOLDER by folders;
+ * an argument named +N must begin with a plus sign. */
 struct option_row {
-	const char *name; /* without its dashes */
-	char key;	  /* one letter; 0: none */
-	const char *arg;  /* its argument's name; NULL: it takes none */
-	const char *help; /* without full stop and default */
+	const char *name; /* without the dashes */
+	char key;	  /* the one-letter form; 0: none */
+	const char *arg;  /* name of the argument; NULL: the option takes none */
+	const char *help; /* without a full stop at the end, and without the default */
 	enum option_kind kind;
 	enum option_store store;
-	size_t offset;		  /* offset in the struct that the table fills */
-	double least, most, unit; /* the bounds are in units, for numbers 1 */
-	bool above, below;	  /* the bound itself is not allowed */
-	bool needed;		  /* a text: leaving it NULL is a usage error */
-	const char *standard;	  /* the default, parsed like an argument; NULL: keep what the struct holds */
+	size_t offset;		  /* of the field in the struct that the table fills */
+	double least, most, unit; /* the bounds, in units (1 for numbers); most = DBL_MAX: no upper bound */
+	bool above, below;	  /* `least` or `most` itself is not allowed */
+	bool needed;		  /* for a text: a NULL after parsing is a usage error */
+	const char *standard;	  /* the default, parsed like an argument; NULL: the field is left as it is */
 	const char *environment;  /* environment variable used if the option is not given; NULL: none */
 	option_values *values;	  /* the only accepted arguments; NULL: any */
-	int (*take)(void *target, char *arg, struct error *e); /* arg: from argv, may be changed; NULL without `arg` */
-	void (*more)(char *text, size_t size); /* what the help text adds as the default; NULL: nothing */
+	int (*take)(void *target, char *arg, struct error *e); /* arg may be changed; may be NULL */
+	void (*more)(char *text, size_t size); /* appends a default known only at run time to the help; NULL: none */
 };
 
 #define OPTION_STORE(type, field) \
@@ -69,7 +69,7 @@ struct option_row {
 							   : OPTION_UINT64, uint32_t                                   \
 							   : OPTION_UINT32, int                                        \
 							   : OPTION_INT)
-/* The last part of a row: its kind, and the field that it fills. */
+/* The last part of a row: the kind of the argument, and the field that it fills. */
 #define OPTION_FLAG(type, field) .kind = OPTION_IS_FLAG, OPTION_STORE(type, field)
 #define OPTION_TEXT(type, field) .kind = OPTION_IS_TEXT, OPTION_STORE(type, field)
 #define OPTION_OUTPUT(type, field) .kind = OPTION_IS_OUTPUT, OPTION_STORE(type, field)
@@ -94,36 +94,36 @@ struct option_group {
 
 /* Options that fill one struct. */
 struct option_table {
-	const struct option_group *groups; /* ends with an empty row */
-	int (*check)(void *target,
-		     struct error *e); /* checks their combination, after the last word; NULL: nothing to check */
+	const struct option_group *groups;	     /* ends with an empty row */
+	int (*check)(void *target, struct error *e); /* checks combinations, after parsing; NULL: nothing to check */
 };
 
-/* Paragraphs are filled; in texts of several lines, each line is filled, except in examples. */
+/* A program as its help describes it. Each line of a text is wrapped on its own, except in the examples. */
 struct program {
 	const char *name;
-	const char *words;    /* what follows the options, one line per form of the command; NULL: nothing */
+	const char *words;    /* the words after the options, one line per form of the command; NULL: nothing */
 	const char *summary;  /* one sentence */
 	const char *examples; /* one per line */
 	const char *details;  /* further text */
 	const char *exits;    /* "0 done, 1 failed, 2 usage" */
 	struct option_table own;
-	const struct option_table *shared; /* by several programs: fills the struct's first member; NULL: none */
+	const struct option_table *shared; /* options of several programs: fill the struct's first member; NULL: none */
 	option_values *verbs;		   /* accepted first words; NULL: any */
-	/* Takes the index-th word that is not an option; NULL: there must be none. */
+	/* Called with the index-th word that is not an option; NULL: such words are errors. */
 	int (*word)(void *target, size_t index, char *word, struct error *e);
 };
 
 /* Stores the defaults of a table; does not read the environment. */
 int option_defaults(const struct option_table *t, void *target, struct error *e);
 
-/* Defaults, environment, command line, then the checks. -EINVAL, with a sentence for the user: a usage error. *asked
- * is one of the last kinds if such an option was given, and then nothing after it was parsed; otherwise
- * OPTION_IS_END. */
+/* Stores the defaults, then reads the environment and the command line, then runs the checks. Returns -EINVAL with a
+ * sentence for the user after a usage error. If an option that every program has was given, *asked is its kind and the
+ * words after it have not been parsed; otherwise *asked is OPTION_IS_END. */
 int options_parse(const struct program *p, int argc, char **argv, void *target, enum option_kind *asked,
 		  struct error *e);
 
-/* All rows of a program, those that every program has at the end; NULL after the last. group may be NULL. */
+/* Returns the i-th row of a program, NULL after the last: its own rows, the shared ones, then those that every program
+ * has. *group is the group of the row; group may be NULL. */
 const struct option_row *option_at(const struct program *p, size_t i, const struct option_group **group);
 
 #endif

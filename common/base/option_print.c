@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Help and manual page have the same sentences in two layouts: describe() builds the text of a row from its help,
- * values, default and environment variable. The completion knows the names, and the possible arguments by their values
- * or the argument's name.
+ * Prints what option_print.h lists. The help and the manual page have the same sentences in two layouts: describe()
+ * builds the text of an option from its help, values, default and environment variable. The completion script offers
+ * the names of options and, as arguments, an option's values, or files or folders if the argument's name says so.
  *
- * Nothing here fails: text of a row beyond 4,096 bytes is cut off, without memory there is no usage, and output that
- * is lost on stdout is reported when the program ends (program.c).
+ * Nothing here returns an error: a description is cut after 4,096 bytes, --usage prints nothing if memory is out, and
+ * output lost on stdout is reported when the program ends (program.c).
  */
 #include "common/base/option_print.h"
 
@@ -17,7 +17,7 @@
 
 enum { MARGIN = 79, HELP_COLUMN = 29, DESCRIPTION = 4096 };
 
-/* "path, bdpt or hslt" */
+/* Appends the values as "path, bdpt or hslt". */
 static void put_values(struct text *t, option_values *values)
 {
 	const char *name;
@@ -43,7 +43,8 @@ static void describe(const struct option_row *r, char *text, size_t size)
 
 /* ---- help ---- */
 
-/* The words of a line of n bytes, starting at a column; continuation lines start at `indent`. */
+/* Prints the words of a line of n bytes, wrapped at MARGIN. The output is at `column`; further lines are indented to
+ * column `indent`. */
 static void print_filled(FILE *out, const char *line, size_t n, size_t column, size_t indent)
 {
 	const char *end = line + n;
@@ -78,7 +79,7 @@ static void fill_lines(FILE *out, const char *text)
 	}
 }
 
-/* Each line of `text`, prefixed by `before`. */
+/* Prints each line of `text` after the prefix `before`, without wrapping. */
 static void print_lines(FILE *out, const char *before, const char *text)
 {
 	while (*text) {
@@ -157,7 +158,8 @@ static void print_usage(FILE *out, const struct program *p)
 
 /* ---- manual page ---- */
 
-/* Text for roff: requests and escapes are disabled, and no character is typeset as another one. */
+/* Prints text escaped for roff: nothing in it is a request or an escape, and dashes, quotes and the like stay what they
+ * are. */
 static void roff(FILE *out, const char *text, size_t n)
 {
 	static const char special[] = "\\-'`^~";
@@ -301,7 +303,7 @@ static void print_case(FILE *out, const struct option_row *r)
 	fputs(" -- \"$word\") ;;\n", out);
 }
 
-/* bash splits words at '=': `--size=3` arrives as three words. */
+/* The script accounts for bash splitting words at '=': it receives `--size=3` as three words. */
 static void print_completion(FILE *out, const struct program *p)
 {
 	char function[64];

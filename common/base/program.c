@@ -24,17 +24,19 @@ static void check_output(int code, void *user)
 	_exit(code ? code : 1);
 }
 
-/* A program may be started with some of these closed. The files that it opens would then get their numbers, and its
- * messages would be written into them. What was closed still fails: it is opened for the other direction. */
+/* A program may be started with standard descriptors closed. Files that it opens would then get these numbers, and its
+ * messages would be written into those files. Closed descriptors are opened here on /dev/null in the wrong direction,
+ * so that using them still fails. */
 static void open_standard(void)
 {
 	for (int fd = STDIN_FILENO; fd <= STDERR_FILENO; fd++)
 		if (fcntl(fd, F_GETFD) < 0 && open("/dev/null", fd == STDIN_FILENO ? O_WRONLY : O_RDONLY) != fd)
-			exit(1); /* nobody can be told why */
+			exit(1); /* there is nowhere to report this */
 }
 
-/* A write beyond the limit of a file's size (ulimit -f, LimitFSIZE, queues of clusters) would end the program without a
- * word, and a coordinator again after each restart. It fails with EFBIG instead, as on any disk that refuses. */
+/* By default, a write beyond the limit of a file's size (ulimit -f, LimitFSIZE, batch systems) would end the program
+ * without a message, and a coordinator again after each restart. With the signal ignored, the write fails with EFBIG,
+ * which is handled like any other error of the disk. */
 static void survive_file_limit(void)
 {
 	signal(SIGXFSZ, SIG_IGN);

@@ -5,13 +5,14 @@
 
 #include "common/base/option.h"
 
-/* options_parse for main: an error exits with 2, --help and the like with 0. Before that, standard descriptors that are
- * closed are opened, so that no file gets their numbers, and SIGXFSZ is ignored: a write beyond the limit of a file's
- * size is an error of that write. If the program exits with 0 (other than by _exit) and stdout could not take
- * everything (a full disk), it prints an error and the exit code becomes 1. */
+/* Calls options_parse for main. A usage error exits with 2; --help and the like print and exit with 0. Before that:
+ * - standard descriptors that are closed are opened, so that no file of the program gets their numbers;
+ * - SIGXFSZ is ignored, so that a write beyond the limit of a file's size fails with EFBIG.
+ * When the program exits (other than by _exit) and part of its output on stdout was lost, such as on a full disk, an
+ * error is printed and exit code 0 becomes 1. */
 void program_options(const struct program *p, int argc, char **argv, void *target);
 
-/* For the row of --verbose. */
+/* option_row.take of --verbose: shows debug events in the log. */
 int program_take_verbose(void *target, char *arg, struct error *e);
 
 #endif

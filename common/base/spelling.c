@@ -10,7 +10,8 @@ static char lower(char c)
 	return c >= 'A' && c <= 'Z' ? (char)(c - 'A' + 'a') : c;
 }
 
-/* Insertions, deletions, replacements and transpositions (optimal string alignment). */
+/* Returns the number of insertions, deletions, replacements and transpositions of neighbours that turn a into b
+ * (optimal string alignment), ignoring case. */
 static size_t edit_distance(const char *a, size_t n, const char *b, size_t m)
 {
 	size_t row[3][SPELLING_MOST + 1];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Finds what a mistyped name may have meant. Pure; any thread. */
+/* Finds the known name that a mistyped name was probably meant to be. Pure; any thread. */
 #ifndef COMMON_BASE_SPELLING_H
 #define COMMON_BASE_SPELLING_H
 
@@ -7,19 +7,20 @@
 
 enum { SPELLING_MOST = 48 }; /* longer names are not compared */
 
-/* Keeps the nearest of the offered names, if it is near enough to be a typing error. Not to be copied. */
+/* Keeps the nearest of the candidates that are near enough to `wanted` for a typing error. Set `wanted`, zero the rest.
+ * Must not be copied, because `best` points into it. */
 struct spelling {
 	const char *wanted;
-	const char *best; /* NULL: none is near enough; otherwise `copy`, so that an offered name need not last */
-	size_t distance;
-	char copy[SPELLING_MOST + 1];
+	const char *best;	      /* the nearest candidate, in `copy`; NULL: none is near enough */
+	size_t distance;	      /* its edit distance */
+	char copy[SPELLING_MOST + 1]; /* so that candidates need not outlive spelling_offer */
 };
 void spelling_offer(struct spelling *s, const char *candidate);
 
-/* "; did you mean `x`?" or "" */
+/* Prints "; did you mean `x`?", or "" if no candidate was near enough. Returns text. */
 const char *spelling_hint(const struct spelling *s, char *text, size_t size);
 
-/* Appends `name` to a comma-separated list, which ends with "..." if it is full. */
+/* Appends `name` to a comma-separated list in text, or "..." if the list is full. */
 void spelling_list(char *text, size_t size, const char *name);
 
 #endif

@@ -26,8 +26,8 @@ const char *target_shown(const char *path)
 	return strcmp(path, TARGET_STDOUT) == 0 ? "stdout" : path;
 }
 
-/* The descriptor behind /dev/fd/3, /dev/stdout and the like; reopening such a file would write from its beginning.
- * Negative: none. */
+/* Returns the program's own descriptor that a path such as /dev/fd/3 or /proc/self/fd/1 names; negative if it names
+ * none. Such a path must not be opened again, because writing would then start at the file's beginning. */
 static int own_descriptor(const char *path)
 {
 	char folder[TARGET_PATH], real[PATH_MAX], own[64];
@@ -40,7 +40,7 @@ static int own_descriptor(const char *path)
 	return realpath(folder, real) && strcmp(real, own) == 0 ? atoi(name) : -1;
 }
 
-/* Follows one link; `path` is the link. */
+/* Replaces `path`, a link, by the path that it points to. */
 static int follow_link(char path[TARGET_PATH], struct error *e)
 {
 	char to[TARGET_PATH], next[TARGET_PATH];

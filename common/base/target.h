@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Resolves a path that a program is told to write to. A regular file, or none, is replaced as a whole by renaming a
- * temporary file. For a link, the file it points to is replaced and the link stays. Anything else (a pipe, a terminal,
- * a device, a descriptor of the program itself such as /dev/stdout or /dev/fd/N) is written to. Any thread.
+ * Resolves the path of an output file. A regular file, or a new one, is to be replaced as a whole by renaming a
+ * temporary file; for a link, the file that it points to is replaced and the link stays. Anything else (a pipe, a
+ * terminal, a device, or a descriptor of the program itself such as /dev/stdout or /dev/fd/N) is to be written to
+ * directly. Any thread.
  */
 #ifndef COMMON_BASE_TARGET_H
 #define COMMON_BASE_TARGET_H
@@ -14,21 +15,24 @@
 enum { TARGET_PATH = 4096 };
 
 struct target {
-	char path[TARGET_PATH]; /* of the file to replace, or to write to */
+	char path[TARGET_PATH]; /* the file to replace, or to write to */
 	bool through;		/* write to it instead of replacing it */
-	int descriptor;		/* in that case, the program's own descriptor; otherwise negative */
+	int descriptor;		/* the program's own descriptor that path stands for; negative: none */
 };
 
-/* The file behind "-", back again for a command line, and what messages call it; other paths stay as they are. */
+/* On the command line, "-" stands for stdout. These functions return other names unchanged. */
 #define TARGET_STDOUT "/dev/stdout"
-const char *target_of(const char *arg);
-const char *target_arg(const char *path);
-const char *target_shown(const char *path);
+const char *target_of(const char *arg);	    /* "-" to TARGET_STDOUT */
+const char *target_arg(const char *path);   /* TARGET_STDOUT to "-", for a command line */
+const char *target_shown(const char *path); /* TARGET_STDOUT to "stdout", for messages */
 
-/* -ELOOP: a loop of links; -ENAMETOOLONG; -EISDIR. */
+/* Follows links from `path` and decides how to write to the file at their end. A file that cannot be examined is no
+ * error yet: writing to it will fail. Returns 0, -ELOOP for a loop of links, -ENAMETOOLONG, -EISDIR, or another -errno
+ * of reading a link. */
 int target_find(struct target *t, const char *path, struct error *e);
 
-/* Opens the target for writing and returns a new descriptor, or -errno. Opening a pipe waits for its reader. */
+/* Opens a target whose `through` is set and returns a new descriptor, or -errno. Opening a pipe waits for its reader.
+ */
 int target_open(const struct target *t, struct error *e);
 
 #endif

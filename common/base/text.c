@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * UTF-8 by its table of sequences (Unicode, section 3.9), numbers with units by strtod and a letter, and printing that
- * never cuts within a character. Nothing allocates.
+ * Short texts: checking and cleaning UTF-8 by the table of well-formed sequences (Unicode, section 3.9), reading
+ * numbers with units (strtod, then a letter), and printing into fixed-size arrays without cutting inside a character.
+ * Nothing allocates.
  *
- * What is malformed is false; what does not fit is cut.
+ * Functions that read return false for malformed text. Functions that print cut a text that does not fit; that is no
+ * error.
  */
 #include "common/base/text.h"
 
@@ -30,8 +32,8 @@ size_t text_utf8_length(const unsigned char *p)
 	return n;
 }
 
-/* Control characters: those of ASCII, and U+0080 to U+009F, since a terminal takes U+009B for the start of a command,
- * like escape. */
+/* Control characters are those of ASCII and U+0080 to U+009F; terminals understand U+009B, like escape, as the start of
+ * a command. */
 static bool is_control(const unsigned char *p)
 {
 	return p[0] < 32 || p[0] == 127 || (p[0] == 0xC2 && p[1] < 0xA0);
@@ -60,7 +62,7 @@ void text_clean(char *text)
 	}
 }
 
-/* The length of a text of n bytes without an incomplete sequence at its end. */
+/* Returns the length of a text of n bytes without an incomplete UTF-8 sequence at its end. */
 static size_t complete_length(const char *text, size_t n)
 {
 	size_t start = n;
@@ -84,7 +86,7 @@ void text_copy(char *out, size_t size, const char *from)
 	out[n] = 0;
 }
 
-/* The length of the valid part; cut: that is not all of it. */
+/* Prints and returns the length of the text in `out`; *cut: not all of it fitted. */
 __attribute__((format(printf, 4, 0))) static size_t print(char *out, size_t size, bool *cut, const char *format,
 							  va_list ap)
 {
@@ -134,7 +136,8 @@ bool text_ratio(const char *text, double *ratio)
 	return true;
 }
 
-/* A non-negative number, followed by at most one letter of `units`, which selects the factor at the same index. */
+/* Reads a non-negative number, followed by at most one letter of `units`, which selects the factor at the same index.
+ */
 static bool read_unit(const char *text, const char *units, const double *factors, double *number, double *factor)
 {
 	char *end;
@@ -161,7 +164,7 @@ static bool with_unit(const char *text, const char *units, const double *factors
 bool text_count(const char *text, uint64_t *count)
 {
 	static const double thousands[] = {1e3, 1e3, 1e6, 1e9};
-	if (text[strspn(text, "0123456789")] == 0) { /* exact also beyond 2^53 */
+	if (text[strspn(text, "0123456789")] == 0) { /* digits alone: exact also beyond 2^53 */
 		errno = 0;
 		unsigned long long n = strtoull(text, NULL, 10);
 		*count = n;
@@ -170,7 +173,7 @@ bool text_count(const char *text, uint64_t *count)
 	double number, factor;
 	if (!read_unit(text, "kKMG", thousands, &number, &factor))
 		return false;
-	/* 1.001 times 1000 is not 1001 in floating point, but 1001 is the whole number that is written as 1.001k. */
+	/* 1.001 times 1000 is not 1001 in floating point. 1.001k is accepted as 1001 because 1001 / 1000 is 1.001. */
 	double x = rint(number * factor);
 	if ((x != number * factor && x / factor != number) || x >= 0x1p63)
 		return false;

@@ -14,7 +14,7 @@ static const char *file; /* read by the handler, written while the signals are b
 static void remove_and_end(int number)
 {
 	unlink(file);
-	raise(number); /* SA_RESETHAND: as it was by default, when this returns */
+	raise(number); /* SA_RESETHAND has restored the default action, which is taken when this function returns */
 }
 
 static void block_signals(sigset_t *old)

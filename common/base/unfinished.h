@@ -1,16 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A temporary file that SIGINT, SIGTERM and SIGHUP remove before they end the process as they would without: at most
- * one at a time. Programs with one thread that do not handle these signals themselves; an ignored one stays ignored.
+ * A temporary file that is removed if SIGINT, SIGTERM or SIGHUP ends the process; at most one at a time. The signal
+ * then ends the process as usual. For programs with one thread that do not handle these signals themselves; an ignored
+ * signal stays ignored.
  */
 #ifndef COMMON_BASE_UNFINISHED_H
 #define COMMON_BASE_UNFINISHED_H
 
 #include "common/base/error.h"
 
-/* As mkstemp. The path, once it is made, must stay as it is until unfinished_end. Returns the descriptor or -errno. */
+/* Creates the file like mkstemp and returns its descriptor or -errno. The path must stay unchanged until
+ * unfinished_end. */
 int unfinished_begin(char *path, struct error *e);
-/* It has another name, or has been removed. */
+/* Call once the file has been renamed or removed: signals no longer remove it. */
 void unfinished_end(void);
 
 #endif
