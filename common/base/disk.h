@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * All file I/O of data that must survive: the coordinator's spool, blob stores, film files, checked files. The
- * functions are the system's, with its conventions (-1 and errno), called through a table that tests replace by a disk
- * that is full, fails, or loses what was not flushed. tests/lint/disk.sh checks that nothing goes around it; SQLite has
- * its own layer (its VFS). Any thread; call disk_use before there is more than one. Allocates nothing.
+ * All file I/O of data that must survive a crash: the coordinator's spool, blob stores, film files, checked files. The
+ * functions are the system's, with its conventions (-1 and errno), called through a table; tests replace the table by a
+ * disk that is full, fails, or loses data that was not flushed. tests/lint/disk.sh checks that these files are accessed
+ * in no other way; SQLite has its own layer (its VFS). Any thread; call disk_use before there is more than one.
+ * Allocates nothing.
  *
- * Flushing a file makes its bytes and its length durable. Its name becomes durable by flushing its folder. A flush that
+ * Flushing a file makes its bytes and its length durable; flushing its folder makes its name durable. A flush that
  * failed is never repeated: the data may be lost, and the next flush would report success.
  */
 #ifndef COMMON_BASE_DISK_H
@@ -39,15 +40,14 @@
 	X(int, unlink, (const char *path), (path))                                                                   \
 	X(int, mkdir, (const char *path, mode_t mode), (path, mode))                                                 \
 	X(int, rmdir, (const char *path), (path))                                                                    \
-	X(int, stat, (const char *path, struct stat *st), (path, st)) /* of the link itself */                       \
+	X(int, stat, (const char *path, struct stat *st), (path, st)) /* like lstat: links are not followed */       \
 	X(int, fstat, (int fd, struct stat *st), (fd, st))                                                           \
 	X(int, touch, (const char *path), (path))                                                                    \
 	X(int, flock, (int fd, int what), (fd, what))                                                                \
 	X(DIR *, opendir, (const char *path), (path))                                                                \
-	X(struct dirent *, readdir, (DIR * d), (d)) /* NULL: the end, or with errno, which was 0 before, an error */ \
-	X(uint64_t, capacity, (const char *path), (path)) /* bytes of its file system, used or not; 0: not known */  \
-	X(uint64_t, available, (const char *path),                                                                   \
-	  (path)) /* bytes of it that may still be written; UINT64_MAX: not known */
+	X(struct dirent *, readdir, (DIR * d), (d)) /* NULL: end; or an error if errno, set to 0 before, changed */  \
+	X(uint64_t, capacity, (const char *path), (path))  /* size of the file system in bytes, or 0 if not known */ \
+	X(uint64_t, available, (const char *path), (path)) /* bytes that can still be written, or UINT64_MAX */
 
 #define DISK_MEMBER(result, name, parameters, arguments) result(*name) parameters;
 struct disk {
@@ -67,47 +67,49 @@ extern const struct disk disk_system;
 DISK_CALLS(DISK_WRAPPER)
 #undef DISK_WRAPPER
 
-/* Whether an error, -errno, says that there is no room on the disk, or none left of its quota. */
+/* Returns whether `code`, a -errno, means that the disk is full or a quota is used up. */
 static inline bool disk_is_full(int code)
 {
 	return code == -ENOSPC || code == -EDQUOT;
 }
 
-/* The data need not stay in the page cache: it is read again only after a crash. */
+/* Advises the kernel to drop the file from the page cache: it is read again only after a crash. */
 static inline void disk_forget(int fd)
 {
 	posix_fadvise(fd, 0, 0, POSIX_FADV_DONTNEED);
 }
 
-/* The file will be read sequentially and completely, soon. */
+/* Advises the kernel that the whole file will soon be read, sequentially. */
 static inline void disk_read_through(int fd)
 {
 	posix_fadvise(fd, 0, 0, POSIX_FADV_SEQUENTIAL);
 	posix_fadvise(fd, 0, 0, POSIX_FADV_WILLNEED);
 }
 
-/* Writes all of it; 0 or -errno. */
+/* Writes all `size` bytes, in several calls if necessary. Returns 0 or -errno. */
 int disk_write_all(int fd, const void *bytes, size_t size);
-/* Writes a file atomically: a new one under the name PATH.tmp, flushed, then renamed. Others may read it if the
- * mode says so, whatever the umask. Its name is durable once its folder is flushed. After an error the old file is
- * unchanged. */
+/* Replaces a file atomically: writes PATH.tmp, flushes it and renames it. If `mode` grants anything to group or others,
+ * the file gets exactly that mode, whatever the umask. The name is durable once the folder is flushed. After an error
+ * the old file is unchanged. */
 int disk_replace(const char *path, const void *bytes, size_t size, mode_t mode, struct error *e);
 /* Makes the names in a folder durable. */
 int disk_sync_folder(const char *path, struct error *e);
-/* Makes a folder, durably; it may exist already. */
+/* Makes a folder and its name durable; the folder may exist already. */
 int disk_make_folder(const char *path, struct error *e);
 
-/* The names in a folder, except . and .., in no order. A folder may fail midway (EIO; ESTALE on NFS), and what was not
- * listed then is not missing: so every list ends with disk_list_end, which tells. Names may be removed meanwhile. */
+/* Lists the names in a folder, except . and .., in no particular order. Reading a folder may fail midway (EIO; ESTALE
+ * on NFS); a name that was not listed may exist nevertheless. Every list therefore ends with disk_list_end, which
+ * reports such an error. Names may be removed while a list is open. */
 struct disk_list {
 	const char *path; /* not copied */
 	DIR *d;
-	int fault; /* errno; 0: none */
+	int fault; /* errno of the first error; 0: none */
 };
 void disk_list_begin(struct disk_list *l, const char *path);
-const char *disk_list_next(struct disk_list *l); /* valid until the next call; NULL: the end, or an error */
-/* rc: what the caller met, which comes before an error of the folder. 0: each name was seen, or the caller stopped
- * before; otherwise rc, or -errno of the folder's first error. */
+/* Returns the next name, valid until the next call; NULL at the end or after an error. */
+const char *disk_list_next(struct disk_list *l);
+/* Ends the list. rc is the caller's own error, or 0. Returns rc if it is not 0, then -errno of the folder's first error
+ * if there was one, otherwise 0. */
 int disk_list_end(struct disk_list *l, int rc, struct error *e);
 
 #endif

@@ -6,21 +6,24 @@
 #include <stddef.h>
 
 struct list {
-	void *items; /* mem_alloc'd */
-	size_t count, room;
-	size_t size; /* of an item */
+	void *items;  /* allocated with mem.h */
+	size_t count; /* items in use */
+	size_t room;  /* items that fit */
+	size_t size;  /* bytes of an item */
 };
 
-/* Room for one more item, for the caller to fill; NULL: no memory, and the list is as before. Pointers to items are
- * valid until the next call. */
+/* Appends one item, which the caller fills, and returns it; NULL if memory is out, and then the list is unchanged.
+ * Pointers to items are valid until the next call. */
 void *list_push(struct list *l);
-void list_free(struct list *l); /* leaves it empty */
+/* Frees the items; the list is empty and can be used again. */
+void list_free(struct list *l);
 
-/* Room for one more in an array of `count` items that only this has made larger, or NULL, an empty one. It grows at the
- * powers of two, so its capacity need not be known. Returns the array, which may have moved; NULL: no memory, and it is
- * as before. */
+/* Makes room for one more item in an array of `count` items of `size` bytes. The array must be NULL (if count is 0) or
+ * have been grown by this function alone: it doubles whenever count is a power of two, so no capacity is stored.
+ * Returns the array, which may have moved; NULL if memory is out, and then the array is unchanged. */
 void *list_room(void *items, size_t count, size_t size);
 
-int double_compare(const void *a, const void *b); /* for qsort: ascending */
+/* Compares two doubles for qsort, ascending. */
+int double_compare(const void *a, const void *b);
 
 #endif

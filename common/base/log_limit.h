@@ -12,13 +12,15 @@
 enum { LOG_BURST = 100, LOG_PER_SECOND = 5 };
 
 struct log_bucket {
-	double used, at;   /* tokens used, and as of when; zeroed: a full bucket */
-	uint64_t withheld; /* lines left out since the last log_bucket_withheld */
+	double used;	   /* tokens used at time `at`; zeroed: a full bucket */
+	double at;	   /* time of the last call, s */
+	uint64_t withheld; /* lines suppressed since log_bucket_withheld last reported any */
 };
 
-/* true: write the line. `now` in s, never decreasing. false: leave it out; it is counted. */
+/* Returns whether the line may be written; if not, it is counted. `now` is in s and never decreases. */
 bool log_bucket_take(struct log_bucket *b, double now);
-/* How many lines were left out, once lines are allowed again, and resets the count; otherwise 0. */
+/* Once lines are allowed again, returns how many were suppressed, resets that count and takes a token for the line that
+ * reports it; otherwise returns 0. */
 uint64_t log_bucket_withheld(struct log_bucket *b, double now);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Progress on stderr: on a terminal a bar that redraws itself, elsewhere a plain line now and then. One thread.
+ * Progress on stderr: on a terminal a bar that is redrawn in place, elsewhere a plain line now and then. One thread.
  */
 #ifndef COMMON_BASE_PROGRESS_H
 #define COMMON_BASE_PROGRESS_H
@@ -9,29 +9,32 @@
 #include <stddef.h>
 
 struct progress {
-	bool terminal, drawn;
-	double shown;	   /* fraction in the last plain line; negative: none yet */
-	double shown_time; /* s */
-	char state[32];	   /* when the last plain line was written */
-	double most;	   /* of progress_kept */
-	char most_state[32];
+	bool terminal;	     /* stderr is a terminal that can redraw a line */
+	bool drawn;	     /* a bar has been drawn */
+	double shown;	     /* fraction in the last plain line; negative: none yet */
+	double shown_time;   /* when the last plain line was written, s */
+	char state[32];	     /* state in the last plain line */
+	double most;	     /* largest fraction passed to progress_kept in state most_state */
+	char most_state[32]; /* state in the last call of progress_kept */
 };
 
 void progress_start(struct progress *p);
-/* fraction in [0,1]; state: one word; detail: text after the bar. */
+/* Shows a fraction in [0,1], the state (one word), and a text after the bar. */
 void progress_show(struct progress *p, double fraction, const char *state, const char *detail);
-/* What is done of an amount that is only estimated falls when the estimate grows, or is withdrawn. People are shown the
- * most that it was in this state; the time that is left tells them the rest. */
+/* Returns the largest fraction passed since `state` last changed. If the total is only an estimate, the fraction done
+ * falls when the estimate grows; a bar that goes backwards would confuse, and the remaining time shows the change. */
 double progress_kept(struct progress *p, double fraction, const char *state);
-/* Where it falls because there is more to be done than before, as for a job that is extended: appends to the detail
- * what it was, if that is another number on the screen. */
+/* For a fraction that falls because work was added, as when a job is extended: appends the earlier fraction to `detail`
+ * if it differs in the digits that are shown. */
 void progress_explain_fall(struct progress *p, double fraction, const char *state, char *detail, size_t size);
-void progress_end(struct progress *p); /* leaves the cursor at the start of a line */
+/* Ends the bar's line, so that the next text starts on a line of its own. */
+void progress_end(struct progress *p);
 
-/* A rate in few characters: "3.2 k", "12 M"; a time: "1:02:03", "45 s". */
+/* Prints a number in few characters: "3.20 k", "12.0 M". */
 void progress_number(double x, char *text, size_t size);
+/* Prints a time, rounded up to seconds: "45 s", "2:03", "1:02:03". */
 void progress_time(double seconds, char *text, size_t size);
-/* Two digits: "4.5 s", "31 min", "2.4 h", "12 days"; "for ever". */
+/* Prints a time with about two digits: "4.5 s", "31 min", "2.4 h", "12 days"; "for ever" from a million years on. */
 void progress_duration(double seconds, char *text, size_t size);
 
 #endif
