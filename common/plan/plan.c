@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * plan_make divides a request into groups, parts, chains, epochs and rounds, by sizes that depend on the request alone.
- * plan_check checks that a plan from the network has every property that plan_make guarantees, so that its users need
- * no further checks.
+ * plan_make divides the work of a request into groups, parts, chains, epochs and rounds. All sizes are computed from
+ * the request alone, never from the machine, the workers or the time of day, so that the same request always gives the
+ * same plan. First come chains or samples with their groups and parts (make_chains, make_samples), then the length of
+ * an epoch (choose_epoch) and the number of rounds, then the bootstrap. plan_check checks that a plan from the network
+ * has every property that plan_make guarantees, so that its users need no further checks.
  *
  * Failures: -EINVAL with a sentence that names the number and its range.
  */
@@ -21,23 +23,23 @@ enum {
 	DEFAULT_CHAINS = 1024,
 	DEFAULT_BOOTSTRAP = 1000000,
 	LEAST_BOOTSTRAP = 16384,
-	FEW_BOOTSTRAP = 4096,	    /* of samples, which it only scales, in short renders */
-	SHARE_BOOTSTRAP = 64,	    /* one in so many of their samples */
-	LEAST_BOOTSTRAP_SLOW = 256, /* a bootstrap sample of thousands of rays joins as many vertices: 256 find light if
-				       there is any */
+	FEW_BOOTSTRAP = 4096,	    /* minimum for plans of samples, whose bootstrap only sets the scale of the grid */
+	SHARE_BOOTSTRAP = 64,	    /* plans of samples have one bootstrap sample per 64 samples */
+	LEAST_BOOTSTRAP_SLOW = 256, /* minimum if a bootstrap sample takes thousands of rays: each then connects as many
+				       pairs of vertices, so that 256 samples find light if there is any */
 	LEAST_CHAINS = 16,
-	MUTATIONS_PER_CHAIN = 2048, /* with fewer mutations, the number of chains is reduced rather than their length */
-	AIM_ROUNDS = 8,
-	LEASE_SAMPLES_MOST = 1 << 20, /* chains: mutations in one lease */
-	LEASE_SAMPLES_OPEN = 1 << 18, /* for chains without a bound on mutations: the most in one lease */
-	LEASE_SAMPLES_LEAST = 1 << 13,
-	LEASE_SECONDS = 20,	      /* of one thread */
-	LEASE_SAMPLES_SLOW = 1 << 15, /* fewer never take longer than that in any scene tried */
-	SPEED_UNKNOWN = 50000,	      /* mutations or samples a second, if no pilot measured it */
-	RAYS_A_SECOND = 2000000,      /* of one thread; 1.5 to 3.5 million in the scenes of tests/bench */
-	RAYS_USUAL = 8,		      /* the most that a mutation or a sample usually takes */
-	PIXEL_BYTES = 12,	      /* bytes of a tile on the wire */
-	STRIP_SAMPLES_MOST = 1 << 17, /* samples in one lease */
+	MUTATIONS_PER_CHAIN = 2048,    /* shorter jobs have fewer chains, not shorter ones */
+	AIM_ROUNDS = 8,		       /* rounds of a job whose number of mutations or samples is bounded */
+	LEASE_SAMPLES_MOST = 1 << 20,  /* chains: most mutations in one lease */
+	LEASE_SAMPLES_OPEN = 1 << 18,  /* the same if nothing bounds the job's mutations */
+	LEASE_SAMPLES_LEAST = 1 << 13, /* and the fewest then */
+	LEASE_SECONDS = 20,	       /* time that a lease should take, of one thread */
+	LEASE_SAMPLES_SLOW = 1 << 15,  /* so many never took longer than LEASE_SECONDS in any scene tried */
+	SPEED_UNKNOWN = 50000,	       /* mutations or samples a second of one thread, if no pilot has measured it */
+	RAYS_A_SECOND = 2000000,       /* assumed of one thread; 1.5 to 3.5 million in the scenes of tests/bench */
+	RAYS_USUAL = 8,		       /* mutations and samples that take more rays count as slow */
+	PIXEL_BYTES = 12,	       /* of a tile on the wire */
+	STRIP_SAMPLES_MOST = 1 << 17,  /* samples: most samples in one lease */
 };
 #define TOTAL_MOST (UINT64_C(1) << 62)
 #define LEASE_MOST (UINT64_C(1) << 40)
@@ -135,7 +137,7 @@ static int check_film(const struct plan *p, struct error *e)
 	return 0;
 }
 
-/* 0: no bound. Otherwise the samples or mutations requested, the least of the given bounds. */
+/* Sets *total to the number of samples or mutations requested, the least of the given bounds; 0: there is no bound. */
 static int asked_total(const struct plan_request *r, const struct plan *p, uint64_t *total, struct error *e)
 {
 	*total = 0;
@@ -169,7 +171,7 @@ bool plan_wants_rays(const struct plan_request *r)
 	return !asked && (!counted || r->seconds > 0 || r->target_error > 0);
 }
 
-/* Bootstrap samples that one thread draws in that many seconds; 2^62: no rays were counted. */
+/* Returns how many bootstrap samples one thread is assumed to draw in that time; 2^62 if no rays were counted. */
 static uint64_t bootstrap_room(const struct plan_request *r, double seconds)
 {
 	return r->rays.bootstrap > 0 ? (uint64_t)fmin(seconds * RAYS_A_SECOND / r->rays.bootstrap, 0x1p62) : 1ull << 62;
@@ -180,15 +182,16 @@ uint64_t plan_bootstrap_room(const struct plan_request *r, double seconds)
 	return clamp(bootstrap_room(r, seconds), LEAST_BOOTSTRAP_SLOW, PLAN_MAX_BOOTSTRAP / 2);
 }
 
-/* How many times as long a mutation or a sample takes as a usual one; at least 1. */
+/* Returns the ratio of the rays of a mutation or sample to the usual number; at least 1. */
 static double slowness_of(const struct plan_request *r)
 {
 	return fmax(1, r->rays.step / RAYS_USUAL);
 }
 
-/* Mutations in a lease of a plan that ends by time or error: 32 per pixel and round, divided among up to 64 leases.
- * A lease's tiles cost about 20 ns per pixel of the crop to sum, send and add, which is 2 % of half a mutation per
- * pixel. Fewer than 2^13 are not worth sending; slow mutations have shorter leases in proportion. */
+/* Returns the mutations in a lease of a plan that only time or error end: 32 per pixel and round, divided among the
+ * round's leases, but at least half a mutation per pixel of the crop: summing, sending and adding a lease's tiles costs
+ * about 20 ns per pixel, which is 2 % of the time of half a mutation. Fewer than 2^13 are not worth sending; leases of
+ * slow mutations are shorter in proportion. */
 static uint64_t open_lease(const struct plan_request *r, const struct plan *p)
 {
 	uint64_t leases = (uint64_t)p->groups * p->parts, per_pixel = crop_pixels(p) * 32 / leases,
@@ -197,9 +200,9 @@ static uint64_t open_lease(const struct plan_request *r, const struct plan *p)
 	return (uint64_t)((double)lease / slowness_of(r));
 }
 
-/* Samples or mutations that fit into a bound on time or error, by conservative constants, because a plan must not
- * depend on the machine: one thread at SPEED_UNKNOWN, and independent pixels with relative errors of 100 % per
- * sample. Infinity: no such bound. */
+/* The next two functions return how many samples or mutations fit into a bound on time or on the error; infinity if
+ * there is no such bound. They assume one thread at SPEED_UNKNOWN, and independent pixels whose relative error is 100 %
+ * per sample: conservative constants, because a plan must not depend on the machine. */
 static double room_in_time(const struct plan_request *r)
 {
 	return r->seconds > 0 ? SPEED_UNKNOWN / slowness_of(r) * r->seconds : INFINITY;
@@ -212,13 +215,13 @@ static double room_for_error(const struct plan_request *r, const struct plan *p)
 
 enum epoch_rule { RULE_ASKED, RULE_ROUNDS, RULE_FILM, RULE_ROOM, RULE_MOST, RULE_SECONDS, RULE_BANDWIDTH };
 
-/* The power of two nearest to x by ratio, at least 1. */
+/* Returns the power of two nearest to x by ratio, from 1 to 2^40. */
 static double power_of_two_near(double x)
 {
 	return x > 1 ? exp2(fmin(round(log2(x)), 40)) : 1;
 }
 
-/* Mutations or samples of a lease whose epoch is 1. */
+/* Returns the mutations or samples in a lease if the epoch were 1. */
 static uint64_t lease_unit(const struct plan *p)
 {
 	if (p->kind == PLAN_CHAINS)
@@ -231,7 +234,8 @@ static uint64_t lease_bytes(const struct plan *p)
 	return crop_pixels(p) * PIXEL_BYTES / (p->kind == PLAN_CHAINS ? 1 : p->parts);
 }
 
-/* The rule is stated above plan_wants_speed. parts, groups and chains are set already. */
+/* Chooses the length of an epoch by the rule that plan.h states above plan_wants_speed, and returns which part of the
+ * rule decided. p's parts, groups and chains are set already. */
 static enum epoch_rule choose_epoch(const struct plan_request *r, const struct plan *p, uint64_t total, uint64_t *epoch)
 {
 	bool chains = p->kind == PLAN_CHAINS;
@@ -268,8 +272,9 @@ static enum epoch_rule choose_epoch(const struct plan_request *r, const struct p
 	return rule;
 }
 
-/* A round has at least one sample per pixel and group. If two threads would not finish it in time, there are fewer
- * groups, but at least four, so that there is an error. */
+/* Returns the number of groups, if none are requested. A round of samples has at least one sample per pixel and
+ * group; if two threads would not finish it within the job's time, there are fewer groups than usual, but at least
+ * four, so that an error can be estimated. */
 static uint32_t usual_groups(const struct plan_request *r, const struct plan *p)
 {
 	if (r->groups)
@@ -314,6 +319,7 @@ bool plan_wants_speed(const struct plan_request *r, const struct plan *p)
 	return !r->epoch && !(r->speed > 0) && p->epoch > LEASE_SAMPLES_SLOW / lease_unit(p);
 }
 
+/* Chooses groups, chains, parts, epoch and rounds of a plan of chains. total: mutations requested; 0: no bound. */
 static int make_chains(const struct plan_request *r, struct plan *p, uint64_t total, struct error *e)
 {
 	p->groups = r->groups ? r->groups : DEFAULT_GROUPS;
@@ -343,6 +349,7 @@ static int make_chains(const struct plan_request *r, struct plan *p, uint64_t to
 	return 0;
 }
 
+/* Like make_chains, for a plan of samples. total: samples of all pixels. */
 static int make_samples(const struct plan_request *r, struct plan *p, uint64_t total, struct error *e)
 {
 	uint64_t rows = (uint64_t)p->crop_height + 2 * (uint64_t)p->border;

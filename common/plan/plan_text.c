@@ -55,7 +55,7 @@ void plan_describe(const struct plan *p, char *text, size_t size)
 	text_put(&t, ", paths of %u to %u edges, seed %llu", p->min_depth, p->max_depth, (unsigned long long)p->seed);
 }
 
-/* In the unit that was asked for. */
+/* Appends the change from the requested to the planned number of samples or mutations, in the unit of the request. */
 static void describe_total(const struct plan_request *r, const struct plan *p, const char *then, struct text *t)
 {
 	unsigned long long pixels = (unsigned long long)p->crop_width * p->crop_height;
@@ -88,7 +88,7 @@ void plan_describe_changes(const struct plan_request *r, const struct plan *p, c
 void plan_options(const struct plan *p, uint64_t rounds, char *text, size_t size)
 {
 	struct text t = {text, size};
-	rounds += rounds == 0; /* a black bootstrap ends a job before its first round, whatever the bound */
+	rounds += rounds == 0; /* a bootstrap without light ends a job before its first round, whatever the bound */
 	text_put(
 		&t,
 		"--integrator %s --size %ux%u --crop %u,%u,%u,%u --seed %llu --min-depth %u --max-depth %u --groups %u",
@@ -111,7 +111,7 @@ void plan_options(const struct plan *p, uint64_t rounds, char *text, size_t size
 			 (unsigned long long)p->epoch, (unsigned long long)(rounds * p->groups * p->epoch));
 }
 
-/* "a=b", or "'a=b c'" where a shell would take it for something else. */
+/* Appends a word, quoted if it has characters that are special to a shell: a=b, 'a=b c'. */
 static void put_quoted(struct text *t, const char *word)
 {
 	static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789@=,.:+-_/%";

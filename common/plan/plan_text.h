@@ -1,18 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A plan as text: what was chosen and why, the options that reproduce the same bits, and texts inside a plan. */
+/* A plan as text: what was chosen and why, and the options that reproduce the same bits. */
 #ifndef COMMON_PLAN_PLAN_TEXT_H
 #define COMMON_PLAN_PLAN_TEXT_H
 
 #include "common/plan/plan.h"
 
-/* "1024 chains in 16 groups ..., 8 rounds ...": what was chosen, and by which rule; for logs. */
+/* Describes a plan for logs: "hslt: 1024 chains in 16 groups, ...; 8 rounds (... mutations); ...". */
 void plan_describe(const struct plan *p, char *text, size_t size);
-/* What plan_make changed in the request ("chains 100 -> 128: ..."); empty: nothing. */
+/* Describes which numbers of the request plan_make changed ("chains 100 -> 128: ..."); empty if none. */
 void plan_describe_changes(const struct plan_request *r, const struct plan *p, char *text, size_t size);
-/* The options that reproduce the same bits after `rounds` rounds, whatever bound ended this job. */
+/* Prints the options that reproduce the bits after `rounds` rounds, whatever bound ended this job. */
 void plan_options(const struct plan *p, uint64_t rounds, char *text, size_t size);
 
-/* The options that say what the scene is: definitions and folders of its files. */
+/* The options -D and --path, on which the contents of the scene depend. */
 struct plan_define {
 	const char *name, *value;
 };
@@ -23,8 +23,8 @@ struct plan_scene {
 	size_t path_count;
 	const char *paths[PLAN_PATHS_MAX];
 };
-/* plan_options with these, quoted for a shell. */
+/* Like plan_options, followed by the options of `s`, quoted for a shell. */
 void plan_options_with(const struct plan *p, uint64_t rounds, const struct plan_scene *s, char *text, size_t size);
-enum { PLAN_OPTIONS_TEXT = 16384 }; /* more is cut */
+enum { PLAN_OPTIONS_TEXT = 16384 }; /* bytes for the options; longer texts are cut */
 
 #endif

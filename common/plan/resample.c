@@ -3,7 +3,7 @@
 
 #include <Random123/threefry.h>
 
-enum { STREAM_RESAMPLING = 5 }; /* RNG_RESAMPLING of the renderer's random numbers */
+enum { STREAM_RESAMPLING = 5 }; /* the same number as the renderer's RNG_RESAMPLING, so that no other stream uses it */
 
 double plan_resample_u(const struct plan *p, uint32_t group)
 {
@@ -29,7 +29,8 @@ bool plan_resample(const struct plan *p, uint32_t group, const float *weight, ui
 	uint64_t i = 0;
 	for (uint32_t k = 0; k < count; k++) {
 		double at = ((double)k + u) / count * total;
-		/* `last` guards against the rounding of `at` up to the total; an index of weight 0 is never chosen. */
+		/* `at` may be rounded up to the total: `last` then prevents running past the last index with a weight.
+		 * An index of weight 0 is never chosen. */
 		while (i < last && sum <= at)
 			sum += (double)weight[++i];
 		index[k] = first + i;
