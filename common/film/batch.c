@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * batch_check protects the canvas from the network: it checks counts, tiles within the crop and in order, finite
- * values, weights, chain states of the plan's size, and sums that must be consistent. A batch that passes can be merged
- * without further checks.
+ * batch_check protects the canvas from the network: a batch that passes can be merged without further checks. One
+ * function checks each kind of content against the plan: the lease, the tiles (inside the crop, aligned, in order, all
+ * values finite), the number and sizes of chain states, the bootstrap weights, the counters and sums (which must be
+ * consistent with each other), the path classes, the moments and the counters of strategies.
  *
- * Failures are -EBADMSG with a sentence for the log of the sender; -ENOMEM when a batch is copied.
+ * Failures are -EBADMSG with a sentence for the log. A batch that fails is refused as a whole.
  */
 #include "common/film/batch.h"
 
@@ -71,7 +72,7 @@ static int check_key(const struct lease_key *k, const struct plan *p, struct err
 
 static bool all_finite(const float *v, size_t n)
 {
-	/* An exponent of all ones is an infinity or NaN. All values are tested together, so the loop has no branch. */
+	/* An exponent of all ones means infinity or NaN. The loop has no branch, so that it can be vectorised. */
 	uint32_t bad = 0;
 	for (size_t i = 0; i < n; i++) {
 		uint32_t bits;
@@ -109,9 +110,9 @@ static int check_tiles(const struct batch *b, const struct plan *p, struct error
 }
 
 enum {
-	STATE_HEAD = 64,
-	STATE_VERTEX = 128, /* random numbers of both sub-paths; as a vertex of a path it has 40 */
-	STATE_COST = 48,    /* of memory besides the bytes: struct chain_state and what an allocation needs */
+	STATE_HEAD = 64,    /* most bytes of a state besides its vertices */
+	STATE_VERTEX = 128, /* most bytes per vertex: random numbers of both sub-paths; a stored path needs only 40 */
+	STATE_COST = 48,    /* memory per state besides its bytes: struct chain_state and the allocator's overhead */
 };
 
 uint32_t chain_state_max(const struct plan *p)
@@ -133,6 +134,7 @@ uint64_t chain_states_bytes(const struct chain_state *s, uint32_t count)
 	return sum;
 }
 
+/* *live: the number of chains that run, whose states are not empty. */
 static int check_states(const struct batch *b, const struct plan *p, uint64_t *live, struct error *e)
 {
 	struct plan_range chains = plan_chain_range(p, b->key.part);
@@ -166,11 +168,11 @@ static int check_weights(const struct batch *b, const struct plan *p, struct err
 	return 0;
 }
 
-/* Tolerance for sums of the same terms in another order, partly rounded to float. */
+/* Relative tolerance between sums of the same terms in different orders, partly rounded to float. */
 #define ROUNDING (1 + 1e-6)
 
-/* More of anything than a sample can count: rays of a path of 128 edges with all connections and of the chains that it
- * starts, refused contributions. */
+/* Above anything that one sample can add to a counter, such as the rays of a path of 128 edges with all its connections
+ * and of the chains that it starts. */
 #define PER_SAMPLE 0x1p24
 
 static int check_absurd(const struct batch *b, const struct plan *p, uint64_t samples, struct error *e)
@@ -188,8 +190,8 @@ static int check_absurd(const struct batch *b, const struct plan *p, uint64_t sa
 	return 0;
 }
 
-/* For n non-negative terms: their sum and sum of squares must satisfy the Cauchy-Schwarz inequality and float's
- * range, which no sample exceeds. Squares may have underflowed. */
+/* Checks that the sum and the sum of squares of n non-negative terms are possible: each term is in the range of float,
+ * and sum^2 / n <= squares <= sum^2 (the first is the Cauchy-Schwarz inequality). Squares may have underflowed. */
 static int check_sums(const struct batch *b, struct error *e)
 {
 	const double sums[] = {b->independent_sum, b->independent_square, b->beyond_sum, b->cpu_seconds};
@@ -306,7 +308,7 @@ static int check_moments(const struct batch *b, const struct plan *p, struct err
 		double first = 0;
 		for (uint64_t s = 0; s < sequences; s++)
 			first += (double)b->moments[s * tiles + t];
-		/* Proposals that are all but impossible leave moments below FLT_MIN, which have few bits or none. */
+		/* Proposals with a tiny acceptance probability leave moments below FLT_MIN, where floats lose bits. */
 		double lost = ((double)sequences + 1) * (double)FLT_TRUE_MIN;
 		if (!((double)b->moments[sequences * tiles + t] <= first * ROUNDING + lost))
 			return error_set(e, EBADMSG, "a second moment above the first");

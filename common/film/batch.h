@@ -17,7 +17,8 @@ struct lease_key {
 	uint64_t epoch;
 };
 const char *lease_kind_name(enum lease_kind kind); /* "bootstrap", "render" */
-/* A lease in a line of a log, and (without its kind) in a sentence: printf(LEASE_WORDS, LEASE_PLACE(&key)). */
+/* Formats and arguments that print a lease: LEASE_FORMAT with LEASE_VALUES(&key) in a line of a log, LEASE_WORDS with
+ * LEASE_PLACE(&key), without the kind, in a sentence. */
 #define LEASE_FORMAT "kind=%s group=%u part=%u epoch=%llu"
 #define LEASE_VALUES(k) lease_kind_name((k)->kind), LEASE_PLACE(k)
 #define LEASE_WORDS "group %u part %u epoch %llu"
@@ -26,65 +27,69 @@ bool lease_key_equal(const struct lease_key *a, const struct lease_key *b);
 
 enum { TILE_SIZE = 64, TILE_CHANNELS = 3 }; /* X Y Z */
 
-/* A rectangle that changed; x, y in pixels of the FULL film, inside the crop, aligned to TILE_SIZE from the crop's
- * corner (smaller at the right and lower border). A batch contains each tile at most once, in row-major order. */
+/* The sums of a rectangle of pixels. x and y are pixels of the FULL film; tiles are inside the crop and aligned to
+ * TILE_SIZE from the crop's corner (smaller at the right and lower border). A batch contains only tiles that received
+ * light, each at most once, in row-major order. */
 struct tile {
 	uint32_t x, y, width, height;
 	float *xyz; /* [height][width][3], finite */
 };
 
-/* The state of one chain after an epoch: opaque to all but the integrator. Any worker can continue from it. */
+/* The state of one chain after an epoch, from which any worker can continue. Only the integrator interprets it. */
 struct chain_state {
 	uint8_t *bytes;
-	uint32_t size; /* 1..chain_state_max */
+	uint32_t size; /* at most chain_state_max; 0: the chain does not run */
 };
-enum { CHAIN_STATE_MAX = 5376 }; /* of any plan */
+enum { CHAIN_STATE_MAX = 5376 }; /* largest size for any plan */
 
-/* The longest state of a chain of this plan: so many bytes for each vertex of the longest path. */
+/* Returns the largest size of a state of this plan, in bytes; it grows with the plan's max_depth. */
 uint32_t chain_state_max(const struct plan *p);
-/* Memory that the states of all its chains need at most. */
+/* Returns the memory that the states of all chains of the plan need at most. */
 uint64_t chain_states_max(const struct plan *p);
-uint64_t chain_states_bytes(const struct chain_state *s, uint32_t count); /* memory that these need; NULL: 0 */
+/* Returns the memory that these states need; 0 if s is NULL. */
+uint64_t chain_states_bytes(const struct chain_state *s, uint32_t count);
 
 enum { BATCH_COUNTERS = 16 };
 enum batch_counter {
 	COUNT_SAMPLES,	   /* samples or mutations made */
 	COUNT_ACCEPTED,	   /* accepted mutations */
 	COUNT_INDEPENDENT, /* independent proposals (bootstrap samples, large steps) */
-	COUNT_NAN,	   /* contributions refused: NaN */
-	COUNT_INFINITE,	   /* ... infinite */
-	COUNT_NEGATIVE,	   /* ... negative */
+	COUNT_NAN,	   /* contributions refused because they were NaN */
+	COUNT_INFINITE,	   /* contributions refused because they were infinite */
+	COUNT_NEGATIVE,	   /* contributions refused because they were negative */
 	COUNT_RAYS_CLOSEST,
 	COUNT_RAYS_SHADOW,
-	COUNT_STUCK,		/* chains that accepted nothing during the epoch */
-	COUNT_LONGEST_STUCK,	/* most rejections in a row (merged by maximum) */
-	COUNT_STATES_LOST,	/* chains whose last state could not be read back: they start the next epoch where they
-				   started this one */
-	COUNT_SPREAD,		/* contributions too bright for a sample, which chains spread */
+	COUNT_STUCK,	     /* chains that accepted nothing during the epoch */
+	COUNT_LONGEST_STUCK, /* most rejections in a row (merged by maximum) */
+	COUNT_STATES_LOST, /* chains whose state after the epoch could not be decoded again, so that they begin the next
+			      epoch where they began this one; or whose seed carried no light on this worker */
+	COUNT_SPREAD,	   /* contributions of samples that were too bright and were spread by chains (erpt) */
 	COUNT_SPREAD_MUTATIONS, /* mutations of these chains */
-	COUNT_SPREAD_RAYS,	/* rays that these chains took, part of COUNT_RAYS_CLOSEST and COUNT_RAYS_SHADOW */
+	COUNT_SPREAD_RAYS,	/* rays of these chains, included in COUNT_RAYS_CLOSEST and COUNT_RAYS_SHADOW */
 };
 
-/* All rays of one batch, whose counters are bounded. Not for sums of many batches, which may be saturated. */
+/* Returns all rays of one batch, whose counters are bounded by batch_check. Sums of many batches may be saturated, and
+ * adding them here could overflow. */
 static inline uint64_t batch_rays(const uint64_t counters[BATCH_COUNTERS])
 {
 	return counters[COUNT_RAYS_CLOSEST] + counters[COUNT_RAYS_SHADOW];
 }
 
-/* Counters of the chains of a lease for each strategy of the plan's mixture; names in common/estimate/strategy.h.
- * From STRATEGY_FAIL_FIRST on: why a proposal could not be made or carried no light, one reason per proposal. */
+/* Counters of the chains of a lease for each strategy of the plan's mixture; common/estimate/strategy.h has their
+ * names. The counters from STRATEGY_FAIL_FIRST on are the reasons why proposals could not be made or carried no light,
+ * one reason per proposal. */
 enum { BATCH_STRATEGIES = PLAN_MAX_STRATEGIES };
 enum strategy_counter {
 	STRATEGY_PROPOSED, /* mutations for which the strategy was chosen */
 	STRATEGY_ACCEPTED,
 	STRATEGY_RAYS,		/* rays of its proposals, reverse walks included */
-	STRATEGY_WALKS,		/* on the manifold */
-	STRATEGY_ITERATIONS,	/* of all walks */
+	STRATEGY_WALKS,		/* walks on the manifold */
+	STRATEGY_ITERATIONS,	/* iterations of all walks */
 	STRATEGY_REVERSE_WALKS, /* walks from the proposal back to the current state */
 	STRATEGY_FAIL_FIRST,
 	STRATEGY_FAIL_OUTSIDE = STRATEGY_FAIL_FIRST, /* left the frame or the aperture */
 	STRATEGY_FAIL_MISSED,			     /* a ray met nothing */
-	STRATEGY_FAIL_BLOCKED,			     /* ... or another surface than expected */
+	STRATEGY_FAIL_BLOCKED,			     /* a ray met another surface than expected */
 	STRATEGY_FAIL_MODE,			     /* reflection or transmission, side, or material changed */
 	STRATEGY_FAIL_SINGULAR,			     /* a singular matrix */
 	STRATEGY_FAIL_DIVERGED,			     /* the step of a walk fell below the least step */
@@ -98,16 +103,17 @@ enum strategy_counter {
 };
 
 /*
- * Within-chain moments, for chains only. A sequence is a chain; if the plan has more than SEQUENCES_MAX chains, a
- * sequence is all chains of one lease (which bounds the coordinator's memory). A mutation gives weight w to a state (1
- * - a to the current one, a to the proposal) whose I = X+Y+Z falls with share f into a tile of the crop; film points
- * outside the crop belong to no tile. First moments, by sequence and tile: the sum of w f. Second moments, by tile over
- * the whole lease: the sum of w f^2.
+ * Moments within chains, for plans of chains only. They are kept per sequence and tile. A sequence is one chain; if the
+ * plan has more than SEQUENCES_MAX chains, it is all chains of one lease, which bounds the coordinator's memory. Each
+ * mutation gives the weight w = 1 - a to the current state and w = a to the proposal (a: the acceptance probability); a
+ * share f of a state's I = X+Y+Z falls into a tile of the crop (film points outside the crop belong to no tile). First
+ * moments, per sequence and tile, are the sums of w f; second moments, per tile over the whole lease, the sums of w
+ * f^2.
  */
 enum { SEQUENCES_MAX = 4096 };
-uint32_t batch_sequences(const struct plan *p);	 /* of one render lease; 0: no chains */
-uint32_t batch_film_tiles(const struct plan *p); /* of the crop */
-/* Number of floats in struct batch.moments for a lease of that kind. */
+uint32_t batch_sequences(const struct plan *p);	 /* sequences of one render lease; 0: the plan has no chains */
+uint32_t batch_film_tiles(const struct plan *p); /* tiles of the crop */
+/* Returns the number of floats in struct batch.moments for a lease of that kind. */
 uint64_t batch_moment_count(const struct plan *p, enum lease_kind kind);
 
 struct batch {
@@ -115,32 +121,36 @@ struct batch {
 	uint64_t counters[BATCH_COUNTERS];
 	uint32_t strategy_count; /* entries of the plan's mixture, or 0 */
 	uint64_t strategy[BATCH_STRATEGIES][STRATEGY_COUNTERS];
-	/* Sums over independent proposals of I = X+Y+Z of the whole sample; zeros are counted in COUNT_INDEPENDENT.
-	 * beyond_sum: the same for paths longer than the integrator's state holds; estimated by the bootstrap and
-	 * not part of independent_sum (b is the integral of what chains can reach). */
+	/* Sums of I and I^2 over the independent samples, I = X+Y+Z of the whole sample. COUNT_INDEPENDENT also counts
+	 * samples with I = 0. beyond_sum: the sum of I of paths too long for a chain's state, estimated by the
+	 * bootstrap; not part of independent_sum, since b is the integral over the paths that chains can reach. */
 	double independent_sum, independent_square, beyond_sum;
-	/* By path class. Bootstrap: the terms of independent_sum. Chains: time, the sum of w times the class's share
-	 * of the state's I. Samples: the part of independent_sum that chains spread. */
+	/* By path class. Bootstrap: the class's part of independent_sum. Chains: time, the sum of w times the class's
+	 * share of the state's I. Samples: the part of independent_sum that chains spread (erpt). */
 	double classes[PATH_CLASSES];
 	double cpu_seconds; /* not part of the result's bits */
 	uint32_t tile_count;
 	struct tile *tiles;
-	uint32_t state_count; /* chains of the lease, in order of the chain range */
+	uint32_t state_count; /* chains of the lease; states are in the order of its chain range */
 	struct chain_state *states;
-	uint64_t weight_count; /* bootstrap: I of each index in the range, in order */
-	float *weights;
+	uint64_t weight_count; /* bootstrap samples of the lease */
+	float *weights;	       /* I of each, in order of their indices */
 	uint64_t moment_count;
 	float *moments; /* [sequence][tile] first moments, then [tile] second ones; tiles in row-major order */
 };
 
-void batch_fini(struct batch *b);
+void batch_fini(struct batch *b); /* frees the arrays */
 
-/* Checks everything that can be checked without the scene: the key is in the plan; tiles are inside the crop,
- * aligned, unique, in order; values are finite; counts match the plan (COUNT_SAMPLES of a render lease and
- * COUNT_INDEPENDENT of a bootstrap lease exactly); states have sizes that such states can have; weights >= 0; as many
- * strategies as the plan has, none with more proposals than samples; no class and no sequence with more time than its
- * mutations; no tile with a second moment above the first; sums that non-negative numbers can have; counters of the
- * order of the samples. -EBADMSG with a sentence. */
+/* Checks everything that can be checked without the scene:
+ * - the lease exists in the plan;
+ * - tiles are inside the crop, aligned, unique and in order, and their values are finite;
+ * - counts match the plan, COUNT_SAMPLES of a render lease and COUNT_INDEPENDENT of a bootstrap lease exactly, and no
+ *   counter is larger than that many samples can make it;
+ * - chain states have possible sizes, and weights are finite and not negative;
+ * - sums of non-negative terms and of their squares are consistent;
+ * - strategies are as many as in the plan, with at most as many proposals as samples;
+ * - no class and no sequence has more time than mutations, and no tile's second moment is above its first.
+ * Returns 0, or -EBADMSG with a sentence. */
 int batch_check(const struct batch *b, const struct plan *p, struct error *e);
 
 #endif

@@ -1,11 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Adding a batch: find the film of its group and round, reserve its tiles on the disk, add the values as integers on
- * the grid, and record that the batch is merged. With the last batch of a round, its film is added to the prefix and
- * cleared. Integers add exactly, so the order of batches does not matter and a batch can be subtracted again.
+ * Merges batches into films. canvas_add finds the film of the batch's group and round, reserves disk space for its
+ * tiles, adds the pixel values as integers on the grid, and records that the lease is merged. When the last batch of a
+ * round has arrived, close_round adds the round's films to the prefix and clears them for the next round but one.
+ * Integers add exactly, so the order of batches does not matter and canvas_take_back can subtract a batch again.
  *
- * Failures leave the canvas unchanged: -EEXIST and -EAGAIN if the batch is not expected now, -ERANGE if a sum would
- * leave the grid, -ENOSPC if there is no room for a tile.
+ * For each film, `bound` limits the magnitude of its sums. Batches that could push a pixel beyond 2^62 are refused when
+ * they are added, so that closing a round cannot fail.
+ *
+ * Failures leave the canvas unchanged: -EEXIST if the lease is merged already, -EAGAIN if its round is not open,
+ * -ERANGE if a sum would leave the grid, -ENOSPC if the disk has no room for a tile.
  */
 #include "common/film/canvas.h"
 
@@ -23,14 +27,15 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-/* The prefix and both open rounds together stay below 2^62 in every pixel, so closing a round cannot fail. */
+/* The sums of the prefix and both open rounds together stay below 2^62 in every pixel, so closing a round cannot fail.
+ */
 #define SUM_MOST (UINT64_C(1) << 62)
 #define VALUE_MOST 0x1p61
 
 enum {
-	CHAIN_EXPONENT = -32, /* a chain adds about 1 per mutation: 2^30 of them fit into one pixel */
-	SAMPLE_BITS = 28,     /* below a group's mean pixel sum in one round */
-	BLACK_BITS = 40,      /* below the brightest sample */
+	CHAIN_EXPONENT = -32, /* grid of chains: a mutation adds about 1, so that 2^30 mutations fit into one pixel */
+	SAMPLE_BITS = 28,     /* grid of samples: bits below a group's mean pixel sum in one round */
+	BLACK_BITS = 40,      /* if b is not known: bits below the brightest sample */
 	EXPONENT_MOST = 900,
 };
 
@@ -52,6 +57,8 @@ int canvas_grid_exponent(const struct plan *p, double b_pooled, double brightest
 	return exponent < -EXPONENT_MOST ? -EXPONENT_MOST : exponent > EXPONENT_MOST ? EXPONENT_MOST : exponent;
 }
 
+/* Opens a file without a name in the folder: by O_TMPFILE, or where the file system lacks it, by unlinking a new file.
+ */
 static int open_unlinked(const char *folder, struct error *e)
 {
 	int fd = disk_open(folder, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
@@ -73,7 +80,7 @@ static int open_unlinked(const char *folder, struct error *e)
 
 enum { IN_MEMORY = MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE };
 
-/* NULL: an error. */
+/* Maps memory for the films; NULL, with the error set, if there is none. */
 static void *map_films(size_t bytes, int flags, int fd, struct error *e)
 {
 	void *map = mmap(NULL, bytes, PROT_READ | PROT_WRITE, flags, fd, 0);
@@ -198,7 +205,8 @@ static uint32_t *missing_of(const struct canvas *c, const struct lease_key *k)
 	return &c->missing[(size_t)k->group * c->plan.parts + k->part];
 }
 
-/* For a render lease: whether its round is closed, so that its sums are or were in the prefix. */
+/* Returns whether the round of a render lease is closed. Its sums are then in the prefix, unless the batch has been
+ * taken back. */
 static bool is_closed(const struct canvas *c, const struct lease_key *k)
 {
 	return k->epoch < c->rounds;
@@ -249,7 +257,8 @@ uint64_t canvas_missing(const struct canvas *c)
 
 /* ---- pixels */
 
-/* Rounds to the nearest integer, ties to even. Above 2^51 every float is an integer. */
+/* Rounds to the nearest integer, ties to even. Adding 1.5 * 2^52 leaves the integer in the low bits of the mantissa.
+ * From 2^51 on, x is an integer already: it is a float times a power of two. */
 static int64_t round_to_grid(double x)
 {
 	if (fabs(x) < 0x1p51) {
@@ -266,7 +275,8 @@ static size_t tile_values(const struct tile *t)
 	return (size_t)t->width * t->height * TILE_CHANNELS;
 }
 
-/* The largest magnitude: the bits of finite floats without their sign are ordered like the floats. */
+/* Returns the largest magnitude of a value of the tile. Without the sign bit, finite floats are ordered like their bits
+ * read as integers. */
 static float largest_of_tile(const struct tile *t)
 {
 	uint32_t most = 0;
@@ -282,7 +292,7 @@ static float largest_of_tile(const struct tile *t)
 	return value;
 }
 
-/* A generous bound on a filter kernel's largest value: settings bound its radius from below. */
+/* Above the largest value of any filter kernel: a kernel has integral 1, and settings bound its radius from below. */
 #define KERNEL_MOST 0x1p14
 
 int canvas_admits(const struct canvas *c, const struct batch *b, struct error *e)
@@ -302,7 +312,8 @@ int canvas_admits(const struct canvas *c, const struct batch *b, struct error *e
 	return 0;
 }
 
-/* Adds a row, with the scale's sign. Each loop does one thing and has no exit, so the compiler vectorises it. */
+/* Adds v * scale to a row of sums. small: all products are below 2^51. Neither loop has an exit, so that the compiler
+ * vectorises them. */
 static void add_row(int64_t *s, const float *v, size_t count, double scale, bool small)
 {
 	if (small) {
@@ -318,9 +329,9 @@ static void add_row(int64_t *s, const float *v, size_t count, double scale, bool
 	}
 }
 
-/* Adds (sign 1) or subtracts (sign -1) a tile. false: a value is off the grid, and nothing was done. Each |sum| was
- * at most SUM_MOST and a value is less than VALUE_MOST, so the sum does not overflow, and *bound shows if it is too
- * large. */
+/* Adds (sign 1) or subtracts (sign -1) a tile, and raises *bound to the largest resulting |sum|. Returns false, without
+ * any change, if a value is too large for the grid. The sums were at most SUM_MOST and the values are less than
+ * VALUE_MOST, so they cannot overflow here; the caller compares *bound with SUM_MOST. */
 static bool add_tile(const struct canvas *c, int64_t *slot, const struct tile *t, double sign, uint64_t *bound)
 {
 	double most = (double)largest_of_tile(t) * c->scale;
@@ -360,6 +371,7 @@ int canvas_reserve(struct canvas *c, const struct batch *b, struct error *e)
 	return rc;
 }
 
+/* Adds all tiles of a batch to the film of its lease; if one does not fit, subtracts those that were added. */
 static int add_tiles(struct canvas *c, const struct batch *b, struct error *e)
 {
 	size_t prefix = canvas_film(b->key.group, FILM_PREFIX), open = film_of(c, &b->key);
@@ -384,6 +396,7 @@ static int add_tiles(struct canvas *c, const struct batch *b, struct error *e)
 	return error_set(e, ERANGE, "a pixel's sum left the film's range (quantum %g)", c->quantum);
 }
 
+/* Moves the sums of a tile from an open film to the prefix and raises *bound to the prefix's largest |sum|. */
 static void close_tile(struct canvas *c, size_t prefix, size_t open, size_t tile, uint64_t *bound)
 {
 	int64_t *to = canvas_slot(c, prefix, tile), *from = canvas_slot(c, open, tile);
@@ -469,7 +482,7 @@ void canvas_take_back(struct canvas *c, const struct batch *b)
 	assert(k->kind == LEASE_RENDER && canvas_has(c, k));
 	for (uint32_t i = 0; i < b->tile_count; i++) {
 		bool on_grid = add_tile(c, canvas_slot(c, film, tile_index(c, &b->tiles[i])), &b->tiles[i], -1, &bound);
-		assert(on_grid); /* the same as when it was added */
+		assert(on_grid); /* as it was when the batch was added */
 		(void)on_grid;
 	}
 	c->bound[film] = bound > c->bound[film] ? bound : c->bound[film];

@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The merged films of a job: one film per group, sums on an integer grid, so the order of additions does not matter
- * (docs/design.md, rules 1). Batches of round r are added to the open film of r; when the round is complete, its sums
- * move into the prefix. The published image is the prefix of complete rounds. Two rounds may be open: the first
- * incomplete one and the next. Memory: 8 bytes x 3 channels x pixels x groups x 3, in mapped files in `folder`
- * (unlinked at once) or, with folder NULL, in anonymous memory; untouched pages cost nothing. Chains also need the
- * memory of canvas_moments.h: 24 bytes per tile and sequence, 0.5 % of the films with 1,024 chains in 16 groups. One
- * thread at a time.
+ * The merged films of a job: per group, sums on an integer grid, so that the order of additions does not matter
+ * (docs/design.md, rules 1). Batches of round r are added to the open film of round r; when the round is complete, its
+ * sums move into the prefix. The published image is made from the prefix, the sums of all complete rounds. Two rounds
+ * may be open: the first incomplete one and the next.
+ *
+ * Memory: 8 bytes x 3 channels x pixels x groups x 3 films (prefix and two open rounds), in a mapped file in `folder`,
+ * which has no name, or with folder NULL in anonymous memory; untouched pages cost nothing. Chains also need the memory
+ * of canvas_moments.h: 24 bytes per tile and sequence, 0.5 % of the films with 1,024 chains in 16 groups. One thread at
+ * a time.
  */
 #ifndef COMMON_FILM_CANVAS_H
 #define COMMON_FILM_CANVAS_H
@@ -16,48 +18,56 @@
 
 struct canvas;
 
-struct bootstrap_result { /* over all groups, from the weights in index order: see bootstrap_merge */
-	double b[PLAN_MAX_GROUPS];
+/* The result of the bootstrap of all groups, computed from the weights in index order. */
+struct bootstrap_result {
+	double b[PLAN_MAX_GROUPS]; /* by group */
 	double b_pooled;
 	double beyond_share; /* share of the energy in paths too long for the chains' state */
 	bool black; /* no sample carried light. Chains cannot start: the job ends with a black image. Samples continue,
 		       since a small bootstrap proves nothing about many samples */
 };
 
-/* The grid: quantum 2^exponent. Fixed for chains (values are of order 1 per mutation); derived from b for samples. */
+/* Returns the exponent of the grid, whose quantum is 2^exponent: fixed for chains (values are of order 1 per mutation);
+ * for samples derived from b or, if b is 0 or not finite, from the brightest sample. */
 int canvas_grid_exponent(const struct plan *p, double b_pooled, double brightest);
 
+/* Creates an empty canvas. Returns 0, -ENOMEM, or an error of creating or mapping the file in `folder`. */
 int canvas_new(struct canvas **c, const struct plan *p, int grid_exponent, const char *folder, struct error *e);
 void canvas_free(struct canvas *c);
-size_t canvas_bytes(const struct plan *p); /* of its films */
-/* Whether there is room for films in memory: what canvas_new without a folder says after a bootstrap. */
+size_t canvas_bytes(const struct plan *p); /* size of the films */
+/* Returns -ENOMEM if canvas_new would not get the memory for the films, without a folder; otherwise 0. Call it before a
+ * bootstrap whose result would be lost if canvas_new failed after it. */
 int canvas_probe(const struct plan *p, struct error *e);
-bool canvas_is_mapped(const struct canvas *c); /* to a file */
-/* Bytes of that file for which the disk has not given room yet. */
+bool canvas_is_mapped(const struct canvas *c); /* the films are in a mapped file, not in memory */
+/* Returns the bytes of the mapped file for which no disk space is reserved yet; 0 if there is no file. */
 uint64_t canvas_unreserved(const struct canvas *c);
 
-/* Bootstrap batches add only their independent sums. Counters and sums of render batches belong to their round.
- * -EEXIST: merged before; -EAGAIN: the round is not open, or an earlier batch is taken back; -ERANGE: a sum left the
- * grid (the job fails). */
+/* Merges a batch that has passed batch_check. A bootstrap batch adds only its sums of independent samples and path
+ * classes; a render batch adds its pixels, counters and sums to its round. Returns -EEXIST if the lease is merged
+ * already, -EAGAIN if its round is not open or an earlier batch of its (group, part) has been taken back, -ENOSPC or
+ * another error of the disk, or -ERANGE if a sum would leave the grid (the job fails). */
 int canvas_add(struct canvas *c, const struct batch *b, struct error *e);
-/* Takes back the last render batch that was added for a (group, part), exactly as it was added. It may be added
- * again with another content; until then no round is closed. COUNT_LONGEST_STUCK keeps its value. */
+/* Takes back the last render batch that was added for its (group, part); b must be as it was added. A batch of the same
+ * lease may be added later with other contents; until then no round is closed. COUNT_LONGEST_STUCK, a maximum, keeps
+ * its value. */
 void canvas_take_back(struct canvas *c, const struct batch *b);
-uint64_t canvas_missing(const struct canvas *c); /* batches of complete rounds that are taken back */
-/* Checks a render batch first: no pixel may take more than an eighth of the film's range. -EBADMSG for chains, which
- * cannot stay in one pixel for so long; -ERANGE for samples, whose brightness has no bound but exceeds the grid. */
+/* Returns the number of batches of complete rounds that have been taken back and not been added again. */
+uint64_t canvas_missing(const struct canvas *c);
+/* Checks, before canvas_add, that no pixel of a render batch takes more than an eighth of the film's range. Returns
+ * -EBADMSG for chains, which cannot stay in one pixel for so long, and -ERANGE for samples: a sample may be that
+ * bright, but then the grid is too fine. */
 int canvas_admits(const struct canvas *c, const struct batch *b, struct error *e);
 /* Sets the tail index of the independent samples (common/estimate/tail.h), from the bootstrap. */
 void canvas_set_tail(struct canvas *c, double index);
-/* The plan now ends after this many rounds, not fewer than are open. */
+/* Changes the number of rounds after which the plan ends; at least the number of complete ones. */
 void canvas_set_rounds(struct canvas *c, uint64_t rounds);
-/* Reserves disk space for the tiles of a render batch, so that adding it cannot fail for lack of it. -ENOSPC and
- * other errors of the disk. */
+/* Reserves disk space for the tiles of a render batch, so that adding it cannot fail for lack of space. Returns 0,
+ * -ENOSPC or another error of the disk. */
 int canvas_reserve(struct canvas *c, const struct batch *b, struct error *e);
-bool canvas_has(const struct canvas *c, const struct lease_key *k); /* merged before */
-uint64_t canvas_rounds(const struct canvas *c);			    /* complete rounds */
+bool canvas_has(const struct canvas *c, const struct lease_key *k); /* the lease is merged */
+uint64_t canvas_rounds(const struct canvas *c);			    /* number of complete rounds */
 
-/* The counts of the prefix of complete rounds; with open_rounds, of everything received. */
+/* Returns the counts of the prefix of complete rounds; with open_rounds, of everything merged. */
 void canvas_counts(const struct canvas *c, bool open_rounds, struct canvas_counts *out);
 
 #endif

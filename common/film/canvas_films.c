@@ -5,7 +5,8 @@
 
 #include <string.h>
 
-/* A page of a sparse file that the disk has no room for would be a signal, not an error: reserve before touching. */
+/* Touching a page of a sparse file for which the disk has no room raises SIGBUS. Reserving the space first turns this
+ * into an error. */
 int canvas_back_tile(struct canvas *c, size_t film, size_t tile, struct error *e)
 {
 	uint8_t *flags = canvas_flags(c, film, tile);

@@ -65,6 +65,7 @@ int moments_fit(const struct moments *m, const struct lease_key *k, struct error
 			 (unsigned long long)epochs);
 }
 
+/* Adds (sign 1) or subtracts (sign -1) moments, rounded to the grid. */
 static void add_grid(int64_t *to, const float *from, size_t count, int sign)
 {
 	for (size_t i = 0; i < count; i++)
@@ -106,7 +107,7 @@ void moments_take_back(struct moments *m, const struct batch *b, bool closed)
 	add_render(m, b, closed, -1);
 }
 
-/* Zeros are not added, so their pages stay untouched. */
+/* Adds `from` to `to` and clears it. Zeros are skipped, so that untouched pages stay untouched. */
 static void move_grid(int64_t *to, int64_t *from, size_t count)
 {
 	for (size_t i = 0; i < count; i++)
@@ -130,7 +131,7 @@ void moments_close_round(struct moments *m, uint64_t round)
 
 /* ---- files */
 
-/* Runs of a film's tiles, or of an exact sum's words. */
+/* Saves `count` runs of `run` numbers each: the tiles of a film, or the words of an exact sum. */
 static int save_runs(struct checked_file *out, const void *numbers, size_t run, size_t count, struct error *e)
 {
 	int rc = 0;

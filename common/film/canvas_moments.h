@@ -6,8 +6,9 @@
  * not matter. Memory: 24 bytes per sequence and tile, 24 per lease and tile; untouched pages cost nothing. One thread
  * at a time.
  *
- * In a file, numbers little endian: sequences of a lease S, leases L, tiles T, classes C, 4 bytes each; then runs. A
- * run is one byte, 0: all of its numbers are zero, none follow; otherwise they do, 8 bytes each:
+ * File format, numbers little endian: the sequences per lease S, leases per round L, tiles T and classes C, 4 bytes
+ * each, then runs of numbers (G: groups). A run begins with one byte: 0 if all its numbers are 0, and then they are
+ * left out; otherwise the numbers follow, 8 bytes each.
  *
  * runs    numbers  contents
  * 3 L S   T        first moments: prefix, open rounds of even and odd number; lease; sequence
@@ -26,16 +27,18 @@ struct moments;
 int moments_new(struct moments **m, const struct plan *p, struct error *e);
 void moments_free(struct moments *m);
 
-/* -ERANGE: after this many rounds a sum could leave the grid. Call it before moments_add, which cannot fail. */
+/* Returns -ERANGE if a sum could leave the grid after the lease's epoch. Call it before moments_add, which cannot fail.
+ */
 int moments_fit(const struct moments *m, const struct lease_key *k, struct error *e);
-/* closed: add to the prefix. */
+/* Adds a batch. closed: the round of its lease is complete, so it is added to the prefix. */
 void moments_add(struct moments *m, const struct batch *b, bool closed);
-void moments_take_back(struct moments *m, const struct batch *b,
-		       bool closed); /* for a render lease; b as it was added */
+/* Subtracts a render batch; b must be as it was added. */
+void moments_take_back(struct moments *m, const struct batch *b, bool closed);
+/* Moves the sums of an open round into the prefix. */
 void moments_close_round(struct moments *m, uint64_t round);
 
 int moments_save(const struct moments *m, struct checked_file *out, struct error *e);
-int moments_load(struct moments *m, struct checked_file *in,
-		 struct error *e); /* loads into new moments of the same plan */
+/* Loads into new moments of the same plan; -EBADMSG if the file belongs to another plan. */
+int moments_load(struct moments *m, struct checked_file *in, struct error *e);
 
 #endif

@@ -13,10 +13,10 @@ enum {
 	TALLY = sizeof(uint64_t) *
 		(BATCH_COUNTERS + BATCH_STRATEGIES * STRATEGY_COUNTERS + PLAN_MAX_GROUPS * (2 + 2 * EXACT_SUM_WORDS))
 };
-/* Where numbers are in the head that belong to the build, and not to the plan. */
+/* Offsets in the head of the numbers that depend on the build, not on the plan. */
 enum { AT_VERSION = 0, AT_TALLY = 4, AT_SLOT = 28 };
 
-/* What must be equal for a file to be loaded. */
+/* Writes the head, which must be equal in the file and in the canvas that loads it. */
 static void pack_head(const struct canvas *c, unsigned char bytes[HEAD])
 {
 	put32(bytes + AT_VERSION, VERSION);
@@ -40,12 +40,12 @@ static size_t has_bytes(const struct canvas *c)
 	return (size_t)(1 + OPEN_ROUNDS) * c->plan.groups * c->plan.parts;
 }
 
-/* ---- everything but the pixels: writing and reading go through the same list */
+/* ---- everything but pixels and moments; the same functions write and read, so that the order is the same */
 
 struct transfer {
 	struct checked_file *file;
 	bool writes;
-	int rc; /* of the first that failed; none follows */
+	int rc; /* the first error; nothing is transferred after it */
 	struct error *e;
 };
 
@@ -87,7 +87,7 @@ static int transfer_all(struct transfer *t, struct canvas *c)
 	return t->rc;
 }
 
-/* ---- */
+/* ---- pixels */
 
 static int write_place(struct checked_file *out, uint32_t film, uint32_t tile, struct error *e)
 {
@@ -115,7 +115,7 @@ static int save_tiles(const struct canvas *c, struct checked_file *out, struct e
 int canvas_save(const struct canvas *c, struct checked_file *out, struct error *e)
 {
 	unsigned char head[HEAD];
-	struct canvas copy = *c; /* only read */
+	struct canvas copy = *c; /* transfer_all takes a canvas that it could write to; it only reads this one */
 	assert(canvas_missing(c) == 0);
 	pack_head(c, head);
 	int rc = checked_file_write(out, head, sizeof head, e);
@@ -126,7 +126,9 @@ int canvas_save(const struct canvas *c, struct checked_file *out, struct error *
 	return rc ? rc : save_tiles(c, out, e);
 }
 
-/* With a count that never reaches the number of all leases, its round would stay open for ever. */
+/* Checks the counts of merged leases against the flags of the leases: with a wrong count, a round would never be
+ * closed.
+ */
 static int check_merged(const struct canvas *c, struct error *e)
 {
 	uint32_t leases = c->plan.groups * c->plan.parts, merged[1 + OPEN_ROUNDS] = {0};
@@ -152,7 +154,7 @@ static int load_tiles(struct canvas *c, struct checked_file *in, struct error *e
 		if (film >= films_of(c) || tile >= canvas_tiles(c))
 			return error_set(e, EBADMSG, "a tile that the films do not have");
 		rc = canvas_back_tile(c, film, tile, e);
-		/* Closing a round moves it into the prefix, so room for that is reserved now. */
+		/* Closing the round will move the tile into the prefix, so space for that is reserved now. */
 		if (!rc)
 			rc = canvas_back_tile(c, canvas_film(film / FILMS, FILM_PREFIX), tile, e);
 		if (!rc)

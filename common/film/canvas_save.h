@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Saves a canvas to a file and loads it, open rounds included: adding the same batches to both gives the same bits.
- * Untouched tiles take no space. One thread at a time.
+ * Saves a canvas to a file and loads it, open rounds included: a loaded canvas gives the same bits as the saved one
+ * when the same batches are added to both. Untouched tiles take no space. One thread at a time.
  *
- * Version 2, all numbers little endian (common/base/checked_file.h). G groups, P parts, a film is canvas_film(), a tile
- * is numbered row by row:
+ * Version 2, all numbers little endian (common/base/checked_file.h). G: groups, P: parts. Films are numbered as by
+ * canvas_film(), tiles row by row.
  *
  * offset  bytes      contents
  * 0       4          version
@@ -22,11 +22,11 @@
  *         8          tail index of the bootstrap, a double
  *                    moments (canvas_moments.h)
  *         98312 each the tiles that were touched: film and tile, 4 bytes each, then the sums, 8 bytes each
- *         8          the end: all bits set
+ *         8          the end of the tiles: all bits set
  *
- * A tally is numbers of 8 bytes: the counters, the counters of each strategy, then for each of 64 groups the samples,
- * the independent samples, and two exact sums of 36 words each, least significant first. Numbers are those of the enums
- * in batch.h: another number of them is another version.
+ * A tally is a list of 8-byte numbers: the counters, the counters of each strategy, then for each of 64 groups the
+ * samples, the independent samples, and two exact sums of 36 words each, least significant first. Counters are in the
+ * order of the enums in batch.h; adding one to an enum changes the format and needs a new version.
  */
 #ifndef COMMON_FILM_CANVAS_SAVE_H
 #define COMMON_FILM_CANVAS_SAVE_H
@@ -34,9 +34,10 @@
 #include "common/base/checked_file.h"
 #include "common/film/canvas.h"
 
+/* Saves a canvas from which no batch of a complete round is taken back (canvas_missing() is 0). */
 int canvas_save(const struct canvas *c, struct checked_file *out, struct error *e);
-/* Loads into a new canvas of the same plan and grid. -EBADMSG: it is of another one; -EPROTO: of another version.
- * The canvas is unusable after an error. */
+/* Loads into a new canvas of the same plan and grid. Returns -EBADMSG if the file is of another plan or grid or
+ * damaged, -EPROTO if it is of another version. The canvas is unusable after an error. */
 int canvas_load(struct canvas *c, struct checked_file *in, struct error *e);
 
 #endif

@@ -6,7 +6,7 @@
 
 enum { MANTISSA_BITS = 52, EXPONENT_MASK = 0x7ff, UNIT_EXPONENT = -1074 };
 
-/* word[i...] += value, with carry. */
+/* Adds value to word i and carries into the following words. */
 static void add_at(struct exact_sum *s, int i, uint64_t value)
 {
 	while (value && i < EXACT_SUM_WORDS) {
@@ -69,6 +69,7 @@ static bool bit_at(const uint64_t *w, int position)
 	return w[position / 64] >> (position % 64) & 1;
 }
 
+/* Returns whether any bit below the position is set. */
 static bool any_below(const uint64_t *w, int position)
 {
 	for (int i = 0; i < position / 64; i++)

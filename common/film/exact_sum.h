@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A sum of doubles without rounding: the same in any order (a Kulisch accumulator: 64-bit words over the whole range of
- * double). Infinities and NaN are refused; the caller counts them. No allocation.
+ * A sum of doubles without rounding, and therefore independent of the order: a Kulisch accumulator, 64-bit words that
+ * cover the whole range of double. Infinities and NaN are refused. No allocation.
  */
 #ifndef COMMON_FILM_EXACT_SUM_H
 #define COMMON_FILM_EXACT_SUM_H
@@ -15,7 +15,7 @@ struct exact_sum {
 	uint64_t word[EXACT_SUM_WORDS]; /* two's complement, least significant first, unit 2^-1074 */
 };
 
-bool exact_sum_add(struct exact_sum *s, double x); /* false: x is not finite */
+bool exact_sum_add(struct exact_sum *s, double x); /* false, and no change, if x is not finite */
 void exact_sum_merge(struct exact_sum *s, const struct exact_sum *other);
 double exact_sum_value(const struct exact_sum *s); /* rounded once, to nearest even */
 

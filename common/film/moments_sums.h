@@ -7,13 +7,15 @@
 #include "common/film/path_class.h"
 #include "common/plan/plan.h"
 
+/* The sets of sums: the prefix, then the open rounds of even and odd number. */
 enum { MOMENTS_PREFIX, MOMENTS_OPEN, MOMENTS_SETS = 3 };
 
-/* First moments are times, at most the number of mutations: the chains of one lease make at most 2^42. */
+/* Moments are stored in units of 1 / MOMENTS_GRID. They are at most the number of mutations, 2^42 for the chains of one
+ * lease (moments_fit), so that sums stay below 2^62. */
 #define MOMENTS_GRID 0x1p20
 struct moments {
 	struct plan plan;
-	uint32_t per_lease, leases, tiles; /* sequences of a lease; leases of a round */
+	uint32_t per_lease, leases, tiles; /* sequences per lease, leases per round, tiles of the crop */
 	int64_t *first;			   /* [set][lease][sequence][tile] */
 	int64_t *second;		   /* [set][lease][tile] */
 	struct exact_sum *time;		   /* [set][group][class] */

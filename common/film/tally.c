@@ -44,7 +44,7 @@ void tally_add(struct tally *t, const struct batch *b)
 	(void)finite;
 }
 
-/* COUNT_LONGEST_STUCK is a maximum, which cannot be subtracted from. */
+/* COUNT_LONGEST_STUCK is left as it is: nothing can be subtracted from a maximum. */
 void tally_take_back(struct tally *t, const struct batch *b)
 {
 	uint32_t g = b->key.group;
@@ -57,7 +57,7 @@ void tally_take_back(struct tally *t, const struct batch *b)
 	t->group[g].independent -= b->counters[COUNT_INDEPENDENT];
 	bool finite = exact_sum_add(&t->group[g].sum, -b->independent_sum) &&
 		      exact_sum_add(&t->group[g].beyond, -b->beyond_sum);
-	assert(finite); /* the same as when it was added */
+	assert(finite); /* as when the batch was added */
 	(void)finite;
 }
 

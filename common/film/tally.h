@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The sums of what batches contain besides pixels: counters, and by group the samples and the independent samples of b.
- * Sums are exact, so the order does not matter and a batch can be subtracted. Pure.
+ * The sums of the contents of batches other than pixels and moments: counters and, by group, the numbers of samples and
+ * of independent samples and the sums from which b is estimated. Sums are exact, so the order does not matter and a
+ * batch can be subtracted. Pure.
  */
 #ifndef COMMON_FILM_TALLY_H
 #define COMMON_FILM_TALLY_H
@@ -9,7 +10,7 @@
 #include "common/film/batch.h"
 #include "common/film/exact_sum.h"
 
-/* Sums over render batches, each merged once; COUNT_LONGEST_STUCK is their maximum. Strategies that the plan's
+/* Sums of the counters of batches; COUNT_LONGEST_STUCK is their maximum. The counters of strategies that the plan's
  * mixture does not have are 0. */
 struct canvas_counts {
 	uint64_t counters[BATCH_COUNTERS];
@@ -21,14 +22,14 @@ void canvas_counts_add(struct canvas_counts *to, const struct canvas_counts *fro
 struct tally {
 	struct canvas_counts counts;
 	struct {
-		uint64_t samples, independent;
-		struct exact_sum sum, beyond;
+		uint64_t samples, independent; /* sums of COUNT_SAMPLES and COUNT_INDEPENDENT */
+		struct exact_sum sum, beyond;  /* sums of independent_sum and beyond_sum */
 	} group[PLAN_MAX_GROUPS];
 };
 
 void tally_add(struct tally *t, const struct batch *b);
-void tally_take_back(struct tally *t,
-		     const struct batch *b); /* the same as when it was added; COUNT_LONGEST_STUCK keeps its value */
+/* Subtracts a batch, which must be as it was added. COUNT_LONGEST_STUCK keeps its value. */
+void tally_take_back(struct tally *t, const struct batch *b);
 void tally_merge(struct tally *to, const struct tally *from, uint32_t groups);
 
 #endif
