@@ -1,8 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The inside of struct canvas, for those who add to it here and those who make images of it (common/estimate).
- * A film holds one slot of TILE_SIZE x TILE_SIZE x 3 integers per tile of the crop, so that a tile that nothing touched
- * is a run of pages that nothing touched. Film `group * FILMS + which`; which: the prefix, or the open round's parity.
+ * The contents of struct canvas, for the sources of this folder, which add to it, and of common/estimate, which make
+ * images from it.
+ *
+ * Each group has FILMS films: the prefix (FILM_PREFIX) and the open rounds of even and odd number (FILM_OPEN + parity);
+ * film `which` of a group has the index group * FILMS + which. A film holds one slot of TILE_SIZE x TILE_SIZE x 3
+ * integers per tile of the crop, so that a tile without light is a run of untouched pages.
  */
 #ifndef COMMON_FILM_CANVAS_FILMS_H
 #define COMMON_FILM_CANVAS_FILMS_H
@@ -19,27 +22,30 @@ enum {
 	SLOT = TILE_SIZE * SLOT_ROW,
 	OPEN_ROUNDS = 2
 };
-enum tile_flag { TILE_BACKED = 1, TILE_USED = 2 };
+enum tile_flag {
+	TILE_BACKED = 1, /* its disk space is reserved */
+	TILE_USED = 2,	 /* something has been added to it */
+};
 
 struct canvas {
 	struct plan plan;
 	double scale, quantum; /* 2^-exponent and its inverse */
 	uint32_t tiles_across, tiles_down;
-	int64_t *sums;
-	size_t bytes;
-	int fd;			      /* -1: anonymous */
+	int64_t *sums;		      /* [film][tile][SLOT] */
+	size_t bytes;		      /* of the sums */
+	int fd;			      /* the file of the sums; -1: anonymous memory */
 	uint8_t *flags;		      /* [film][tile] of enum tile_flag */
-	uint64_t *bound;	      /* [film]: no |sum| of the film is above */
-	uint64_t rounds;	      /* complete */
-	uint32_t merged[OPEN_ROUNDS]; /* leases of an open round, by its parity */
-	uint8_t *has;		      /* [bootstrap, open parity 0, 1][group][part] */
-	uint32_t *missing; /* [group][part]: so many of the last complete rounds lack its batch, which was taken back */
+	uint64_t *bound;	      /* [film]: at least the largest |sum| of the film */
+	uint64_t rounds;	      /* number of complete rounds */
+	uint32_t merged[OPEN_ROUNDS]; /* number of merged leases of the open rounds, by parity */
+	uint8_t *has;		      /* 1: merged; [bootstrap, open round of parity 0, of parity 1][group][part] */
+	uint32_t *missing;	      /* [group][part]: number of the last complete rounds whose batch was taken back */
 	struct tally prefix, open[OPEN_ROUNDS], bootstrap;
-	double b_tail; /* 0: not known */
+	double b_tail; /* tail index of the bootstrap; 0: not known */
 	struct moments *moments;
 };
 
-/* Reserves its place on the disk, before it is touched. */
+/* Reserves disk space for a tile of a film; must be called before the tile is touched. Returns 0 or -errno. */
 int canvas_back_tile(struct canvas *c, size_t film, size_t tile, struct error *e);
 
 static inline size_t canvas_tiles(const struct canvas *c)
