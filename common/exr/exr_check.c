@@ -23,7 +23,7 @@ static int check_channels(const exr_attr_chlist_t *list, struct exr_image *img, 
 	return 0;
 }
 
-/* The bytes of a pixel in all channels, before compression. */
+/* Returns the bytes of a pixel in all channels, before compression. */
 static int64_t pixel_bytes(const exr_attr_chlist_t *list)
 {
 	int64_t sum = 0;
@@ -79,8 +79,8 @@ int exr_check(exr_context_t x, const struct exr_stream *s, const struct exr_limi
 				 (long long)height);
 	img->width = (uint32_t)width;
 	img->height = (uint32_t)height;
-	/* Windows that begin left of or above the display window cannot be expressed by unsigned numbers; only the
-	 * size is reported. */
+	/* The position of a data window that begins left of or above the display window is lost: it would be negative.
+	 */
 	int64_t dx = (int64_t)data.min.x - display.min.x, dy = (int64_t)data.min.y - display.min.y;
 	img->x = dx > 0 ? (uint32_t)dx : 0;
 	img->y = dy > 0 ? (uint32_t)dy : 0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What a foreign EXR file's header promises, before anything is allocated or decoded. Private to this folder. */
+/* Checks the header of a foreign EXR file before anything is allocated or decoded. Private to this folder. */
 #ifndef COMMON_EXR_EXR_CHECK_H
 #define COMMON_EXR_EXR_CHECK_H
 
@@ -9,14 +9,15 @@
 #include <stdbool.h>
 
 struct exr_limits {
-	int64_t bytes;	   /* of all planes as floats */
-	int64_t inflation; /* bytes of pixels that one byte of the file can represent */
+	int64_t bytes;	   /* most bytes of all planes, as floats */
+	int64_t inflation; /* most bytes of pixels that one byte of the file can represent */
 };
 
 bool exr_is_dwa(exr_compression_t c);
 
-/* One flat part of at most these limits, which the file can hold: its sizes and channels into img, whose planes stay
- * NULL. -EBADMSG, -EFBIG. */
+/* Accepts a file of one flat part within the limits, and long enough for its number of pixels. Stores sizes, channels
+ * and primaries in img, whose planes stay NULL, and whether the part is tiled. Returns 0, -EFBIG if the planes would
+ * exceed most->bytes, or -EBADMSG. */
 int exr_check(exr_context_t x, const struct exr_stream *s, const struct exr_limits *most, struct exr_image *img,
 	      bool *tiled, struct error *e);
 

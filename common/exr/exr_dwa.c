@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * OpenEXRCore checks the header and copies the compressed chunks into a file with a header of ours, so that OpenEXR's
- * C++ library, which believes sizes in headers, never sees a foreign one. That file is in memory, but has a name,
- * because the RGBA interface opens files by name; it decodes some rows at a time.
+ * Reads DWA-compressed images with OpenEXR's C++ library. That library trusts the sizes in headers, so it never gets to
+ * see a foreign header: OpenEXRCore reads and checks the file, writes a new header, and copies the compressed chunks
+ * behind it unchanged. The new file is in memory (memfd), but is opened as /proc/self/fd/N, because the library's C
+ * interface (ImfCRgbaFile.h) opens files by name. It decodes 256 rows at a time.
  *
- * Failures: what exr_check refuses, images without R, G and B, or Y, chunks larger than the file, and what OpenEXR
- * refuses, all with a sentence.
+ * Refused with a sentence: whatever exr_check refuses, images with neither R, G and B nor Y, chunks larger than the
+ * file, and whatever OpenEXR refuses.
  */
 #include "common/exr/exr_dwa.h"
 
@@ -21,13 +22,13 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-/* Of 64 numbers that are all the same, DWA stores one, and deflate compresses it. */
+/* DWA stores one number for a block of 64 equal ones, and deflate then compresses by up to 1032. */
 #define INFLATION_MOST (INT64_C(64) * 1032)
-/* DWAB compresses 256 rows at a time, DWAA 32, and the library has room for a whole such chunk, or tile, even if the
- * image has less. */
+/* DWAB compresses 256 rows at a time, DWAA 32. The library allocates memory for a whole chunk or tile even if the image
+ * is smaller, so the size of chunks is bounded. */
 enum { ROWS = 256, CHUNK_PIXELS_MOST = 1 << 25 };
 
-/* OpenEXR's C interface keeps its last message in one place. */
+/* OpenEXR's C interface keeps its last error message in a global variable. */
 static pthread_mutex_t one_at_a_time = PTHREAD_MUTEX_INITIALIZER;
 
 static int refused(struct error *e)
@@ -40,7 +41,7 @@ static bool has_channel(const struct exr_image *img, const char *name)
 	return exr_channel(img, name) < EXR_CHANNELS_MOST;
 }
 
-/* Only the planes that are read. */
+/* Replaces the channels of img by R, G and B, or Y, and allocates their planes. */
 static int choose_channels(struct exr_image *img, struct error *e)
 {
 	static const char *const rgb[3] = {"R", "G", "B"};
@@ -83,7 +84,8 @@ static exr_result_t write_header(exr_context_t from, exr_context_t to, const str
 	return rc == EXR_ERR_SUCCESS ? exr_write_header(to) : rc;
 }
 
-/* The compressed bytes of a chunk; mem_alloc'd. most: of the file. */
+/* Reads the compressed bytes of a chunk into new memory, which the caller frees also after an error. most: the size of
+ * the file, which no chunk can exceed. */
 static exr_result_t read_packed(exr_context_t from, const exr_chunk_info_t *chunk, size_t most, void **packed)
 {
 	if (chunk->packed_size > most)
@@ -132,7 +134,9 @@ static exr_result_t copy_tiles(exr_context_t from, exr_context_t to, const struc
 	return rc;
 }
 
-/* A file with the same pixels from (0, 0) on; mem_alloc'd. */
+/* Writes a file with the same compressed pixels, but a data window that begins at (0, 0). *bytes is freed with
+ * mem_free.
+ */
 static int rewrite_file(exr_context_t from, size_t most, const struct exr_image *img, bool tiled, unsigned char **bytes,
 			size_t *size, struct error *e)
 {
@@ -186,7 +190,8 @@ static int memory_file(const unsigned char *bytes, size_t size, struct error *e)
 	return error_set(e, ENOMEM, "no memory for an EXR file");
 }
 
-/* rows: room for up to ROWS rows. The interface wants the address that pixel (0, 0) would have. */
+/* Decodes into the planes. rows: a buffer for up to ROWS rows; the library takes the address that pixel (0, 0) of the
+ * image would have. */
 static int read_rows(ImfInputFile *in, ImfRgba *rows, struct exr_image *img, struct error *e)
 {
 	for (uint32_t y = 0; y < img->height; y += ROWS) {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Builds the header with OpenEXRCore and compresses chunk by chunk, storing chunks raw if compression would enlarge
- * them.
+ * Writes images as EXR files in memory: OpenEXRCore builds the header and compresses the pixels chunk by chunk; chunks
+ * that compression would enlarge are stored raw.
  */
 #include "common/exr/exr_image.h"
 
@@ -16,7 +16,7 @@ void exr_image_fini(struct exr_image *img)
 	for (uint32_t c = 0; c < EXR_CHANNELS_MOST; c++)
 		mem_free(img->planes[c]);
 	for (size_t i = 0; img->attributes && i < img->attribute_count; i++) {
-		char *name, *string; /* owned, const for readers only */
+		char *name, *string; /* const in struct exr_attribute, but owned by an image that was read */
 		memcpy(&name, &img->attributes[i].name, sizeof name);
 		memcpy(&string, &img->attributes[i].string, sizeof string);
 		mem_free(name);
@@ -63,8 +63,8 @@ const float *exr_plane(const struct exr_image *img, const char *name)
 	return c < EXR_CHANNELS_MOST ? img->planes[c] : NULL;
 }
 
-/* Attributes for any viewer: who wrote the file, and that the colours are those of ITU-R BT.709, linear, white D65
- * (color.h). */
+/* Writes standard attributes: the program that wrote the file and, if there are colours, the primaries of ITU-R BT.709
+ * with white D65 (color.h). */
 static exr_result_t write_origin(exr_context_t x, const struct exr_image *img)
 {
 	static const exr_attr_chromaticities_t bt709 = {0.64f, 0.33f, 0.30f, 0.60f, 0.15f, 0.06f, 0.3127f, 0.3290f};
@@ -94,12 +94,13 @@ static exr_result_t write_header(exr_context_t x, const struct exr_image *img)
 }
 
 struct compressor {
-	exr_result_t (*run)(exr_encode_pipeline_t *encode); /* the library's own attributes */
+	exr_result_t (*run)(exr_encode_pipeline_t *encode); /* the library's function for the file's compression */
 };
 
 /*
- * A chunk whose stored size equals the size of its pixels is read as raw. OpenEXRCore 3.1.5 stores raw only what
- * deflate enlarges, so deflated data of exactly that size would be taken for pixels.
+ * Compresses a chunk, or leaves it raw. Readers take a chunk for raw if its stored size equals the size of its pixels.
+ * OpenEXRCore 3.1.5 stores a chunk raw only if deflate enlarges it; if deflate's output has exactly the size of the
+ * pixels, readers would take it for pixels. Such a chunk is stored raw here.
  */
 static exr_result_t compress_or_store(exr_encode_pipeline_t *encode)
 {

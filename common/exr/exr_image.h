@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Images as OpenEXR files in memory: R G B float (and error.R,G,B), ZIP, scan lines. Any thread.
+ * Images as OpenEXR files in memory: named channels of floats, written as scan lines with ZIP compression. Any thread.
  */
 #ifndef COMMON_EXR_EXR_IMAGE_H
 #define COMMON_EXR_EXR_IMAGE_H
@@ -14,7 +14,8 @@
 enum { EXR_CHANNELS_MOST = 16 };
 #define EXR_PIXELS_MOST (INT64_C(1) << 28)
 
-struct exr_attribute { /* header attributes "hslt:..."; see header.h for the table of names and types */
+/* A header attribute "hslt:..."; header_list.h has the table of names and types. */
+struct exr_attribute {
 	const char *name;
 	enum { EXR_ATTRIBUTE_STRING, EXR_ATTRIBUTE_DOUBLE, EXR_ATTRIBUTE_INT } type;
 	const char *string;
@@ -24,23 +25,26 @@ struct exr_attribute { /* header attributes "hslt:..."; see header.h for the tab
 
 struct exr_image {
 	uint32_t width, height, channel_count;
-	uint32_t full_width, full_height, x, y; /* the display window, and the data window's corner */
-	char names[EXR_CHANNELS_MOST][32];	/* "R", "error.G", sorted by the library */
+	uint32_t full_width, full_height, x, y; /* the display window, and the data window's corner in it */
+	char names[EXR_CHANNELS_MOST][32];	/* "R", "error.G"; the library sorts the channels of a file by name */
 	float *planes[EXR_CHANNELS_MOST];	/* [height][width] each */
-	bool has_primaries;			/* when read: the header says what R, G and B are */
+	bool has_primaries;			/* after reading: the header defines the primaries */
 	float primaries[8];			/* CIE 1931 x, y of red, green, blue and white, as stored */
 	size_t attribute_count;
-	struct exr_attribute *attributes; /* when read: all hslt:* attributes of these types; owned */
+	struct exr_attribute *attributes; /* after reading: all hslt:* attributes of a known type; owned */
 };
 
-/* The index of the channel with this name; EXR_CHANNELS_MOST: no such channel. */
+/* Returns the index of a channel; EXR_CHANNELS_MOST if there is none of this name. */
 uint32_t exr_channel(const struct exr_image *img, const char *name);
-const float *exr_plane(const struct exr_image *img, const char *name); /* NULL: no such channel */
-/* NULL: no such attribute */
+/* Returns the plane of a channel; NULL if there is none of this name. */
+const float *exr_plane(const struct exr_image *img, const char *name);
+/* Returns an attribute; NULL if there is none of this name. */
 const struct exr_attribute *exr_attribute_find(const struct exr_image *img, const char *name);
 
-/* bytes are mem_alloc'd; free them with mem_free. */
+/* Encodes the image; *bytes is freed with mem_free. Returns 0, -EINVAL for a size or number of channels that cannot be
+ * written, or -ENOMEM. */
 int exr_write(const struct exr_image *img, unsigned char **bytes, size_t *size, struct error *e);
+/* Frees planes and attributes. */
 void exr_image_fini(struct exr_image *img);
 
 #endif

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Checks the header against the file's size before it allocates, then decodes chunks directly into the planes of the
- * channels.
+ * Reads EXR files from memory with OpenEXRCore: checks the header against the file's size before anything is allocated
+ * (exr_check), then decodes the chunks directly into the planes of the channels, then reads the attributes hslt:*.
  *
- * Failures: anything that OpenEXR refuses, headers that promise more pixels than the bytes can hold, channels other
- * than floats, halves and integers, tiles with levels, deep data. All are -EBADMSG or -ENOTSUP with a sentence, and
- * nothing is kept.
+ * Failures: anything that OpenEXR refuses, and whatever exr_check refuses, such as deep data or a header with more
+ * pixels than the file can hold, are -EBADMSG; planes beyond the caller's limit are -EFBIG, DWA compression is
+ * -ENOTSUP. All come with a sentence, and the image is left empty.
  */
 #include "common/exr/exr_read.h"
 
@@ -15,7 +15,7 @@
 #include <string.h>
 
 enum { ATTRIBUTES_MOST = 256 };
-/* Bytes of pixels that one byte of the file can represent: deflate's 1032, times 4/3 because PXR24 drops every
+/* Most bytes of pixels that one byte of the file can represent: deflate's 1032, times 4/3 because PXR24 drops every
  * fourth byte. */
 #define INFLATION_MOST INT64_C(1376)
 #define ATTRIBUTE_PREFIX "hslt:"

@@ -69,8 +69,8 @@ static int64_t write_at(exr_const_context_t x, void *user, const void *from, uin
 static exr_context_initializer_t initializer(struct exr_stream *s)
 {
 	exr_context_initializer_t i = EXR_DEFAULT_CONTEXT_INITIALIZER;
-	/* The library keeps its own allocator: 3.1.5 deadlocks if the allocation of an attribute fails, so tests
-	 * cannot make it run out of memory. */
+	/* The library uses its own allocator, not mem.h: tests make allocations of mem.h fail, and OpenEXRCore 3.1.5
+	 * deadlocks if the allocation of an attribute fails. */
 	i.error_handler_fn = keep_message;
 	i.user_data = s;
 	i.max_image_width = i.max_image_height = EXR_MAX_SIDE;

@@ -33,7 +33,7 @@ static exr_result_t write_header(exr_context_t x, const struct tile *t, uint32_t
 	return rc == EXR_ERR_SUCCESS ? exr_write_header(x) : rc;
 }
 
-/* The file holds a row of X, a row of Y, a row of Z, then the next row; little endian. */
+/* Converts from [row][pixel][channel] to the file's [row][channel][pixel], little endian. */
 static void pack(const struct tile *t, float *to)
 {
 	size_t width = t->width;
@@ -46,6 +46,7 @@ static void pack(const struct tile *t, float *to)
 	}
 }
 
+/* The inverse of pack. */
 static void unpack(const unsigned char *from, const struct tile *t)
 {
 	float line[TILE_CHANNELS][TILE_SIZE];
@@ -81,7 +82,8 @@ int exr_tile_write(const struct tile *t, uint32_t full_width, uint32_t full_heig
 	return exr_close_write(&x, &s, written, bytes, size, e);
 }
 
-/* Refuses anything that exr_tile_write does not produce, before decoding. */
+/* Checks that the header is one that exr_tile_write produces. Returns NULL and sets the place and size of *t, or
+ * returns the reason for refusing the file. */
 static const char *check_header(exr_context_t x, uint32_t full_width, uint32_t full_height, struct tile *t)
 {
 	int parts;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * header_fill goes through plan, result and extras in the order of header_list.h, and makes an attribute of each value
- * that is there. Text goes into one buffer of fixed size; what does not fit is cut at its end, which is not an error.
- * Nothing fails.
+ * header_fill goes through the plan, the result and the extra values, and adds an attribute for each value that is
+ * known. Names and types come from header_list.h. All strings are stored in one buffer of fixed size; strings that do
+ * not fit are cut, which is not an error. Nothing here fails.
  */
 #include "common/exr/header.h"
 

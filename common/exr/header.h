@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The header attributes "hslt:..." of an image, in one table: name, type, meaning. EXR has no 64-bit integer, so counts
- * are strings of decimal digits. The coordinator and hslt-render fill them in with the same function, so equal images
- * have equal headers, except for the attributes marked `excluded`, which say how the image was made.
+ * The header attributes "hslt:..." of an image, in one table: name, type, meaning. EXR has no 64-bit integers, so
+ * counts are strings of decimal digits. The coordinator and hslt-render fill them in with the same function, so equal
+ * images have equal headers, except for attributes marked `excluded`, which may differ between runs with the same plan
+ * (times, workers, date).
  */
 #ifndef COMMON_EXR_HEADER_H
 #define COMMON_EXR_HEADER_H
@@ -14,15 +15,17 @@
 
 struct header_row {
 	const char *name;
-	int type; /* of enum in struct exr_attribute */
-	bool excluded;
+	int type;      /* EXR_ATTRIBUTE_... of struct exr_attribute */
+	bool excluded; /* ignored by hslt-compare --exact */
 	const char *meaning;
 };
 extern const struct header_row header_rows[]; /* ends with a NULL name */
 
-bool header_excluded(const char *name); /* hslt-compare --exact ignores it */
+/* Returns `excluded` of the attribute; false for unknown names. */
+bool header_excluded(const char *name);
 
-struct header_effect { /* see render_effects */
+/* One effect of the renderer and why it was switched on or off. */
+struct header_effect {
 	const char *name;
 	bool on, forced;
 	const char *why, *saves;
@@ -30,27 +33,28 @@ struct header_effect { /* see render_effects */
 
 struct header_extra {
 	const char *scene;		 /* the scene file's name, without folders */
-	const char *scene_hash;		 /* its SHA-256 in hexadecimal; NULL: not known */
-	const struct plan_scene *inputs; /* NULL: none */
-	const char *camera;		 /* render_camera_text; NULL or "": not known */
-	const char *scene_notes;	 /* text_lines of them, in HEADER_SCENE_NOTES bytes; NULL or "": none */
+	const char *scene_hash;		 /* SHA-256 of the scene file in hexadecimal; NULL: not known */
+	const struct plan_scene *inputs; /* options -D and --path; NULL: none */
+	const char *camera;		 /* from render_camera_text; NULL or "": not known */
+	const char *scene_notes;	 /* one per line, in at most HEADER_SCENE_NOTES bytes; NULL or "": none */
 	size_t effect_count;
 	const struct header_effect *effects;
 	bool mixed; /* workers of different numeric fingerprints took part: the bits are not reproducible */
 	double wall_seconds, cpu_seconds;
 	uint32_t workers;
-	const char *date; /* NULL: now, UTC */
-	const char *end;  /* merge_end_name; NULL: a preview */
+	const char *date; /* UTC; NULL: now */
+	const char *end;  /* from merge_end_name; NULL: the image is a preview */
 };
 
 enum { HEADER_ATTRIBUTES = 64, HEADER_TEXT = 49152, HEADER_SCENE_NOTES = 4096 };
 struct header {
 	size_t count;
-	struct exr_attribute attributes[HEADER_ATTRIBUTES]; /* storage of the strings */
-	char text[HEADER_TEXT];
-	struct text rest; /* of the text */
+	struct exr_attribute attributes[HEADER_ATTRIBUTES];
+	char text[HEADER_TEXT]; /* the strings of the attributes */
+	struct text rest;	/* the unused part of `text` */
 };
-/* Never fails: text that does not fit is cut. Allocates nothing; h must not be moved afterwards. */
+/* Fills in all attributes. Never fails: text that does not fit is cut. Allocates nothing. h must not be moved
+ * afterwards, since attributes point into it. */
 void header_fill(struct header *h, const struct canvas_image *img, const struct plan *p, const struct header_extra *x);
 
 #endif

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The attributes: ROW(NAME, its text in the file, type, whether equal renders may differ in it, meaning). */
+/* The attributes: ROW(NAME, name in the file, type, whether equal renders may differ in it, meaning). */
 ROW(VERSION, "hslt:version", STRING, false, "version of the programs")
 ROW(SCENE, "hslt:scene", STRING, false, "name of the scene file")
-/* Not compared: the same scene may be written in other words. */
+/* Excluded from comparisons: differently written files may describe the same scene. */
 ROW(SCENE_HASH, "hslt:sceneHash", STRING, true, "SHA-256 of the scene file")
 ROW(CAMERA, "hslt:camera", STRING, false,
     "the camera as name=value pairs: fov in degrees, to_world by rows (x left, y up, z forward)")
@@ -62,7 +62,7 @@ ROW(WALL, "hslt:wallSeconds", DOUBLE, true, "from the first bootstrap sample to 
 ROW(CPU, "hslt:cpuSeconds", DOUBLE, true, "of the leases, all threads")
 ROW(WORKERS, "hslt:workers", INT, true, "workers that took part (hslt-render: threads)")
 ROW(DATE, "hslt:date", STRING, true, "when the image was written, UTC")
-/* Not compared: --mutations with the same number of rounds gives the same bits as the error or the time that ended
- * them. */
+/* Excluded from comparisons: a render that ended by time or error has the same bits as one that --mutations ends after
+ * the same number of rounds. */
 ROW(END, "hslt:end", STRING, true, "which bound ended the render: mutations, time, target-error, black, interrupted")
 ROW(CROPS, "hslt:crops", INT, false, "number of crops that hslt-assemble made the image of")

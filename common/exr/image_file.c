@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Encodes an image (colours, errors and R-hat as planes), writes it to a temporary file beside the target, flushes and
- * renames, so that the target is either the old file or the new one. Targets that are not regular files (pipes,
- * devices, descriptors) are written directly.
+ * Encodes an image (colours, errors and R-hat as planes) and writes image files. The bytes go to a temporary file
+ * beside the target, which is flushed and renamed, so that the target is either the old file or the complete new one.
+ * Targets that are not regular files (pipes, devices, descriptors) are written directly.
  *
- * Failures name the path: a missing folder, no space, no permission. The temporary file is removed.
+ * Failures are sentences that name the path: a missing folder, no space, no permission. The temporary file is removed.
  */
 #include "common/exr/image_file.h"
 
@@ -76,7 +76,7 @@ int image_file_encode(const struct canvas_image *img, const struct plan *p, cons
 		out.attribute_count = h->count;
 		rc = exr_write(&out, bytes, size, e);
 	}
-	out.attributes = NULL; /* not mem_alloc'd individually */
+	out.attributes = NULL; /* part of h, so exr_image_fini must not free them */
 	exr_image_fini(&out);
 	mem_free(h);
 	return rc;
@@ -88,7 +88,8 @@ static int failed(struct error *e, const char *path, const char *what)
 	return error_set(e, code, "%s: cannot %s: %s", target_shown(path), what, strerror(code));
 }
 
-/* Makes the new name survive a crash. Failing to open the folder is not worth an error. */
+/* Flushes the folder of `path`, so that a new name survives a crash. Failures are ignored: the image itself is written.
+ */
 static void sync_folder(const char *path)
 {
 	char folder[PATH_ROOM];
@@ -102,7 +103,7 @@ static void sync_folder(const char *path)
 	close(fd);
 }
 
-/* Creates a temporary file beside `path`; its descriptor or a negative errno. */
+/* Creates a temporary file beside `path`. Returns its descriptor or -errno. */
 static int open_beside(const char *path, char temporary[PATH_ROOM], struct error *e)
 {
 	int n = snprintf(temporary, PATH_ROOM, "%s.XXXXXX", path);
@@ -172,7 +173,7 @@ int image_file_write(const char *path, const unsigned char *bytes, size_t size, 
 	return t.through ? write_through(&t, path, bytes, size, e) : replace(t.path, bytes, size, e);
 }
 
-/* Of a pipe, whose length is not known. *bytes: also after a failure. */
+/* Reads a pipe to its end. *bytes is to be freed also after a failure. */
 static int read_stream(int fd, const char *path, unsigned char **bytes, size_t *size, struct error *e)
 {
 	size_t room = 0;

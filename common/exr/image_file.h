@@ -1,23 +1,28 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Writes an image as an EXR file, with header and errors beside colours, atomically. Any thread. */
+/* Image files: encoding an image with its errors and header as EXR, writing files atomically, reading them. Any thread.
+ */
 #ifndef COMMON_EXR_IMAGE_FILE_H
 #define COMMON_EXR_IMAGE_FILE_H
 
 #include "common/exr/header.h"
 
-/* Channels R G B; with more than one group error.R error.G error.B; with several chains rhat.Y, the potential scale
- * reduction of the pixel's tile, 0 where no chain came. Bytes are mem_alloc'd. */
+/* Encodes an image as EXR. Channels: R, G, B; if there are several groups, error.R, error.G, error.B; if there are
+ * several chains, rhat.Y, the potential scale reduction of the pixel's tile, 0 where no chain came. *bytes is freed
+ * with mem_free. Returns 0, -EINVAL or -ENOMEM. */
 int image_file_encode(const struct canvas_image *img, const struct plan *p, const struct header_extra *x,
 		      unsigned char **bytes, size_t *size, struct error *e);
 
-/* Temporary file, fsync, rename, fsync of the folder; targets that are not regular files are written directly
- * (common/base/target.h). */
+/* Writes a file atomically and durably: temporary file, fsync, rename, fsync of the folder. Targets that are not
+ * regular files are written directly (common/base/target.h). Returns 0 or -errno. */
 int image_file_write(const char *path, const unsigned char *bytes, size_t size, struct error *e);
 
-/* Whether image_file_write could write there: checked before hours are spent. Leaves nothing behind. */
+/* Returns 0 if image_file_write can write there, otherwise -errno: to be called before hours of work are spent. Leaves
+ * nothing behind. */
 int image_file_probe(const char *path, struct error *e);
 
-/* Reads the whole file, or a pipe to its end, at most 2^32 bytes; bytes are mem_alloc'd. */
+/* Reads a regular file, or a pipe to its end, of at most 2^32 bytes; *bytes is freed with mem_free. Returns 0 or
+ * -errno.
+ */
 int image_file_read(const char *path, unsigned char **bytes, size_t *size, struct error *e);
 
 #endif

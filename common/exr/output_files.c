@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Each output is resolved through links to a device and inode, or to a path without links; compared with the inputs and
- * the other outputs; its name with the format; and what is there already, by its first bytes. Last, whether a file can
- * be made there.
+ * For each output, in order: its path is resolved through links to a device and inode or, if there is no such file yet,
+ * to a path without links (find); it must differ from the inputs and from the outputs before it; an existing file must
+ * have the output's format, judged by its first bytes; the extension must suit the format; and a file must be possible
+ * to create there.
  *
- * The first of these that is wrong is the error, and nothing has been written by then.
+ * The first violation is the error. Nothing has been written by then.
  */
 #include "common/exr/output_files.h"
 
@@ -44,7 +45,7 @@ static bool is_html(const char *begin)
 	return strncasecmp(begin, "<!doctype html", 14) == 0;
 }
 
-/* The first column of the figures. */
+/* hslt-accuracy's tables begin with the title of their first column. */
 static bool is_csv(const char *begin)
 {
 	return strncmp(begin, "setting,", 8) == 0;
@@ -67,7 +68,7 @@ static const struct {
 	[OUTPUT_JSON] = {"a file of statistics", is_statistics},
 };
 
-/* A file that exists is known by device and inode, another one by its path without links. */
+/* Identifies a file: by device and inode if it exists, otherwise by its path without links. */
 struct place {
 	bool exists, regular;
 	dev_t device;
@@ -75,7 +76,8 @@ struct place {
 	char path[PATH_MAX + TARGET_PATH];
 };
 
-/* The folder's path without links, and the name in it. Where there is no such folder, nothing can be written. */
+/* Sets the path of a file that does not exist: its folder without links, then its name. If the folder does not exist
+ * either, the path stays as it is; image_file_probe will report that. */
 static void find_new(struct place *p, const char *path)
 {
 	char folder[TARGET_PATH], real[PATH_MAX];
@@ -112,7 +114,7 @@ static bool is_same(const struct place *a, const struct place *b)
 	return a->regular && b->regular && a->device == b->device && a->inode == b->inode;
 }
 
-/* A pipe that two outputs share would hold neither. */
+/* Two outputs on one pipe would be mixed up, although pipes are not regular files and pass is_same. */
 static bool both_stdout(const char *a, const char *b)
 {
 	return strcmp(a, TARGET_STDOUT) == 0 && strcmp(b, TARGET_STDOUT) == 0;
@@ -134,7 +136,7 @@ static int check_inputs(const struct output_file *f, const struct place *p, cons
 	return 0;
 }
 
-/* A name that promises another format of pictures than is written. */
+/* A plot's format is chosen by its extension, so there must be a known one. */
 static int check_plot(const char *option, const char *path, struct error *e)
 {
 	char hint[40];
@@ -161,7 +163,7 @@ static int check_name(const struct output_file *f, struct error *e)
 			 formats[f->format].noun, f->format == OUTPUT_EXR ? "; hslt-tonemap converts one to PNG" : "");
 }
 
-/* A file that cannot be read is not known to be of another format. */
+/* Refuses an existing file of another format. A file that cannot be read passes: its format is not known. */
 static int check_format(const struct output_file *f, struct error *e)
 {
 	char begin[BEGINNING + 1] = "";

@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Composes JSON values: if memory runs out for a part, the rest is freed, and the result is NULL. Any thread. */
+/* Composes JSON values without checking each step: if memory runs out for any part, all parts are freed and the result
+ * is NULL. Any thread. */
 #ifndef COMMON_JSON_COMPOSE_H
 #define COMMON_JSON_COMPOSE_H
 
 #include <jansson.h>
 
-/* Each takes both values, any of which may be NULL, and returns the first with the second in it. */
+/* Adds a value to an object (json_with) or list (json_and) and returns the object or list. Both arguments may be NULL,
+ * and both references are taken over; NULL if either is NULL or memory is out. */
 static inline json_t *json_with(json_t *o, const char *key, json_t *value)
 {
 	if (json_object_set_new(o, key, value) == 0)

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Writes each estimate as an object or a list, and reads it again. JSON has no infinities: such numbers are null. What
- * is missing or of another type is read as 0, or as unknown. Writing fails only when memory is out: NULL.
+ * Each ..._to_json function writes an estimate as an object or a list, and ..._from_json reads it again. JSON has
+ * neither infinities nor NaN; such numbers become null. A value that is missing or of another type is read as 0 or as
+ * unknown, so files of older versions can be read. Writing returns NULL if memory is out; reading cannot fail.
  */
 #include "common/json/estimate_json.h"
 
@@ -31,7 +32,7 @@ json_t *forecast_looks_to_json(const struct forecast_history *h)
 	for (uint32_t i = 0; i < h->count; i++) {
 		const struct forecast_look *l = &h->looks[i];
 		if (!isfinite(l->work + l->cpu_seconds + l->seconds + l->rel_mse + l->rel_mse_upper))
-			continue; /* JSON has no such numbers */
+			continue; /* JSON has neither infinities nor NaN */
 		list = json_and(list, json_pack("{s:f s:f s:f s:f s:f s:o s:b}", "mutations", l->work, "cpuSeconds",
 						l->cpu_seconds, "wallSeconds", l->seconds, "relMSE", l->rel_mse,
 						"relMSEUpper", l->rel_mse_upper, "degrees", forecast_real(l->degrees),
