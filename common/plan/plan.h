@@ -125,11 +125,11 @@ bool plan_request_is_bounded(const struct plan_request *r);
 int plan_make(const struct plan_request *r, struct plan *p, struct error *e);
 /*
  * The length of an epoch, if none is requested, follows from these rules:
- * - A job with a bound on its mutations or samples has 8 rounds; more, if it also has a time and a round would take
- * more than about an eighth of it.
- * - Without such a bound, a round of chains has 32 mutations per pixel, and a round of samples has an eighth of the
- *   samples that the bound on time or error leaves room for (at 50,000 samples a second, and 1/E^2 samples per pixel
- * for an error of E), so that the job ends soon after the bound is reached.
+ * - A job with a bound on its mutations or samples has 8 rounds; more, if it also has a time and a round would
+ *   take more than about an eighth of it.
+ * - Without such a bound, a round of chains has 32 mutations per pixel, and a round of samples has an eighth of
+ *   the samples that the bound on time or error leaves room for (at 50,000 samples a second, and 1/E^2 samples per
+ *   pixel for an error of E), so that the job ends soon after the bound is reached.
  * - A lease has at most a million mutations or, if a pilot has measured the speed, takes at most about 20 s of one
  *   thread (the epoch is rounded to a power of two, so that the noise of the pilot seldom shows).
  * - If a bandwidth is set, an epoch is long enough that sending a lease's tiles does not exceed it, but not longer than
