@@ -1,18 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A cancelling channel's brightness B follows, over the pixels of a tile, a normal distribution around zero whose
- * standard deviation is a share s of the pixel's brightest channel M: s^2 = sum(b^2 - v) / sum M^2 with the measured
- * values b and their variances v. Of one pixel it is then known that B is normal with the variance 1 / (1 / v + 1 /
- * (s M)^2) around b times that over v (empirical Bayes). Without the s, as if all brightnesses were equally probable,
- * most of gold's blue looks brighter than it is, and its relMSE was 0.7 to 0.8 of the true one.
+ * Model: over the pixels of a tile, the brightness B of a cancelling channel is normally distributed around zero, with
+ * a standard deviation of s M, where M is the value of the pixel's brightest channel and s is common to the tile. From
+ * the measured values b and their variances v follows s^2 = sum(b^2 - v) / sum M^2. Given b, a pixel's B is then normal
+ * with the variance w = 1 / (1 / v + 1 / (s M)^2) and the mean b w / v (empirical Bayes). Without s, that is with all
+ * brightnesses equally probable, most of gold's blue looked brighter than it is, and its estimated relMSE was 0.7 to
+ * 0.8 of the true one.
  *
- * s^2 is at least half of its own standard error: a few pixels may all come out darker than their noise.
+ * s^2 is set to at least half of its own standard error, because in a few pixels all values may happen to be smaller
+ * than their noise.
  */
 #include "common/estimate/cancelling.h"
 
 #include <math.h>
 
-/* A channel darker than this share of its pixel's brightest one may be the remainder of colours that cancel. */
+/* Only channels darker than this share of the pixel's brightest channel count as cancelling. */
 static const double cancelled = 0.125;
 
 static size_t index_of_brightest(const double *b)
@@ -21,7 +23,7 @@ static size_t index_of_brightest(const double *b)
 	return fabs(b[2]) > fabs(b[most]) ? 2 : most;
 }
 
-/* M */
+/* Returns M, the value of the pixel's brightest channel. */
 static double most_of(const struct tile_error *t, size_t pixel)
 {
 	return t->brightness[pixel][index_of_brightest(t->brightness[pixel])];
@@ -50,7 +52,7 @@ void cancelling_find_spread(struct tile_error *t)
 		for (size_t p = 0; p < (size_t)t->width * t->height; p++) {
 			if (!t->cancels[p][k])
 				continue;
-			/* Over the floor, so that no square leaves the range of doubles. */
+			/* Divided by the floor, so that no square leaves the range of doubles. */
 			double most = most_of(t, p), v = t->square[p][k] / t->floor_square,
 			       truth = t->brightness[p][k] * t->brightness[p][k] / t->floor_square - v;
 			sum += truth;

@@ -9,7 +9,8 @@ static double ratio(double a, double b)
 	return b > 0 ? a / b : 0;
 }
 
-/* From sums on the grid to X+Y+Z of the group's image, which is scaled by the group's own b. */
+/* Returns the factor from sums on the grid to X, Y, Z of the group's image. The image of chains is scaled by the
+ * group's own b. */
 static double factor_of(const struct canvas *c, uint32_t group)
 {
 	const struct plan *p = &c->plan;
@@ -22,7 +23,7 @@ static double factor_of(const struct canvas *c, uint32_t group)
 	       ratio(c->quantum, (double)c->prefix.group[group].samples);
 }
 
-/* X, Y, Z on the grid; NULL: the group has nothing there. */
+/* Returns X, Y, Z of a pixel on the grid; NULL if nothing was added to its tile. */
 static const int64_t *pixel(const struct canvas *c, size_t film, uint32_t x, uint32_t y)
 {
 	size_t tile = (size_t)(y / TILE_SIZE) * c->tiles_across + x / TILE_SIZE;

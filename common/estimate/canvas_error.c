@@ -1,9 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The relative error of an image from the spread between groups: weights 1 / (B^2 + (0.01 m)^2), with estimates of
- * the brightness B that are as little noisy as possible; sums of weighted errors, with bounds. tile_error.c makes the
- * standard errors of pixels, canvas_interval.c turns the sums into relMSE and its interval. All loops run in a fixed
- * order over exact inputs, so equal films give equal bits.
+ * The relative error of an image from the spread between groups.
+ *
+ * The relMSE is a sum over pixels of squared standard errors times the weights 1 / (B^2 + (0.01 m)^2), m the mean of B.
+ * The true brightness B is not known, and noise in an estimate of B would bias the weights, so the estimate must be as
+ * little noisy as possible. For each tile (error_tile), the standard errors are computed (tile_error.c) and each pixel
+ * is settled, that is, its brightness is chosen and its weighted errors are added to the sums:
+ * - a pixel whose neighbourhood is reliable keeps its own brightness (settle_pixel);
+ * - a channel in which colours cancel is weighted over all brightnesses that it may have (settle_cancelling);
+ * - other pixels wait; the smallest square of 2, 4, ... 64 pixels a side whose mean brightness is reliable gives them
+ *   its own (settle_square, settle_block).
+ * canvas_interval.c turns the sums into the relMSE and its interval.
+ *
+ * All loops run in a fixed order over exact inputs, so equal films give equal bits. The only failure is -ENOMEM.
  */
 #include "common/estimate/canvas_error.h"
 
@@ -17,35 +26,40 @@
 
 enum { FOLDED = ERROR_FOLDED, VALUES = 3 * PLAN_MAX_GROUPS };
 
-/* Of 16 groups, with which limits were calibrated: above this kurtosis one of them has most of a pixel's variance; a
- * single outlier would have 14. A pixel that is brighter than its surroundings by so many of its standard errors
- * received its light in three groups or more. */
+/* Limits for 16 groups, with which they were calibrated; find_limits derives those for other numbers. one_group_of_16:
+ * kurtosis of the groups' values above which one group has most of a pixel's variance (a single outlier would give 14).
+ * highlight_of_16: a pixel brighter than its surroundings by this many of its standard errors received its light in at
+ * least three groups. */
 static const double one_group_of_16 = 9.6, highlight_of_16 = 1.5;
 
-/* The tail index of errors is estimated from the largest in 128 and in 512, as that of samples when an integrator is
- * chosen (worker/render/choose.h), but from at least 32 and 8. From fewer than ERRORS_LEAST it would be the index of
- * the bulk. */
+/* The tail index of errors is the smaller of two estimates, from the largest 1 / TAIL of the errors and from the
+ * largest 1 / (TAIL * EXTREME), but from at least 32 and 8 errors; worker/render/choose.h uses the same shares for
+ * samples. With fewer than ERRORS_LEAST errors in all, these would not be the tail but the bulk, and no index is
+ * estimated. */
 enum { TAIL = 128, TAIL_LEAST = 32, TAIL_MOST = 1 << 16, EXTREME = 4, ERRORS_LEAST = 2048 };
 
 /* ---- weights: 1 / (B^2 + floor), with an estimate of B that is as little noisy as possible */
 
-/* A square of pixels: sums over all of them, and over those that have no brightness of their own yet. */
+/* A square of pixels: sums over all its pixels (all...) and over the waiting ones (open...), whose brightness is not
+ * settled yet. */
 struct block {
-	uint32_t pixels, waiting[3];
-	double all[3], open[3];			      /* of the mean */
-	double rare[3], open_rare[3];		      /* of the mean minus the base */
-	double all_apart[VALUES], open_apart[VALUES]; /* [3][groups] */
+	uint32_t pixels, waiting[3];		      /* numbers of pixels; waiting ones by channel */
+	double all[3], open[3];			      /* sums of the brightness */
+	double rare[3], open_rare[3];		      /* sums of the brightness minus the base (tile_error.h) */
+	double all_apart[VALUES], open_apart[VALUES]; /* sums of the groups' deviations, [3][groups] */
 };
 
-/* The squared denominator of errors. Noise in B makes 1 / B^2 too large by three of its variances; two are
- * subtracted from that where brightness comes in rare hits, because errors are then largest where B is too bright:
- * `variances` is 1, or 3 where they are independent. */
+/* Returns the squared denominator of errors, B^2 + floor^2 plus a correction for the noise of B: on average, noise
+ * makes 1 / B^2 too large by 3 variance / B^4, so three variances are added to the denominator if errors and B are
+ * independent. Where light comes in rare hits, errors are largest where B is too bright, which outweighs two of them,
+ * and one is added. variances: 3 or 1. */
 static double divisor_square(const struct tile_error *t, double brightness, double square, double variances)
 {
 	return brightness * brightness + t->floor_square + variances * square;
 }
 
-/* A part of the relMSE whose pixels share one brightness, and the uncertainty of that. */
+/* Adds a part of the relMSE whose pixels have one brightness in common, and its uncertainty: square is the variance of
+ * the brightness. */
 static void add_share(struct tile_error *t, double part, double brightness, double square, double divisor)
 {
 	double slope = 2 * brightness * part / divisor;
@@ -53,9 +67,9 @@ static void add_share(struct tile_error *t, double part, double brightness, doub
 	t->sum.doubt += slope * slope * square;
 }
 
-/* The pixel's part of the relMSE with each group's deviation divided by the brightness found by the other groups, so
- * that no sample is divided by the brightness it makes itself. This is an upper bound, since light that only one
- * group met is missing in that group's divisor. */
+/* Returns the pixel's part of the relMSE, with each group's deviation divided by the brightness found by the other
+ * groups, so that no sample is divided by a brightness to which it contributed. This is an upper bound, since light
+ * that only one group met is missing in that group's divisor. */
 static double by_others(const struct tile_error *t, size_t pixel, size_t k)
 {
 	const float *apart = tile_error_apart(t, pixel) + k * t->groups;
@@ -68,8 +82,8 @@ static double by_others(const struct tile_error *t, size_t pixel, size_t k)
 	return sum / n / (n - 1);
 }
 
-/* Bounds of a part of the relMSE, and what makes it doubtful. The lower bound divides by the pixel's own brightness,
- * with all its fireflies. */
+/* Adds a pixel's part of the relMSE to the sums of lower and upper bounds and of doubtful parts. high: the upper bound.
+ * The lower bound divides by the pixel's own brightness, which includes all its fireflies. */
 static void add_bounds(struct tile_error *t, size_t pixel, size_t k, double part, double high)
 {
 	double square = t->square[pixel][k];
@@ -80,9 +94,9 @@ static void add_bounds(struct tile_error *t, size_t pixel, size_t k, double part
 		t->sum.one_group += part;
 }
 
-/* Divides by the pixel's own brightness. Where it is reliable, each group's errors are divided by the brightness
- * that the other groups found, to second order: this removes the correlation of errors and brightness, however rare
- * the light is. */
+/* Settles a pixel by its own brightness. If that is reliable (believed_in), each group's errors are divided by the
+ * brightness that the other groups found, to second order: this removes the correlation between errors and brightness,
+ * however rare the light is. */
 static void settle_pixel(struct tile_error *t, size_t pixel, size_t k, bool believed_in)
 {
 	double brightness = t->brightness[pixel][k], square = t->square[pixel][k];
@@ -98,7 +112,7 @@ static void settle_pixel(struct tile_error *t, size_t pixel, size_t k, bool beli
 	add_share(t, square / divisor, brightness, square, divisor);
 }
 
-/* The error is weighted over all brightnesses the pixel may have. */
+/* Settles a channel in which colours cancel: its error is weighted over all brightnesses that it may have. */
 static void settle_cancelling(struct tile_error *t, size_t pixel, size_t k)
 {
 	double square = t->square[pixel][k];
@@ -112,6 +126,7 @@ static void settle_cancelling(struct tile_error *t, size_t pixel, size_t k)
 	t->sum.doubt += square * square * weight.variance;
 }
 
+/* Settles those pixels that keep their own brightness. */
 static void settle_pixels(struct tile_error *t, size_t first, size_t count)
 {
 	for (size_t pixel = first; pixel < first + count; pixel++)
@@ -122,7 +137,8 @@ static void settle_pixels(struct tile_error *t, size_t first, size_t count)
 				settle_pixel(t, pixel, k, true);
 }
 
-/* Squared relative standard error of the mean of the 2 x 2 pixels around this one, each limited to 1. */
+/* Returns the mean, over the 2 x 2 pixels to which this one belongs, of the squared relative standard error, each
+ * limited to 1. */
 static double noise_around(const struct tile_error *t, uint32_t x, uint32_t y, size_t k)
 {
 	double sum = 0, n = 0;
@@ -135,9 +151,10 @@ static double noise_around(const struct tile_error *t, uint32_t x, uint32_t y, s
 	return sum / n;
 }
 
-/* A pixel keeps its own brightness if its neighbourhood is reliable. Judging each pixel alone would keep those that
- * came out too bright and average those that came out too dark. A pixel that is certain by itself keeps its
- * brightness whatever its neighbours are. */
+/* Decides which pixels keep their own brightness, and returns how many values (pixels times channels) wait. A pixel
+ * keeps its brightness if its neighbourhood is reliable: judging each pixel alone would keep those that came out too
+ * bright and average those that came out too dark. A pixel that is certain by itself keeps its brightness whatever its
+ * neighbours are. */
 static uint32_t find_settled(struct tile_error *t)
 {
 	uint32_t waiting = 0;
@@ -154,6 +171,7 @@ static uint32_t find_settled(struct tile_error *t)
 	return waiting;
 }
 
+/* Returns the variance of a block's mean brightness, from the sums of the groups' deviations over its pixels. */
 static double spread_square(const double *apart, uint32_t groups, double pixels)
 {
 	double square = 0;
@@ -162,8 +180,9 @@ static double spread_square(const double *apart, uint32_t groups, double pixels)
 	return square / (pixels * pixels) / groups / (groups - 1);
 }
 
-/* If all groups but a few agree about a pixel, their brightness is used and the excess of the few is spread over the
- * block: `rare` per pixel, with the variance `square`. So a wall beside a lamp stays dark. */
+/* If all groups but a few agree about a pixel, settles it by the brightness that they agree on, plus the block's mean
+ * excess of the few, `rare` per pixel with the variance `square`. In this way a wall beside a lamp stays dark. Returns
+ * false if that brightness is not reliable either. */
 static bool settle_by_base(struct tile_error *t, size_t pixel, size_t k, double rare, double square)
 {
 	double base = t->base[pixel][k] + rare, doubt = t->base_square[pixel][k] + square;
@@ -179,10 +198,11 @@ static bool settle_by_base(struct tile_error *t, size_t pixel, size_t k, double 
 }
 
 /*
- * The largest share of a block's waiting pixels that may be as dark as nothing, by Cantelli's inequality: v / (v + B^2)
- * for a variance v of their brightness around the block's, B, without that of their noise. It is nearly 0 where pixels
- * are alike, however rarely light comes, and large at the edge of something bright before a black background, where a
- * few pixels have a hundredth of the brightness of the others.
+ * Returns an upper bound, by Cantelli's inequality, on the share of a block's waiting pixels that may be entirely dark:
+ * v / (v + B^2), where B is the block's brightness and v the variance of the pixels' brightness around it, without the
+ * variance of their noise. The bound is nearly 0 where pixels are alike, however rarely light comes, and large at the
+ * edge of something bright before a black background, where a few pixels have a hundredth of the brightness of the
+ * others.
  */
 static double share_of_dark(const struct tile_error *t, size_t k, uint32_t x, uint32_t y, uint32_t size,
 			    double brightness)
@@ -200,8 +220,9 @@ static double share_of_dark(const struct tile_error *t, size_t k, uint32_t x, ui
 	return spread > 0 ? spread / (spread + n * (brightness * brightness + t->floor_square)) : 0;
 }
 
-/* The error of a pixel that has a block's brightness: the upper bound is that of a pixel which may be darker. The
- * interval counts `dark` once more anyway. */
+/* Adds the error of a pixel that is settled by a block's brightness. Its upper bound allows for the share of pixels
+ * that are darker than the block; since canvas_interval adds `dark` to the upper bound once more, that part is
+ * subtracted here. */
 static void add_dark(struct tile_error *t, size_t pixel, size_t k, double part, double dark_share)
 {
 	double darker = dark_share * by_others(t, pixel, k);
@@ -210,10 +231,11 @@ static void add_dark(struct tile_error *t, size_t pixel, size_t k, double part, 
 }
 
 /*
- * The block's weight for its waiting pixels. Its brightness is the mean over all its pixels, with and without
- * fireflies. Excluded are pixels that are reliable and more than twice as bright as the waiting ones, such as a lamp
- * beside a wall. A pixel brighter than the block by highlight_errors of its own received its light in three groups or
- * more: that is a highlight, not a firefly (which is one standard error high), and it keeps its own brightness.
+ * Settles the waiting pixels of a block by the block's brightness, unless that is not reliable and a larger block
+ * remains to be tried. The brightness is the mean over all pixels, with and without fireflies; only over the waiting
+ * ones if the mean of all is more than twice as bright, such as for a wall beside a lamp. A pixel that is brighter than
+ * the block by highlight_errors of its own standard errors keeps its own brightness: it received its light in three
+ * groups or more, so it is a highlight and not a firefly (whose brightness is one standard error).
  */
 static void settle_block(struct tile_error *t, struct block *b, size_t k, uint32_t x, uint32_t y, uint32_t size)
 {
@@ -292,7 +314,8 @@ static void add_block(struct block *b, const struct block *part, uint32_t groups
 			b->open_apart[i] += part->open_apart[i];
 }
 
-/* The square of `size` pixels at (x, y) of the tile, built from its quarters; recursion is at most six levels deep. */
+/* Settles the pixels in the square of `size` pixels a side at (x, y) of the tile, as far as it is reliable, after its
+ * quarters. Returns its sums in *b. The recursion is at most six levels deep. */
 static void settle_square(struct tile_error *t, uint32_t x, uint32_t y, uint32_t size, struct block *b)
 {
 	*b = (struct block){0};
@@ -316,7 +339,8 @@ static void settle_square(struct tile_error *t, uint32_t x, uint32_t y, uint32_t
 
 /* ---- sums over the image */
 
-/* FOLDED groups from `first` on, or as many as remain. */
+/* Adds the values of up to FOLDED groups, from `first` on, to the folded values; with more than FOLDED groups also
+ * their squares to the groups' distances. apart: the values, beginning with group `first`. */
 static void fold_groups(struct tile_error *t, uint32_t first, const float *apart, float *folded)
 {
 	uint32_t count = t->groups - first < FOLDED ? t->groups - first : FOLDED;
@@ -329,6 +353,7 @@ static void fold_groups(struct tile_error *t, uint32_t first, const float *apart
 		t->sum.distance[first + g] += (double)v[g] * (double)v[g];
 }
 
+/* Adds each group's error of a pixel, summed over the channels. */
 static void add_to_tail(struct tile_error *t, const float *apart)
 {
 	for (size_t g = 0; g < t->groups; g++)
@@ -341,7 +366,7 @@ static size_t tail_size(size_t errors)
 	return size < TAIL_LEAST ? TAIL_LEAST : size > TAIL_MOST ? TAIL_MOST : size;
 }
 
-/* INFINITY: too few errors. */
+/* Returns the tail index of the errors; INFINITY if there are too few of them. */
 static double find_tail(struct tail *t, size_t errors)
 {
 	size_t size = tail_size(errors);
@@ -351,8 +376,9 @@ static double find_tail(struct tail *t, size_t errors)
 	return fmin(tail_index(t, size), tail_index(t, size / EXTREME));
 }
 
-/* Products of the groups' weighted errors. More than FOLDED groups are folded onto FOLDED, which is valid because
- * errors that add up are alike. A lane is a pair of groups, so each sum is in the order of pixels. */
+/* Adds the products of the groups' weighted errors over a row of pixels. More than FOLDED groups are folded onto
+ * FOLDED: groups are identically distributed, and so are sums of equally many. Vectorisation runs over pairs of groups,
+ * so each sum is in the order of pixels on any machine. */
 static void add_row(struct tile_error *t, size_t first)
 {
 	float gram[FOLDED][FOLDED] = {{0}};
@@ -396,21 +422,22 @@ static void error_tile(struct image_builder *m, struct tile_error *t, uint32_t x
 		add_row(t, (size_t)row * t->width);
 }
 
-/* The kurtosis of n values of which all but one are equal: the largest that n values can have. */
+/* Returns the kurtosis of n values of which all but one are equal, the largest that n values can have. */
 static double outlier_kurtosis(double n)
 {
 	return (n * n - 3 * n + 3) / (n - 1);
 }
 
-/* The square of how many of its standard errors a pixel is bright that two of n groups hit alike. */
+/* Returns (brightness / standard error)^2 of a pixel that two of n groups hit with equal light and the others not. */
 static double two_hits_square(double n)
 {
 	return 2 * (n - 1) / (n - 2);
 }
 
-/* Other numbers of groups have limits at the same share of the largest kurtosis, and above two hits by the same factor.
- * With the limits of 16, two hits of nine were a highlight, and a kurtosis of four groups was never too large. Of so
- * few groups any spread looks like this: canvas_interval.c asks the tail of the errors instead. */
+/* Sets the limits for this number of groups: the same share of the largest possible kurtosis as for 16 groups, and the
+ * same factor above two hits. With the limits of 16 groups, two hits in nine groups would count as a highlight, and no
+ * kurtosis of four groups would be too large. With fewer than ERROR_GROUPS groups any spread looks like one group's, so
+ * canvas_interval.c judges the tail of the errors instead. */
 static void find_limits(struct tile_error *t)
 {
 	double n = t->groups, two = n > 2 ? two_hits_square(n) : INFINITY;

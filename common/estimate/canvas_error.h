@@ -6,7 +6,8 @@
 #include "common/base/error.h"
 #include "common/estimate/image_builder.h"
 
-/* Fills in error and relMSE of an image whose rgb is complete; needs two or more groups and no open rounds. -ENOMEM */
+/* Fills in the standard errors and the relMSE of an image whose rgb is complete. Needs two or more groups and no open
+ * rounds. Returns 0 or -ENOMEM. */
 int canvas_error(struct image_builder *m, struct error *e);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * From integer sums to an image.
+ * Makes an image from the integer sums of a canvas.
  *
  * canvas_image adds up the counts of bootstrap and rounds, computes b of each group and of all, and from it the factor
  * of each group's film. Then it pools the films tile by tile into RGB, and estimates the error and the statistics
@@ -20,7 +20,8 @@
 #include <math.h>
 #include <string.h>
 
-/* Adds the counts of the bootstrap, whose samples are in no film: those that determine b, and refused contributions. */
+/* Adds those counts of the bootstrap that concern the image although its samples are in no film: the ones that
+ * determine b, and refused contributions. */
 static void add_bootstrap(struct tally *to, const struct tally *from, uint32_t groups)
 {
 	for (uint32_t g = 0; g < groups; g++) {
@@ -39,7 +40,8 @@ static double ratio(double a, double b)
 	return b > 0 ? a / b : 0;
 }
 
-/* b of each group and of all, and its standard error from the spread of the groups. */
+/* Computes b of each group, the pooled b, its standard error from the spread of the groups, and the share of the energy
+ * in paths that are too long. */
 static void find_b(struct image_builder *m)
 {
 	uint32_t groups = m->c->plan.groups;
@@ -63,6 +65,7 @@ static void find_b(struct image_builder *m)
 	m->img->beyond_share = ratio(outside, outside + exact_sum_value(&bootstrap));
 }
 
+/* Computes the factors from sums on the grid to the images of the groups and to the pooled image. */
 static void find_factors(struct image_builder *m)
 {
 	const struct plan *p = &m->c->plan;
@@ -80,8 +83,9 @@ static void find_factors(struct image_builder *m)
 	m->pooled_factor = (p->kind == PLAN_CHAINS ? m->img->b : 1) * ratio(m->c->quantum, n);
 }
 
-/* For a preview of samples, where parts of the image have more samples than others: the leases merged, by group, for
- * the strip that contains a row of the crop. Rows that the filter shares between strips are slightly off. */
+/* In a preview of samples, strips differ in their number of samples. Returns the number of leases merged, over all
+ * groups, for the strip that contains this row of the crop. Rows near the border of a strip also contain samples of the
+ * next one, by the filter, and are slightly too bright or too dark. */
 static double preview_leases(const struct canvas *c, uint32_t row)
 {
 	uint32_t part = 0;
@@ -94,7 +98,8 @@ static double preview_leases(const struct canvas *c, uint32_t row)
 	return (double)n;
 }
 
-/* The used slots of a tile, of all groups: the prefix's, and for a preview the open rounds'. */
+/* Collects the used slots of a tile from the films of all groups: the prefix, and for a preview the open rounds.
+ * Returns their number. */
 static uint32_t tile_slots(const struct image_builder *m, size_t tile, const int64_t *slots[PLAN_MAX_GROUPS * FILMS])
 {
 	uint32_t n = 0;
@@ -105,7 +110,8 @@ static uint32_t tile_slots(const struct image_builder *m, size_t tile, const int
 	return n;
 }
 
-/* Sums of integers, so their order does not matter; added as doubles, because the total may exceed 64 bits. */
+/* Adds up a row of pixels over the slots, as doubles, because the total may exceed 64 bits. The order of the slots is
+ * fixed. */
 static void pool_row(const int64_t *const *slots, uint32_t count, size_t at, size_t values, double *sums)
 {
 	memset(sums, 0, values * sizeof *sums);
@@ -151,7 +157,8 @@ static void state_no_interval(struct canvas_image *img, enum error_doubt why)
 	img->rel_mse_95[0] = img->rel_mse_95[1] = NAN;
 }
 
-/* Chains are flagged but too short to be judged: the extent of their errors is not known. */
+/* If something about the chains is flagged but they are too short to be judged, the size of their errors is not known.
+ */
 static void doubt_short_chains(struct image_builder *m)
 {
 	struct convergence a;
@@ -161,8 +168,8 @@ static void doubt_short_chains(struct image_builder *m)
 	state_no_interval(m->img, ERROR_SHORT);
 }
 
-/* Samples per pixel that may have found light before anything else could: of chains, the independent proposals and the
- * bootstrap. */
+/* Returns the number of samples per pixel that can discover light: for chains, only independent proposals and bootstrap
+ * samples do, since mutations start from light that has been found. */
 static double finding_samples(const struct image_builder *m)
 {
 	const struct plan *p = &m->c->plan;
@@ -173,8 +180,8 @@ static double finding_samples(const struct image_builder *m)
 				      : (double)p->groups * (double)p->epoch * (double)m->c->rounds;
 }
 
-/* If what no sample has found were in the image, its error would leave the interval. Once samples find such light, it
- * is in the spread between groups. */
+/* Declares the interval unknown if the error would leave it with the light that, by the plan's pilot, the samples so
+ * far are unlikely to have found. Once samples find such light, the spread between groups shows it. */
 static void doubt_unseen_light(struct image_builder *m)
 {
 	struct canvas_image *img = m->img;

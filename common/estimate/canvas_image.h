@@ -6,7 +6,8 @@
 #include "common/estimate/image.h"
 #include "common/film/canvas.h"
 
-/* Allocates img's arrays; canvas_image_fini frees them. open_rounds: a preview of everything received. */
+/* Makes the image of the complete rounds; with open_rounds, a preview of everything merged, without errors. Allocates
+ * img's arrays, which canvas_image_fini frees. Returns 0 or -ENOMEM. */
 int canvas_image(const struct canvas *c, bool open_rounds, struct canvas_image *img, struct error *e);
 void canvas_image_fini(struct canvas_image *img);
 

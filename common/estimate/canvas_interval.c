@@ -1,23 +1,31 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The relMSE of an image from the sums over its pixels, and the interval of it.
+ * Computes the relMSE of an image and its interval from the sums over the pixels.
  *
- * The estimate is the mean over pixels and channels of the squared standard error over B^2 + (0.01 m)^2. It equals the
- * mean over groups of their squared distance from the mean, over groups - 1.
+ * Estimate. The relMSE is the mean over pixels and channels of the squared standard error over B^2 + (0.01 m)^2. It
+ * equals the mean, over groups, of the squared weighted distance between a group's image and the mean image, divided by
+ * groups - 1.
  *
- * Of its expectation it is about chi-square over its degrees of freedom, those with the spread that the distances show
- * (Satterthwaite 1946), but no more than own_degrees allows: 16 distances may lie together by chance, the products of
- * pairs hardly. The error at hand over the estimate is F with own_degrees and (groups - 1) times as many. Own degrees
- * are fewer by (groups - 1) / (groups + 2), since they come from so many groups themselves: as much as Student's t is
- * wider than the normal; by the doubt of the weights, twice, since brightness that comes in hits is skewed; by heavy
- * tails: the variance of a variance is (kurtosis - 1) / 2 times the normal's. The kurtosis of a few groups is too small
- *   where tails are heavy, hence the power of 1.5, which is of calibration (tests/image/README.md).
- * The interval begins at the lower bound of the sums and ends at the upper one, in which the part of pixels that are
- * divided by a block's brightness counts twice: some of them are darker than the block, and where that shows, by as
- * much as it may be. It is not known where too much of the estimate comes from pixels of which too little is known
- * (limits are of calibration, too), and where errors are so unequal that those which count most may not have come:
- * where their tail index does not rule out an infinite variance, or where neither it nor the groups of single pixels,
- * of which there are too few, would show that.
+ * Distribution. The estimate is approximately its expectation times chi-square over its degrees of freedom. These
+ * follow from the spread of the groups' distances (Satterthwaite 1946), but are at most what own_degrees allows: 16
+ * distances may lie close together by chance, which the products of pairs hardly do. The error of the image at hand,
+ * divided by the estimate, follows an F distribution with `own` and own * (groups - 1) degrees, where `own` is
+ * own_degrees reduced
+ * - by (groups - 1) / (groups + 2), because it is estimated from few groups itself; this is the factor by which
+ *   Student's t is wider than the normal distribution;
+ * - by the doubt of the weights, counted twice, since a brightness that comes in rare hits is skewed;
+ * - by heavy tails, since the variance of a variance is (kurtosis - 1) / 2 times that of normal values. The kurtosis of
+ *   a few groups is too small where tails are heavy, hence the power of 1.5, a result of calibration
+ *   (tests/image/README.md).
+ *
+ * Interval. The quantiles of F are multiplied by the lower and the upper bound of the sums over the pixels. In the
+ * upper bound, the parts of pixels that were divided by a block's brightness count twice, since some of these pixels
+ * are darker than their block.
+ *
+ * Doubt. The interval is declared unknown if too much of the estimate comes from pixels about which too little is known
+ * (the limits are results of calibration, too), or if errors are so unequal that the largest may be still to come:
+ * their tail index does not rule out an infinite variance, or there are so few groups and pixels that neither the tail
+ * index nor the groups of single pixels would show it.
  */
 #include "common/estimate/canvas_interval.h"
 
@@ -27,16 +35,17 @@
 #include <math.h>
 
 static const double tail_power = 1.5, dark_most = 0.5, one_group_most = 0.4;
-/* The maximum ratio of upper to lower end, and the maximum of that over the ratio without heavy tails and uncertain
- * brightness. An error that all pixels share may happen to be nearly zero, so the lower end alone says little. */
+/* The ratio of the interval's upper to its lower end may be up to `widest`, and up to `widest_of_known` times the ratio
+ * that it would have without heavy tails and uncertain brightness: an error that all pixels share may happen to be
+ * nearly zero, and then the interval is wide for this reason alone. */
 static const double widest = 100, widest_of_known = 4;
 
 /*
- * How many errors vary independently in one error image: (sum l)^2 / sum l^2 over the eigenvalues l of the covariance
- * of a group's error; 1 if all pixels err together, as by an error of b. Both sums are estimated without bias from
- * differences of disjoint pairs of groups: |e1 - e2|^2 |e3 - e4|^2 / 4 and ((e1 - e2) . (e3 - e4))^2 / 4, averaged over
- * all sets of four groups. No fourth power of a group's own error occurs, so a firefly does not look like an error of
- * everything. The second sum never exceeds the first.
+ * Returns how many errors vary independently in the error image of a group: (sum l)^2 / sum l^2 over the eigenvalues l
+ * of the covariance of a group's error e; 1 if all pixels err together, as they do by an error of b. Both sums are
+ * estimated without bias from differences of disjoint pairs of groups: |e1 - e2|^2 |e3 - e4|^2 / 4 and
+ * ((e1 - e2) . (e3 - e4))^2 / 4, averaged over all sets of four groups. No fourth power of a group's own error occurs,
+ * so a firefly does not look like an error of the whole image. The second sum never exceeds the first.
  */
 static double own_degrees(const struct error_sums *s)
 {
@@ -59,8 +68,8 @@ static double own_degrees(const struct error_sums *s)
 	return !(total > square) ? 1 : total < most * square ? total / square : most;
 }
 
-/* Relative variance of the groups' distances: 2 over the degrees of freedom of one group. The factor removes the
- * bias of dividing by the mean distance, which exists if all pixels err together. */
+/* Returns the relative variance of the groups' distances, which is 2 over the degrees of freedom of one group. Dividing
+ * by the mean distance has a bias if all pixels err together, which the last factor removes. */
 static double distance_spread(const struct error_sums *s, double mean)
 {
 	double groups = s->groups, square = 0;
@@ -70,16 +79,18 @@ static double distance_spread(const struct error_sums *s, double mean)
 	return square * (1 + fmin(square, 2) / groups);
 }
 
+/* Returns the factor by which heavy tails reduce the degrees of freedom; at least 1. */
 static double heavier_than_normal(const struct error_sums *s)
 {
 	double n = s->groups, kurtosis = s->share > 0 ? s->kurtosis / s->share * (n + 1) / (n - 1) : 3;
 	return kurtosis > 3 ? pow((kurtosis - 1) / 2, tail_power) : 1;
 }
 
-/* The relMSE is a mean of squared errors: below this tail index it has no expectation. */
+/* Tail index of errors below which their squares, whose mean the relMSE is, have no expectation. */
 static const double finite_variance = 2;
 
-/* known: ratio of upper to lower end if only the degrees of freedom were uncertain. */
+/* Sets the reason, if any, why the interval is not known. known: the ratio of its ends without heavy tails and
+ * uncertain brightness. */
 static void find_doubt(const struct error_sums *s, double known, struct canvas_image *img)
 {
 	double dark = s->share > 0 ? s->dark / s->share : 0, one_group = s->share > 0 ? s->one_group / s->share : 0;

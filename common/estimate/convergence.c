@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Checks tiles (potential scale reduction), then classes of paths (chains against bootstrap, groups against each
- * other), then chains that stood still. Everything flagged goes into one sentence. Each criterion requires both
- * significance and size: a deviation that is invisible in the image is not a disagreement, nor is one that may be
- * chance.
+ * other), then chains that accepted nothing during whole epochs. Everything flagged goes into one sentence. Each
+ * criterion requires both significance and size: a deviation that is invisible in the image is not a disagreement, nor
+ * is one that may be due to chance.
  *
  * Nothing fails: values that are not known (too few groups, nothing visited) are NAN and are never flagged.
  */
@@ -15,30 +15,33 @@
 #include <math.h>
 #include <string.h>
 
-/* Tiles. Below 1.1 chains count as mixed (Gelman and Rubin 1992). The error of the mean must be large, too, or a
- * scene of many small lights that chains visit in turn would be flagged for differences that 1,000 chains average
- * out. */
+/* Tiles: below an R-hat of 1.1 chains count as mixed (Gelman and Rubin 1992). A flagged tile must also have a large
+ * error of its mean: otherwise a scene of many small lights, which chains visit in turn, would be flagged for
+ * differences that 1,000 chains average out. */
 #define R_HAT_MIXED 1.1
 #define TILE_ERROR_MOST 0.1
 #define TILE_SHARE_LEAST 1e-3
 #define FLAGGED_SHARE_MOST 0.01
 
-/* Classes: significant over all of them, and large enough to be visible. */
+/* Classes: the difference must be significant, at this level for all classes together, and large enough to be visible:
+ * a share of b, or a share of the class's own energy if that is not negligible. */
 #define CLASS_LEVEL 1e-4
 #define CLASS_OF_B 0.02
 #define CLASS_OF_ITSELF 0.2
 #define CLASS_LEAST 0.005
-/* Standard error of a class's energy in the chains, from the groups: a quarter of the energy if half of the groups
- * found the class and share it evenly (sqrt((16 / 8 - 1) / 15) for 16 groups). If fewer found it, the standard error
+/* Groups are apart if the standard error of a class's energy in the chains, from the spread of the groups, exceeds
+ * these shares of the energy and of b. It is a quarter of the energy if half of the groups found the class and have
+ * equal shares of it (sqrt((16 / 8 - 1) / 15) for 16 groups). With fewer than APART_GROUPS groups the standard error
  * itself is too uncertain. */
 #define APART_OF_ITSELF 0.25
 #define APART_OF_B 0.03
 enum { APART_GROUPS = 8 };
-/* Standard error of a class's energy in the bootstrap above which the bootstrap is no evidence of an excess: see
- * excess(). */
+/* Relative standard error of a class's energy in the bootstrap from which on the bootstrap is no evidence for an excess
+ * in the chains: see excess_counts(). */
 #define CLASS_KNOWN 0.1
 
-/* Chain epochs. */
+/* Share of chain epochs without an accepted mutation that is tolerated, and the shortest epoch for which it is judged.
+ */
 #define STUCK_MOST 0.01
 enum { STUCK_EPOCH = 1000 };
 
@@ -49,7 +52,7 @@ const char *convergence_name(enum convergence_verdict v)
 	return names[v];
 }
 
-/* Finite sums for whole degrees (Abramowitz and Stegun 1964, 26.7.3 and 26.7.4). */
+/* For whole degrees of freedom the probability is a finite sum (Abramowitz and Stegun 1964, 26.7.3 and 26.7.4). */
 double convergence_student_tail(double t, uint32_t degrees)
 {
 	double angle = atan(fabs(t) / sqrt(degrees)), c = cos(angle), square = c * c;
@@ -78,7 +81,8 @@ static bool tile_flagged(const struct canvas_image *img, size_t i)
 	       img->tile_share[i] >= (float)TILE_SHARE_LEAST;
 }
 
-/* The k-th smallest R-hat, by bisection over its values: quadratic, but without memory, and there are few tiles. */
+/* Returns the median of the `known` values of R-hat that are not NAN, by bisection over the values: quadratic, but
+ * there are few tiles, and nothing is allocated. */
 static double median(const struct canvas_image *img, uint32_t known)
 {
 	size_t tiles = (size_t)img->tiles_across * img->tiles_down;
@@ -129,11 +133,11 @@ static void judge_tiles(const struct plan *p, const struct canvas_image *img, st
 /* ---- classes */
 
 /*
- * Whether an excess of a class in the chains over the bootstrap is evidence. Energies of independent samples have heavy
- * tails: before the rare bright samples occur, both mean and spread are too small and t is far too large. So an excess
- * counts only if the bootstrap knows the class well. Little is lost: chains distribute b, which comes from independent
- * samples, so a class that they miss is missing in all other classes of the chains. For a deficit the tails err on the
- * safe side, because samples that raise the mean also raise its spread.
+ * Returns whether an excess of a class in the chains over the bootstrap counts as evidence. Energies of independent
+ * samples have heavy tails: until the rare bright samples occur, both mean and spread of the bootstrap are too small
+ * and t is far too large. An excess therefore counts only if the bootstrap knows the class well. Little is lost by
+ * this: the chains distribute b, which comes from independent samples, over the classes, so an excess in one class is a
+ * deficit in others. A deficit is safe to judge, because samples that raise the bootstrap's mean also raise its spread.
  */
 static bool excess_counts(const struct path_class_energy *c)
 {
@@ -240,7 +244,7 @@ void convergence_judge(const struct plan *p, const struct canvas_image *img, str
 	     stuck = p->epoch >= STUCK_EPOCH && a->stuck_share > STUCK_MOST;
 	if (!tiles && !a->classes_flagged && !a->classes_apart && !stuck)
 		return;
-	/* The product of two counts of a checked plan fits 64 bits: COUNT_SAMPLES does. */
+	/* The product cannot overflow: it is at most COUNT_SAMPLES, which fits into 64 bits. */
 	a->verdict = img->rounds * p->epoch < CONVERGENCE_MUTATIONS ? CHAINS_TOO_SHORT : CHAINS_DISAGREE;
 	put_words(p, img, a, tiles, stuck);
 }

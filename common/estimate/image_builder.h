@@ -6,15 +6,14 @@
 #include "common/estimate/image.h"
 #include "common/film/canvas_films.h"
 
-/* An image being made. */
 struct image_builder {
 	const struct canvas *c;
 	struct canvas_image *img;
-	bool open_rounds;
-	struct tally *all;		/* prefix, bootstrap and, for a preview, the open rounds */
-	double factor[PLAN_MAX_GROUPS]; /* grid units to the group's image; 0: the group has nothing */
-	double pooled_factor;
-	double b[PLAN_MAX_GROUPS];
+	bool open_rounds;		/* a preview, which includes open rounds */
+	struct tally *all;		/* sums of prefix, bootstrap and, for a preview, open rounds */
+	double factor[PLAN_MAX_GROUPS]; /* from grid units to the group's own image; 0: the group has no samples */
+	double pooled_factor;		/* from the sums over all groups to the image */
+	double b[PLAN_MAX_GROUPS];	/* by group */
 };
 
 #endif

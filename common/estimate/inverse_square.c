@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * With B = f sinh u, dB / (B^2 + f^2) = du / (f cosh u): the integrand is smooth however small the floor f is, and the
- * trapezoidal rule converges exponentially.
+ * With the substitution B = f sinh u, dB / (B^2 + f^2) becomes du / (f cosh u): the integrand is smooth however small
+ * the floor f is, and the trapezoidal rule converges exponentially.
  */
 #include "common/estimate/inverse_square.h"
 
@@ -9,10 +9,10 @@
 
 struct inverse_square inverse_square_expect(double brightness, double error, double floor)
 {
-	static const double reach = 6; /* standard errors */
+	static const double reach = 6; /* the integral covers so many standard errors on either side */
 	double f = floor / error, b = brightness / error;
 	double first = asinh((b - reach) / f), last = asinh((b + reach) / f);
-	/* Half a standard deviation where the distribution is narrower than the weight. */
+	/* Longest step in u: half a standard deviation of B where its distribution is narrower than the weight. */
 	double most = fmin(0.25, 0.5 / sqrt(b * b + f * f)), steps = ceil((last - first) / most);
 	double h = (last - first) / steps, up = exp(first), ratio = exp(h), one = 0, two = 0;
 	for (double i = 0; i <= steps; i++, up *= ratio) {

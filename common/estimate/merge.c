@@ -22,18 +22,18 @@
 #include <math.h>
 #include <string.h>
 
-enum { KEY = 2, SUMS = 3 }; /* of a saved lease */
+enum { KEY = 2, SUMS = 3 }; /* numbers of these kinds in a saved lease */
 
 struct bootstrap {
 	struct plan plan;
 	float *weights;	       /* [bootstrap], in index order */
-	struct batch *batches; /* [group][part]: key, counters and sums only */
-	uint32_t missing;
-	struct tail tail; /* of all weights */
+	struct batch *batches; /* [group][part]; only key, counters, sums and classes are kept */
+	uint32_t missing;      /* leases not added yet */
+	struct tail tail;      /* of all weights */
 };
 
-/* How many of the largest samples the tail is judged by: one in 512, but at least enough for a standard error of a
- * quarter. */
+/* Returns how many of the largest samples the tail index is estimated from: one in 512, but at least 16, for which its
+ * relative standard error is a quarter. */
 static size_t tail_count(const struct plan *p)
 {
 	uint64_t n = p->bootstrap / 512;
@@ -230,9 +230,9 @@ void bootstrap_to_canvas(struct bootstrap *s, struct canvas *c)
 	}
 }
 
-/* The least number of rounds between two estimates of the error. One costs 15 to 17 ns per pixel and group, a
- * mutation or sample at least 2 us: after 0.9 of them per pixel and group it is less than 1 % of the work since the
- * last one. */
+/* Returns the least number of rounds between two estimates of the error. An estimate costs 15 to 17 ns per pixel and
+ * group, a mutation or sample at least 2 us: after 0.9 mutations or samples per pixel and group, an estimate costs less
+ * than 1 % of the work since the last one. */
 static uint64_t look_rounds(const struct plan *p)
 {
 	uint64_t work = (uint64_t)p->crop_width * p->crop_height * p->groups / 10 * 9, round = plan_round_mutations(p);

@@ -4,7 +4,8 @@
 #include <float.h>
 #include <math.h>
 
-/* Stirling's series from 12 up: error below 1e-15. (The C library's lgamma writes to a global variable.) */
+/* Stirling's series for arguments from 12 on, to which smaller ones are shifted: error below 1e-15. The C library's
+ * lgamma is not used, because it writes to a global variable. */
 static double log_gamma(double x)
 {
 	double shift = 1;
@@ -15,7 +16,8 @@ static double log_gamma(double x)
 	return (x - 0.5) * log(x) - x + 0.91893853320467274178 + series - log(shift);
 }
 
-/* Steps until the fraction converges; about the square root of the larger parameter. */
+/* Evaluates the continued fraction of the incomplete beta function. It converges in about as many steps as the square
+ * root of the larger parameter. */
 static double beta_fraction(double x, double a, double b)
 {
 	double c = 1, d = 1 - (a + b) * x / (a + 1);
@@ -41,7 +43,7 @@ static double beta_fraction(double x, double a, double b)
 	return f;
 }
 
-/* I_x(a, b), with y = 1 - x passed separately. */
+/* Returns I_x(a, b). y = 1 - x is passed separately, because it would be inaccurate if x is close to 1. */
 static double incomplete_beta(double x, double y, double a, double b)
 {
 	if (!(x > 0))

@@ -5,26 +5,27 @@
 
 #include <math.h>
 
-/* For renders whose light is rare: the estimate below which most of that light has been found, and the factor by which
- * the true error may then still be larger (tests/image/README.md, "Where the render stops"). Above it, single groups
- * that outweigh all others may be all that has been found: a lamp in a glass shell stated 44 % where 544 % was true.
- * Chains wait until such a doubt is gone. That of few groups in few pixels stays for ever: without its rule, which is
- * that of single groups, which they may hide, a target error alone would never end the render. */
+/* The rules for renders whose light is rare (tests/image/README.md, "Where the render stops"). Once the estimate is at
+ * most `small`, most of the rare light has been found, and the true error is at most `factor` times the estimate. Above
+ * `small` this does not hold: for a lamp in a glass shell, 44 % was stated where 544 % was true.
+ * Renders of chains wait until the doubt is gone. The doubt of few groups in few pixels never goes, so it has a rule
+ * for chains, too, without which a target error alone would never end the render; the rule is the one of single groups,
+ * since few groups may hide these. */
 static const struct rare_rule {
 	enum error_doubt doubt;
 	double small, factor;
-	bool chains; /* of them, too */
+	bool chains; /* the rule also applies to chains */
 } rare_rules[] = {{ERROR_ONE_GROUP, 0.1, 5, false}, {ERROR_FEW_GROUPS, 0.1, 5, true}, {ERROR_TAIL, 0.2, 2.5, false}};
 enum { RARE_RULES = sizeof rare_rules / sizeof *rare_rules };
 
 static const char no_spread[] = "a single group of samples gives no error; use --spp 2 or more, and not --groups 1";
 
-/* The error that the image has if the pixels that came out bright really are, where that is less than half of the
- * stated one. A lamp smaller than a pixel looks like a firefly in short renders: 395 % was stated where 22 % was true.
- */
+/* Appends the error that the image has if the pixels that came out bright really are bright, if that is less than half
+ * of the stated error. A lamp smaller than a pixel looks like a firefly in short renders: 395 % was stated where 22 %
+ * was true. */
 static void add_own(const struct canvas_image *img, struct text *t)
 {
-	double own = img->rel_mse_own + img->rel_mse_unseen; /* what highlights have no part in is missing still */
+	double own = img->rel_mse_own + img->rel_mse_unseen; /* unseen light is missing in either case */
 	if (own < 0.25 * img->rel_mse)
 		text_put(t, "; if the bright ones are highlights and not fireflies, the error is about %.3g %%",
 			 100 * sqrt(own));
@@ -79,9 +80,10 @@ void stated_error_doubt(const struct canvas_image *img, char *text, size_t size)
 	}
 }
 
-/* The variance is finite above 2. Of 95 % intervals from 16 groups of 1,000 samples of a Pareto distribution, 95 %
- * hold at an index of 3, 93 % at 2.2, 91 % at 1.8, 80 % at 1.5, 28 % at 1.1 (3,000 trials each). The groups' means
- * give no hint: those that look regular are wrong more often. */
+/* Tail index above which the variance is finite. Of 95 % intervals from 16 groups of 1,000 samples of a Pareto
+ * distribution, 95 % contain the true mean at an index of 3, 93 % at 2.2, 91 % at 1.8, 80 % at 1.5, and 28 % at 1.1
+ * (3,000 trials each). The spread of the groups' means does not show which intervals are wrong: regular looking ones
+ * are wrong more often. */
 static const double finite_variance = 2;
 
 void stated_b_doubt(const struct canvas_image *img, char *text, size_t size)
@@ -120,7 +122,7 @@ void stated_error(const struct canvas_image *img, char *text, size_t size)
 			 (unsigned long long)img->width * img->height);
 }
 
-/* Light that no sample has found adds to a bound that it would leave. */
+/* Returns a bound on the relative error, raised if the error with unseen light would exceed it. */
 static double with_unseen(const struct canvas_image *img, double upper)
 {
 	double more = IMAGE_UNSEEN_FACTOR * img->rel_mse_unseen;
@@ -147,7 +149,7 @@ double stated_error_upper(const struct canvas_image *img, bool *doubtful)
 double stated_error_rare_factor(double error, double upper)
 {
 	for (size_t i = 0; i < RARE_RULES; i++)
-		if (fabs(upper / (rare_rules[i].factor * error) - 1) < 1e-4) /* but for rounding */
+		if (fabs(upper / (rare_rules[i].factor * error) - 1) < 1e-4) /* equal except for rounding */
 			return rare_rules[i].factor;
 	return 0;
 }

@@ -7,39 +7,45 @@
 
 #include "common/estimate/image.h"
 
-/* What the numbers mean; hslt-compare uses the same definition, with its reference as B. */
+/* The definition of relMSE; hslt-compare uses the same one, with its reference as B. */
 #define REL_MSE_DEFINITION \
 	"mean over pixels and channels of (A-B)^2 / (B^2 + (0.01 m)^2), m the mean of B; the relative error is its square root"
 
 enum { STATED_ERROR_TEXT = 384 };
 
-/* Why the interval is not known: "78 % of it comes from pixels ...". Empty: it is known, or there is no estimate. */
+/* Prints why the interval is not known: "78 % of the estimate comes from pixels ...". Empty if it is known, or if there
+ * is no estimate. */
 void stated_error_doubt(const struct canvas_image *img, char *text, size_t size);
 
-/* Why b's standard error is not known (chains): between few groups of means with infinite variance, the spread says
- * too little until the rarest light has come. Empty: it is known. */
+/* Prints why b's standard error is not known (chains): if the samples' variance is infinite, the spread of the means of
+ * few groups is too small until the rarest light has been found. Empty if it is known. */
 void stated_b_doubt(const struct canvas_image *img, char *text, size_t size);
 
-/* "relative error 8.60 % (95 %: 8.41 to 8.90 %)", or "relative error about 38 %, its interval is not known: ...",
- * or "relative error not known: ...";
- * also how many pixels no chain visited. Empty: there is no estimate. */
+/* Prints "relative error 8.60 % (95 %: 8.41 to 8.90 %)", or "relative error about 38 %, its interval is not known:
+ * ...", or "relative error not known: ..."; then, if there are any, the number of pixels that no chain visited. Empty
+ * if there is no estimate. */
 void stated_error(const struct canvas_image *img, char *text, size_t size);
 
 /*
- * What a target error is compared with, relative: the upper end of the 90 % interval. If an image made of samples is in
- * doubt because of rare light, the doubt may last forever, since the variance is infinite: then it is five times the
- * estimate where single groups outweigh all others, once that is 10 % or less, and two and a half times where the tail
- * of the errors is too long, once that is 20 % or less (tests/image/README.md, "Where the render stops"). Few groups in
- * few pixels may hide single ones that outweigh the others, and count as these do, also of chains. If light is unseen
- * that may leave either bound, that includes twice what it adds. doubtful: of no use for that.
+ * Returns the relative error that is compared with a target error: the upper end of the 90 % interval. *doubtful: the
+ * image cannot be compared with a target yet.
+ *
+ * If an image made of samples is in doubt because of rare light, the doubt may last for ever, since the variance is
+ * infinite. Instead of the interval's end, a multiple of the estimate is then compared (tests/image/README.md, "Where
+ * the render stops"): five times the estimate if single groups outweigh all others (ERROR_ONE_GROUP), once the estimate
+ * is 10 % or less; two and a half times if the tail of the errors is too long (ERROR_TAIL), once it is 20 % or less.
+ * With few groups and few pixels (ERROR_FEW_GROUPS), single groups may outweigh the others without being noticed, so
+ * the first rule applies, also to chains. If light that is still unseen would put the error above such a bound, twice
+ * the relMSE of that light is added.
  */
 double stated_error_upper(const struct canvas_image *img, bool *doubtful);
-/* That is below or at the target: what ends a render. */
+/* Returns whether the image's error meets the target, which ends a render. */
 bool stated_error_meets(const struct canvas_image *img, double target);
-/* The factor by which a relative error was multiplied to give this `upper`; 0: it is the end of an interval. */
+/* Returns the factor of the rule for rare light by which stated_error_upper got `upper` from this error; 0 if `upper`
+ * is the end of an interval. */
 double stated_error_rare_factor(double error, double upper);
-/* The estimate at which a render stops while its light is rare, by this factor; 0: it is not known yet,
- * and taken to be the smaller one, as it is most often. */
+/* Returns the estimate at which a render with this target stops by the rule for rare light with this factor. Factor 0
+ * means that the rule is not known yet; the smaller factor, which is the more frequent one, is then assumed. */
 double stated_error_rare_stop(double target, double factor);
 
 #endif

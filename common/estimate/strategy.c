@@ -36,7 +36,7 @@ const char *strategy_counter_name(enum strategy_counter c)
 	return names[c];
 }
 
-/* 5210 -> "5,210". */
+/* Prints 5210 as "5,210". */
 static const char *print_thousands(uint64_t n, char out[NUMBER])
 {
 	char digits[NUMBER];
@@ -50,7 +50,7 @@ static const char *print_thousands(uint64_t n, char out[NUMBER])
 	return out;
 }
 
-/* A cell of the given width: a / b with a suffix, or '-' if b is 0. */
+/* Appends a table cell of the given width: factor * a / b, or '-' if b is 0. */
 static void put_ratio(struct text *t, int width, double factor, uint64_t a, uint64_t b)
 {
 	if (b)
@@ -67,7 +67,8 @@ static uint64_t sum_failures(const uint64_t c[STRATEGY_COUNTERS])
 	return n;
 }
 
-/* Reasons that never occurred are left out, to keep lines readable. */
+/* Appends the reasons for failures, in % of the proposals. Reasons that never occurred are left out, to keep lines
+ * readable. */
 static void put_failures(struct text *t, const uint64_t c[STRATEGY_COUNTERS])
 {
 	text_put(t, " ");
@@ -122,7 +123,7 @@ void strategy_lines(const char *mixture, const struct canvas_counts *n, char *te
 	}
 }
 
-/* Epochs of chains: a chain without a state makes no mutations. */
+/* Returns the number of chain epochs made. Chains without a state have made no mutations and do not count. */
 static uint64_t chain_epochs(const struct plan *p, const struct canvas_counts *n)
 {
 	return n->counters[COUNT_SAMPLES] / p->epoch;

@@ -59,7 +59,7 @@ double tail_index(const struct tail *t, size_t k)
 	return sum > 0 ? (double)k / sum : INFINITY;
 }
 
-/* 95th percentile of the normal distribution. */
+/* The 95th percentile of the standard normal distribution. */
 static const double one_sided = 1.6449;
 
 double tail_index_least(double index, size_t k)

@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Standard errors of pixels: the spread between groups, and where it is too small because little light has arrived,
- * what its neighbours show to be missing. All loops run in a fixed order over exact inputs, so equal films give equal
- * bits.
+ * Standard errors of pixels. tile_error_load computes the spread between groups for each pixel of a tile. Where a
+ * pixel's brightness is not reliable, this spread is usually too small, because rare light has not arrived yet: then
+ * tile_error_write also uses the spread of the neighbours, and the rare light that they received (find_rare). Pixels
+ * that no chain visited get the errors of their neighbourhood. All loops run in a fixed order over exact inputs, so
+ * equal films give equal bits. Nothing fails.
  */
 #include "common/estimate/tile_error.h"
 
@@ -11,11 +13,12 @@
 #include <math.h>
 #include <string.h>
 
-/* Rare light is looked for in squares of up to RARE pixels a side, in pixels that are brighter than one by at most
- * RARE_BRIGHTER powers of two. */
+/* A pixel's rare light is estimated from squares of up to RARE pixels a side, and only from pixels that are brighter by
+ * at most RARE_BRIGHTER powers of two. */
 enum { RARE = 16, RARE_BRIGHTER = 3 };
 
-/* The inner loops run over groups and are independent, so the compiler vectorises them. */
+/* Computes a pixel's deviations, variance and kurtosis from the sums at offset `at` of the groups' slots. The inner
+ * loops run over groups, so that the compiler vectorises them. */
 static void pixel_error(struct image_builder *m, struct tile_error *t, const int64_t *const *slot, size_t at,
 			size_t pixel)
 {
@@ -50,6 +53,8 @@ static void pixel_error(struct image_builder *m, struct tile_error *t, const int
 	}
 }
 
+/* Computes the trimmed mean: an eighth of the groups is dropped, one after the other, each time the one farthest from
+ * the mean of the rest. */
 static void find_base(struct tile_error *t, size_t pixel, size_t k, double floor)
 {
 	double d[PLAN_MAX_GROUPS], mean = 0, square = 0;
@@ -113,7 +118,7 @@ void tile_error_load(struct image_builder *m, struct tile_error *t)
 		}
 }
 
-/* Mean variance of the 3 x 3 pixels around one, within the tile. */
+/* Returns the mean variance of the 3 x 3 pixels around one, within the tile. */
 static double square_around(const struct tile_error *t, uint32_t x, uint32_t y, size_t k)
 {
 	double sum = 0, n = 0;
@@ -124,12 +129,14 @@ static double square_around(const struct tile_error *t, uint32_t x, uint32_t y, 
 }
 
 /*
- * Raises `rare` in a square of pixels to the square of the light that few groups found there, on average. Where light
- * is rare, the groups do not show how often it comes: pixels that it did not reach have groups that agree, on a value
- * that is too small by that much. Those that it reached have a larger error of their own; where light is frequent, what
- * few groups have above the others and below them cancels. For a pixel only those count that would be at most ten times
- * as bright without such light (8 to 16 times: RARE_BRIGHTER powers of two): what is rare in a highlight says nothing
- * about the dark wall beside it.
+ * Raises `rare`, for the pixels of a square, to the square of the rare light per pixel found in it: the mean of
+ * brightness minus base, which is light that only few groups found.
+ *
+ * Pixels that rare light has not reached look certain: their groups agree, on a value that is too small by this mean on
+ * average. Pixels that it has reached have a larger error of their own anyway, and where light is frequent, brightness
+ * and base differ in either direction and the mean is near zero. For each pixel, the mean is only over pixels whose
+ * base is at most about ten times as bright (8 to 16 times: RARE_BRIGHTER powers of two), since rare light in a
+ * highlight says nothing about the dark wall beside it.
  */
 static void raise_square(const struct tile_error *t, size_t k, uint32_t x, uint32_t y, uint32_t size, double *rare)
 {
@@ -156,6 +163,7 @@ static void raise_square(const struct tile_error *t, size_t k, uint32_t x, uint3
 		}
 }
 
+/* Sets `rare` of each pixel to the largest value over the squares of 2, 4, ... RARE pixels a side that contain it. */
 static void find_rare(const struct tile_error *t, double rare[3][TILE_SIZE * TILE_SIZE])
 {
 	for (size_t k = 0; k < 3; k++)
@@ -166,9 +174,9 @@ static void find_rare(const struct tile_error *t, double rare[3][TILE_SIZE * TIL
 }
 
 /*
- * Standard errors of the tile's pixels. Where the brightness is not reliable, the variance of few groups is usually too
- * small, because rare light has not arrived yet: it is averaged with its neighbours', and is at least that of rare
- * light around it. A pixel that no chain visited would have a variance of 0, a false claim; it gets the variance of its
+ * If the brightness of a pixel is not reliable, its variance between few groups is usually too small, because rare
+ * light has not arrived yet. Such a variance is averaged with those of its neighbours, and is at least that of the rare
+ * light around the pixel. A pixel that no chain visited would claim a variance of 0; it gets the variance of its
  * neighbours, of its tile, or (tile_error_fill_unvisited) of the image.
  */
 void tile_error_write(struct image_builder *m, const struct tile_error *t, bool have_bases)
