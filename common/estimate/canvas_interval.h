@@ -6,26 +6,28 @@
 #include "common/estimate/image.h"
 
 enum { ERROR_FOLDED = 16 };
-/* With fewer groups a pixel does not show whether one outweighs the others: of four normal values one nearly always
- * does. */
+/* With fewer groups, the values of a pixel do not show whether one group outweighs the others: of four normally
+ * distributed values one nearly always does. */
 enum { ERROR_GROUPS = 5 };
 
-/* Sums of the groups' weighted errors over an image. Parts of the relMSE are sums over pixels and channels, not
- * means. */
+/* Sums of the groups' weighted errors over an image. The relMSE is a mean over pixels and channels; the parts here are
+ * the terms of that mean, and sums of them are not divided by their number. */
 struct error_sums {
 	uint32_t groups;
-	double share, doubt; /* parts; their squares times the variances of their weights */
-	double low, high;    /* bounds: divided by the brightness with all fireflies, and by what other groups found */
-	double dark, one_group; /* parts whose brightness is a block's mean; parts in which one group has most of the
-				   variance */
-	double kurtosis;	/* of the groups' values, parts as weights */
-	double tail;		/* tail index of the groups' relative errors on the bright side; INFINITY: not known */
-	size_t tail_errors;	/* number of largest errors used */
-	double gram[ERROR_FOLDED][ERROR_FOLDED]; /* products of groups' errors; more groups are folded onto so many */
-	double distance[PLAN_MAX_GROUPS];	 /* a group's error, squared */
+	double share;	    /* sum of all parts */
+	double doubt;	    /* sum of the variances of parts due to the uncertainty of their brightness */
+	double low;	    /* lower bound of share: parts divided by the brightness with all fireflies */
+	double high;	    /* upper bound of share: parts divided by the brightness that the other groups found */
+	double dark;	    /* sum of the parts whose brightness is a block's mean */
+	double one_group;   /* sum of the parts in which one group has most of the variance */
+	double kurtosis;    /* sum of the kurtosis of the groups' values, weighted by parts */
+	double tail;	    /* tail index of the groups' relative errors on the bright side; INFINITY: not known */
+	size_t tail_errors; /* number of largest errors from which it was estimated */
+	double gram[ERROR_FOLDED][ERROR_FOLDED]; /* products of the errors of two groups; further groups are folded */
+	double distance[PLAN_MAX_GROUPS];	 /* squared error of each group, if there are more than ERROR_FOLDED */
 };
 
-/* Fills in the relMSE, its intervals and the reasons for doubt. */
+/* Fills in the relMSE, its interval and the reason for doubt. */
 void canvas_interval(struct error_sums *s, struct canvas_image *img);
 
 #endif

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * fit() fits a level, a trend and their uncertainty to the estimates of the error so far (looks) by generalized least
- * squares. scenario_of() and simulate() draw possible renders from that fit and simulate each until it would stop;
- * summarise_costs() sorts their costs. The random numbers have constant seeds, so equal looks give equal forecasts
- * everywhere.
+ * squares; forecast.h explains the model. scenario_of() draws a possible render from that fit, and simulate() lets it
+ * run until it would stop; this is repeated PLAYS times, and summarise_costs() takes the quantiles of the costs. The
+ * random numbers have constant seeds, so equal looks give equal forecasts everywhere.
  *
- * Without looks, or without one whose interval is known, there is no forecast (false). Costs that no simulated render
- * can pay are INFINITY.
+ * Without looks there is no forecast (the functions return false). The cost of a simulated render that never stops is
+ * INFINITY.
  */
 #include "common/estimate/forecast.h"
 
@@ -19,24 +19,24 @@
 #include <string.h>
 
 enum {
-	PLAYS = 1024,
-	PRIOR_WEIGHT = 6, /* weight of the degrees of freedom that looks report, against their scatter, in looks */
-	STEPS_MOST = 256, /* more than 2^60 rounds have */
+	PLAYS = 1024,	  /* simulated renders */
+	PRIOR_WEIGHT = 6, /* the spread that looks report counts like the scatter of so many looks */
+	STEPS_MOST = 256, /* looks of a simulated render; 2^60 rounds have fewer */
 	TRIES_MOST = 64,
 };
 static const double used_share = 1.0 / 16; /* looks at less than this share of the work say little about the future */
-static const double burst = 0.15;	   /* spread of a look beyond chi-square: rare bursts of light */
+static const double burst = 0.15;	   /* spread of a look in addition to chi-square: rare bursts of light */
 static const double trend_prior =
-	0.2; /* standard deviation of the trend: rare bursts of light, and chains that still remember their seeds */
+	0.2; /* prior standard deviation of the trend: rare bursts of light, and chains that remember their seeds */
 static const double memory = 2,
 		    memory_sd = 0.8;	/* e-folds of work over which a trend decays; the spread of its logarithm */
-static const double drift = 0.08;	/* unforeseen change per e-fold of work */
-static const double price_floor = 0.03; /* relative spread of the time per sample between stretches of time */
+static const double drift = 0.08;	/* standard deviation of unforeseen changes of x per e-fold of work */
+static const double price_floor = 0.03; /* least relative spread of the time per sample over time */
 static const double log_four = 1.3862943611198906;
 
 /* ---- looks */
 
-#define WORK_MOST 0x1p63 /* plans count it in 64 bits */
+#define WORK_MOST 0x1p63 /* plans count work in 64 bits */
 
 void forecast_add_look(struct forecast_history *h, const struct forecast_look *l)
 {
@@ -78,7 +78,8 @@ const struct forecast_look *forecast_reached(const struct forecast_history *h, d
 	return NULL;
 }
 
-/* Quantile of chi-square over its degrees (Wilson and Hilferty 1931) for the normal's quantile z. */
+/* Returns a quantile of chi-square divided by its degrees of freedom (Wilson and Hilferty 1931); z: the quantile of the
+ * normal distribution for the same probability. */
 static double chi_square_share(double degrees, double z)
 {
 	double s = 2 / (9 * degrees), root = 1 - s + z * sqrt(s);
@@ -98,18 +99,19 @@ bool forecast_error(const struct forecast_history *h, struct forecast_range *err
 /* ---- the fit */
 
 struct fit {
-	double work;	     /* of the last look; times are logarithms of work relative to it */
-	double level, trend; /* log(relMSE x work) now, and its growth per e-fold of work */
-	double level_sd, trend_sd, correlation;
-	double spread, shift;		   /* of one look's logarithm around the fit: standard deviation, mean */
-	double seen;			   /* e-folds of work covered by the looks: the trend is extrapolated as far */
-	double now;			   /* the last look's deviation in spreads */
-	double margin, margin_sd;	   /* log of upper end over estimate, where the interval is known */
+	double work;	     /* work at the last look; t below is log(work / this) */
+	double level, trend; /* log(relMSE x work) at the last look, and its growth per e-fold of work */
+	double level_sd, trend_sd, correlation; /* uncertainty of level and trend */
+	double spread, shift;			/* standard deviation and mean of a look's logarithm around the fit */
+	double seen;			   /* e-folds of work covered by the looks; limits the trend into the past */
+	double now;			   /* deviation of the last look, in units of spread */
+	double margin, margin_sd;	   /* log(upper end / estimate) of looks whose interval is known */
 	double doubt;			   /* probability that a look's error is in doubt */
-	double cpu, cpu_sd, wall, wall_sd; /* seconds a sample; relative spread */
+	double cpu, cpu_sd, wall, wall_sd; /* seconds per sample, and their relative spread */
 };
 
-struct normal_equations { /* of level and trend */
+/* The normal equations of level (l) and trend (t). */
+struct normal_equations {
 	double ll, lt, tt, l, t;
 };
 
@@ -122,8 +124,9 @@ static void add_observation(struct normal_equations *q, double weight, double al
 	q->t += weight * at * value;
 }
 
-struct innovation { /* what a look adds to the one before: value = al level + at trend + noise of variance share x
-		       spread^2 */
+/* The part of a look that is independent of the look before: value = al * level + at * trend + noise, where the noise
+ * has the variance share * spread^2. */
+struct innovation {
 	double al, at, value, share;
 };
 
@@ -138,7 +141,7 @@ static struct innovation innovation_of(const struct forecast_look *l, const stru
 	return (struct innovation){1 - r, t - r * t0, x - r * x0, 1 - r * r};
 }
 
-/* Looks `first` .. of h. */
+/* Fits level, trend and spread to the looks of h from `first` on. */
 static void fit_level(struct fit *f, const struct forecast_history *h, uint32_t first)
 {
 	struct normal_equations q = {0};
@@ -148,7 +151,7 @@ static void fit_level(struct fit *f, const struct forecast_history *h, uint32_t 
 		struct innovation v = innovation_of(&h->looks[i], i > first ? &h->looks[i - 1] : NULL, f);
 		add_observation(&q, 1 / v.share, v.al, v.at, v.value);
 	}
-	double det = q.ll * q.tt - q.lt * q.lt; /* > 0, by the prior and the first look */
+	double det = q.ll * q.tt - q.lt * q.lt; /* > 0, because of the prior and the first look */
 	f->level = (q.l * q.tt - q.t * q.lt) / det;
 	f->trend = (q.ll * q.t - q.lt * q.l) / det;
 	double square = 0;
@@ -157,7 +160,7 @@ static void fit_level(struct fit *f, const struct forecast_history *h, uint32_t 
 		double d = v.value - v.al * f->level - v.at * f->trend;
 		square += d * d / v.share;
 	}
-	/* With rare bursts of light the scatter of the looks says more than chi-square. */
+	/* With rare bursts of light, looks scatter more than by chi-square. */
 	variance = (PRIOR_WEIGHT * variance + square) / (PRIOR_WEIGHT + (double)(h->count - first) - 1);
 	f->spread = sqrt(variance);
 	f->level_sd = sqrt(variance * q.tt / det);
@@ -175,8 +178,8 @@ static bool in_doubt(const struct forecast_look *l)
 	return l->doubtful || rare_factor(l) > 0;
 }
 
-/* From the looks of h from `first` on, without those whose upper end is only a multiple of the estimate; if there are
- * no others, the margin is that of chi-square. */
+/* Fits the margin to the looks of h from `first` on, except those whose upper end is only a multiple of the estimate.
+ * If there are no others, the margin is that of chi-square. */
 static void fit_margin(struct fit *f, const struct forecast_history *h, uint32_t first)
 {
 	double sum = 0, square = 0, n = 0;
@@ -192,7 +195,7 @@ static void fit_margin(struct fit *f, const struct forecast_history *h, uint32_t
 	f->margin_sd = n > 1 ? sqrt(fmax(0, square - n * f->margin * f->margin) / (n - 1)) : f->margin / 2;
 }
 
-/* How many of the looks are in doubt, with half a look for each of both (Jeffreys' prior). */
+/* Estimates the share of looks in doubt, with Jeffreys' prior: half a look in doubt and half a look that is not. */
 static void fit_doubt(struct fit *f, const struct forecast_history *h, uint32_t first)
 {
 	double sum = 0.5, n = 1;
@@ -208,7 +211,7 @@ static double seconds_spent(const struct forecast_look *l, bool wall)
 	return wall ? l->seconds : l->cpu_seconds;
 }
 
-/* Seconds per sample, and how much they vary from stretch to stretch: machines are shared. */
+/* Computes the seconds per sample, and how much they vary between looks, since machines are shared. */
 static void fit_price(const struct forecast_history *h, bool wall, double *price, double *sd)
 {
 	const struct forecast_look *end = last_look(h);
@@ -231,7 +234,7 @@ static struct fit fit(const struct forecast_history *h)
 	while (h->looks[first].work < used_share * end->work)
 		first++;
 	double d = fmax(end->degrees, 1);
-	/* Mean and variance of the logarithm of chi-square over its degrees, plus those of bursts. */
+	/* Spread and shift of the logarithm of chi-square over its degrees; the spread includes bursts of light. */
 	struct fit f = {.work = end->work,
 			.spread = sqrt(2 / d + 2 / (d * d) + burst * burst),
 			.shift = -1 / d - 1 / (3 * d * d)};
@@ -265,9 +268,11 @@ static double normal(struct dice *d)
 	return r * cos(6.283185307179586 * uniform(d));
 }
 
-struct scenario { /* one possible state of affairs */
+/* One possible render. Members are as in struct fit, drawn from their distributions. */
+struct scenario {
 	double level, trend, memory, drift, margin, now, cpu, wall;
-	double rare, seen; /* standard normal: how rare its light is; by the last look, apart from that */
+	double rare; /* standard normal: how rare the light of the scene is */
+	double seen; /* standard normal: the luck of the current look, which changes like its deviation */
 };
 
 static struct scenario scenario_of(const struct fit *f, struct dice *d)
@@ -277,7 +282,7 @@ static struct scenario scenario_of(const struct fit *f, struct dice *d)
 	double level =
 		f->level + f->level_sd * (f->correlation * a + sqrt(fmax(0, 1 - f->correlation * f->correlation)) * b);
 	struct scenario y = {.level = level, .trend = trend, .now = f->now + (f->level - level) / f->spread};
-	/* One after the other: the order in which an initializer is evaluated is the compiler's. */
+	/* Separate statements, because C does not define the order in which an initializer is evaluated. */
 	y.margin = fmax(0, f->margin + f->margin_sd * normal(d));
 	y.memory = memory * exp(memory_sd * normal(d));
 	y.drift = drift * normal(d);
@@ -288,13 +293,14 @@ static struct scenario scenario_of(const struct fit *f, struct dice *d)
 	return y;
 }
 
-/* Half of what decides whether a look is in doubt lasts, and half changes as fast as the look's deviation does. */
+/* Returns whether the current look is in doubt. Of the variance that decides this, half (`rare`) stays the same for a
+ * render, and half (`seen`) changes as fast as the deviations of looks. */
 static bool is_in_doubt(const struct fit *f, const struct scenario *y)
 {
 	return 0.5 * erfc(0.5 * (y->rare + y->seen)) < f->doubt;
 }
 
-/* Draws the scenario anew until its last look is in doubt, or is not, as that of the render. */
+/* Draws `rare` and `seen` again until the scenario's current look is in doubt exactly if the render's last look is. */
 static void condition_on_doubt(const struct fit *f, struct scenario *y, bool doubt, struct dice *d)
 {
 	for (int i = 0; i < TRIES_MOST && is_in_doubt(f, y) != doubt; i++) {
@@ -303,7 +309,7 @@ static void condition_on_doubt(const struct fit *f, struct scenario *y, bool dou
 	}
 }
 
-/* How much log(relMSE x work) changes over t e-folds of work. */
+/* Returns the expected change of log(relMSE x work) over t e-folds of work after the last look. */
 static double expected_change(const struct fit *f, const struct scenario *y, double t)
 {
 	if (t < 0)
@@ -311,14 +317,14 @@ static double expected_change(const struct fit *f, const struct scenario *y, dou
 	return y->trend * y->memory * (1 - exp(-t / y->memory)) + y->drift * t;
 }
 
-/* The expected log(relMSE) at some work. */
+/* Returns the expected log(relMSE) after this much work. */
 static double expected_log_mse(const struct fit *f, const struct scenario *y, double work)
 {
 	return y->level + expected_change(f, y, log(work / f->work)) - log(work);
 }
 
-/* The number of rounds at which it stops. rare_stop: the estimate at which it does in doubt; 0: it is never in doubt.
- */
+/* Simulates a render and returns the number of rounds at which it stops. rare_stop: the estimate at which a render in
+ * doubt stops; 0: renders are never in doubt. */
 static double simulate(const struct fit *f, struct scenario *y, const struct plan *p, double target, double rare_stop,
 		       enum forecast_run run, struct dice *d)
 {
@@ -375,7 +381,8 @@ static void summarise_costs(struct plays *s, struct forecast_cost *c)
 	c->seconds = range_of(s->wall);
 }
 
-/* The estimate at which a render stops in doubt, by the rule of the latest look that has one. 0: it cannot. */
+/* Returns the estimate at which a render in doubt stops, by the rule that the latest look in such doubt shows; 0 for
+ * renders of chains, which do not stop in doubt. */
 static double rare_stop_of(const struct forecast_history *h, const struct plan *p, double target)
 {
 	double factor = 0;
@@ -417,7 +424,7 @@ bool forecast_target(const struct forecast_history *h, const struct plan *p, dou
 	return true;
 }
 
-/* e-folds of work that quarter relMSE. */
+/* Returns the e-folds of work after which relMSE is a quarter; INFINITY if more than 15. */
 static double work_to_quarter(const struct fit *f, const struct scenario *y)
 {
 	double low = 0, high = 16;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Potential scale reduction (Gelman and Rubin 1992) by tile, and energies of path classes, from the moments that a
- * canvas keeps. Can only fail for lack of memory.
+ * Computes the potential scale reduction (Gelman and Rubin 1992) by tile and the energies of path classes from the
+ * moments that a canvas keeps. The only failure is -ENOMEM.
  */
 #include "common/estimate/moments_image.h"
 
@@ -10,15 +10,18 @@
 
 #include <math.h>
 
-/* Moments are rounded to float once per epoch and then to the grid. A spread this small relative to the mean cannot
- * be told from none: in a film of one tile, every chain is in it all the time. */
+/* Moments are rounded to float once per epoch and then to the grid, so a spread below this share of the mean cannot be
+ * distinguished from none. It occurs: in a film of one tile, every chain spends all its time in that tile. */
 #define ROUNDING 0x1p-20
 
-/* For the sequences of one tile: mean and variance of their means, and the mean variance of a mutation within one. */
+/* The shares of time that sequences spend in one tile. */
 struct spread {
-	double mean, between, within;
+	double mean;	/* of the sequences' shares */
+	double between; /* their variance */
+	double within;	/* mean variance of one mutation's share within a sequence */
 };
 
+/* n: mutations per sequence. */
 static double r_hat(const struct spread *s, double n)
 {
 	if (!(s->mean > 0) || isnan(s->between) || n < 2)
@@ -73,7 +76,7 @@ static int make_tiles(const struct moments *m, double n, struct canvas_image *im
 
 /* ---- classes */
 
-/* Mean of the groups' values, and its standard error. */
+/* Returns the mean of the groups' values, and stores its standard error. */
 static double mean_of(const double *x, uint32_t groups, double *error)
 {
 	double mean = 0, square = 0;
@@ -85,6 +88,7 @@ static double mean_of(const double *x, uint32_t groups, double *error)
 	return mean;
 }
 
+/* Returns the time of a group's chains in a class, in mutations. */
 static double chains_time(const struct moments *m, uint32_t group, size_t class, bool open_rounds)
 {
 	struct exact_sum sum = {0};
@@ -93,13 +97,14 @@ static double chains_time(const struct moments *m, uint32_t group, size_t class,
 	return exact_sum_value(&sum);
 }
 
-/* The energy of one unit of a class's sums: chains count time, samples the energy that they leave to chains. */
+/* Returns the energy of one unit of a class's sums: chains add up time, of which a unit stands for b; samples add up
+ * the energy that they leave to chains (erpt). */
 static double unit_of(const struct moments *m, const struct moments_group *of)
 {
 	return m->plan.kind == PLAN_CHAINS ? of->b : 1;
 }
 
-/* Adds what chains have of the class to `of_chains`, by group. */
+/* Computes the energy of a class, and adds the chains' energy in it to of_chains, by group. */
 static void make_class(const struct moments *m, const struct moments_group *groups, size_t class, bool open_rounds,
 		       double of_chains[PLAN_MAX_GROUPS], struct path_class_energy *out)
 {
@@ -121,7 +126,8 @@ static void make_class(const struct moments *m, const struct moments_group *grou
 	out->difference_t = compared && !(mean == 0 && error == 0) ? mean / error : NAN;
 }
 
-/* The share of chains in the light, and in the variance of b, of samples that leave some of it to them. */
+/* For samples whose brightest contributions are spread by chains: computes the chains' share of the energy, and of the
+ * variance of b between groups. */
 static void find_chains_part(const double *of_chains, const struct moments_group *groups, uint32_t count,
 			     struct canvas_image *img)
 {

@@ -8,12 +8,14 @@
 
 struct moments;
 
-/* Input per group: independent samples of its bootstrap, merged mutations, b. */
+/* The input for each group. */
 struct moments_group {
-	uint64_t bootstrap, mutations;
+	uint64_t bootstrap; /* independent samples of the group's bootstrap */
+	uint64_t mutations; /* merged mutations or samples */
 	double b;
 };
-/* Fills in img->classes and, for complete rounds of chains (not for previews), the arrays by tile. */
+/* Fills in img->classes and, for complete rounds of chains (not for previews), the arrays by tile. Returns 0 or
+ * -ENOMEM. */
 int moments_image(const struct moments *m, const struct moments_group *groups, uint64_t rounds, bool open_rounds,
 		  struct canvas_image *img, struct error *e);
 
