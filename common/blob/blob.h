@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Blobs named by their SHA-256: files in a folder, stored atomically (temporary file, check, fsync, rename, fsync of
- * the folder). A store with a limit evicts the blobs that were least recently used or released, but none that is held.
- * One thread at a time per store; the hashing functions from any thread. SHA-256 comes from OpenSSL's EVP.
+ * the folder). A store with a limit evicts the least recently used or released blobs, but none that is held. One thread
+ * at a time per store; the hashing functions from any thread. SHA-256 comes from OpenSSL's EVP.
  */
 #ifndef COMMON_BLOB_BLOB_H
 #define COMMON_BLOB_BLOB_H
@@ -17,68 +17,78 @@
 struct blob_store;
 struct blob_entry;
 
-/* Creates the folder if necessary and removes temporary files of earlier runs. limit: bytes; 0: none. Existing blobs
- * are kept for now. */
+/* Opens a store: creates the folder if necessary, removes temporary files of earlier runs, and lists the blobs. limit:
+ * most bytes of all blobs; 0: none. Blobs beyond the limit are not evicted yet. Returns 0, -ENOMEM, or -errno if the
+ * folder or a file in it cannot be read. */
 int blob_store_open(struct blob_store **s, const char *folder, uint64_t limit, struct error *e);
 void blob_store_close(struct blob_store *s);
-/* Evicts the least recently used blob that is not held, to make room on the disk; false: there is none. */
+/* Evicts the least recently used blob that is not held, to make room on the disk; false if there is none. */
 bool blob_store_evict(struct blob_store *s);
-/* Bytes of all files, including those that are held or still arriving. */
+/* Returns the bytes of all files, including those that are held or still arriving. */
 uint64_t blob_store_bytes(const struct blob_store *s);
-/* Whoever may make room on the disk when nothing is left to evict; false: there is none. */
+/* Sets a function that is called when the disk is full and nothing is left to evict. It may make room elsewhere; it
+ * returns false if it cannot. */
 void blob_store_ask(struct blob_store *s, bool (*more_room)(void *user), void *user);
-/* Call if files that are lost with the power can be fetched again. They are then not flushed to the disk: after a
- * restart no file is used before blob_check has read it. */
+/* Call if files that are lost in a power failure can be fetched again. They are then not flushed to the disk, and after
+ * a restart no file may be used before blob_check has read it. */
 void blob_store_use_as_cache(struct blob_store *s);
-/* Evicts what exceeds the limit, at most BLOB_TRIM_MOST at once. Call once everything needed is held, and again while
- * it returns true. */
-enum { BLOB_TRIM_MOST = 64 /* a millisecond */ };
+/* Evicts blobs beyond the limit, at most BLOB_TRIM_MOST at once. Call it once everything needed is held, and again
+ * while it returns true. */
+enum { BLOB_TRIM_MOST = 64 /* takes about a millisecond */ };
 bool blob_store_trim(struct blob_store *s);
 
-bool blob_has(struct blob_store *s, const struct blob_hash *h, uint64_t *size); /* size may be NULL */
-/* Held blobs are not evicted; holds are counted. false: not in the store. */
+/* Returns whether a blob is in the store, and its size, unless `size` is NULL. */
+bool blob_has(struct blob_store *s, const struct blob_hash *h, uint64_t *size);
+/* Holds a blob, which is then not evicted until as many calls of blob_release. Returns false if it is not in the store.
+ */
 bool blob_hold(struct blob_store *s, const struct blob_hash *h);
 void blob_release(struct blob_store *s, const struct blob_hash *h);
-bool blob_is_held(struct blob_store *s, const struct blob_hash *h); /* there or not */
+bool blob_is_held(struct blob_store *s, const struct blob_hash *h); /* also true for a missing blob that is held */
 
-/* Holds a blob, present or not: one that is written later is held from the start. -ENOMEM */
+/* Like blob_hold, but also for a blob that is not in the store, which is then held as soon as it is written. Returns 0
+ * or -ENOMEM. */
 int blob_expect(struct blob_store *s, const struct blob_hash *h, struct error *e);
 
-/* A file descriptor to read from, or -ENOENT. The caller closes it. */
+/* Returns a file descriptor to read from, which the caller closes, or -ENOENT. */
 int blob_open(struct blob_store *s, const struct blob_hash *h, uint64_t *size, struct error *e);
 
-/* Its entry, there or not; NULL: none. For blob_check.c. */
+/* For blob_check.c: returns the entry of a blob, present or missing; NULL if there is none. */
 struct blob_entry *blob_find(struct blob_store *s, const struct blob_hash *h);
 
-/* The path of a held blob, for callers that map it. */
+/* Returns the path of a held blob, for callers that map it. */
 void blob_path(const struct blob_store *s, const struct blob_hash *h, char *path, size_t size);
 
-/* Writing: begin, add in order, commit. Room is made as bytes arrive, so that whoever announces much and sends nothing
- * costs others nothing; begin looks whether the announced size fits beside the blobs that are held. -EFBIG: it does
- * not, or what was to be added does not fit now: nothing was, and the caller may try again. -EMSGSIZE: more than
- * announced, or announced more than the limit; -EBADMSG: the hash does not match the name. End a writer with commit or
- * abort. A committed blob is held once. */
+/* Writing a blob: blob_write_begin, blob_write_add in order, blob_write_commit. Room is made as bytes arrive, so that a
+ * peer that announces much and sends nothing costs others nothing; blob_write_begin only checks that the announced size
+ * fits beside the blobs that are held. End each writer with commit or abort. A committed blob is held once.
+ * Errors: -EFBIG if the announced size does not fit, or if the bytes to be added do not fit now (then none of them is
+ * added, and the caller may try again); -EMSGSIZE for more bytes than announced, or an announced size above the limit;
+ * -EBADMSG if the hash does not match the name; -errno of the disk. */
 struct blob_writer;
 int blob_write_begin(struct blob_writer **w, struct blob_store *s, const struct blob_hash *h, uint64_t size,
 		     struct error *e);
 uint64_t blob_write_at(const struct blob_writer *w); /* bytes written so far */
-void blob_write_pause(struct blob_writer *w);	     /* it has no descriptor until more is added */
+void blob_write_pause(struct blob_writer *w);	     /* closes the file until more is added */
 int blob_write_add(struct blob_writer *w, const void *bytes, size_t size, struct error *e);
 int blob_write_commit(struct blob_writer *w, struct error *e); /* frees the writer in any case */
 void blob_write_abort(struct blob_writer *w);
 
-/* For blob_batch.c: a file that is complete and checked, but neither flushed nor renamed. Its entry is held and counts
- * as missing, so that nothing is evicted under its name. Any thread may ask for paths. */
+/* For blob_batch.c: a file that is complete and checked, but neither flushed nor renamed. Its entry is held and marked
+ * as missing, so that nothing is evicted under its name. Paths may be asked for on any thread. */
 struct blob_kept {
 	struct blob_hash hash;
 	uint64_t size, number; /* number: of the temporary file */
 };
 
 void blob_temporary_path(const struct blob_store *s, uint64_t number, char *path, size_t size);
-int blob_write_keep(struct blob_writer *w, struct blob_kept *kept, struct error *e); /* frees the writer in any case */
-void blob_enter(struct blob_store *s, const struct blob_kept *kept); /* its file has its name and is flushed */
-/* Once for each that was kept. true: it is missing and nobody holds it: sweep when all are let go. */
+/* Ends a writer without flushing and renaming the file. Frees the writer in any case. */
+int blob_write_keep(struct blob_writer *w, struct blob_kept *kept, struct error *e);
+/* Marks the blob as present: its file has been flushed and renamed. */
+void blob_enter(struct blob_store *s, const struct blob_kept *kept);
+/* Ends the hold that blob_write_keep took; to be called once for each kept file. Returns true if the blob is missing
+ * and no longer held: then call blob_store_sweep after the last one. */
 bool blob_let_go(struct blob_store *s, const struct blob_kept *kept);
-void blob_store_sweep(struct blob_store *s); /* forgets those that are missing and not held, all in one pass */
+/* Removes the entries of all blobs that are missing and not held, in one pass. */
+void blob_store_sweep(struct blob_store *s);
 
 #endif

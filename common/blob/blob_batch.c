@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The files have temporary names until all of them are flushed; then they get their own, and the folder is flushed. If
- * a flush fails, those that have their names already stay: the next start reads them, and they are checked before use.
+ * The files have temporary names until all of them are flushed; then they are renamed, and the folder is flushed. If
+ * this fails midway, the files that have been renamed stay: the next start lists them, and they are checked before use.
  */
 #include "common/blob/blob_batch.h"
 
@@ -16,9 +16,9 @@ enum { PATH_MOST = 4096 };
 
 struct blob_batch {
 	struct blob_store *store;
-	struct list kept; /* struct blob_kept */
-	size_t renamed;
-	atomic_bool unwanted;
+	struct list kept;     /* struct blob_kept */
+	size_t renamed;	      /* files that have got their names */
+	atomic_bool unwanted; /* set by blob_batch_give_up */
 };
 
 struct blob_batch *blob_batch_new(struct blob_store *s)

@@ -13,10 +13,10 @@
 struct blob_check {
 	struct blob_store *store;
 	struct blob_hash hash;
-	double begun;
-	bool was_given; /* when it began */
-	bool whole;	/* nothing is left to read */
-	int fd, rc;
+	double begun;	/* when the check began, s of the monotonic clock */
+	bool was_given; /* the entry's `given` when the check began */
+	bool whole;	/* the end of the file has been reached */
+	int fd, rc;	/* of the file; first error while reading */
 	EVP_MD_CTX *md;
 	struct error error;
 };
@@ -38,7 +38,7 @@ int blob_check_begin(struct blob_check **out, struct blob_store *s, const struct
 		return error_set(e, ENOMEM, "no memory to check %s", path);
 	*c = (struct blob_check){
 		.store = s, .hash = *h, .begun = clock_seconds(), .was_given = n->given, .fd = -1, .rc = 0};
-	n->given = false; /* what is given from now on may be read too late for this check */
+	n->given = false; /* a file opened from now on may change after this check has read it */
 	blob_take(s, n);
 	n->checks++;
 	*out = c;
@@ -51,7 +51,7 @@ bool blob_is_being_checked(struct blob_store *s, const struct blob_hash *h)
 	return n && n->checks;
 }
 
-/* The store's path does not change: no lock. */
+/* Opens the file. Called on any thread without a lock: of the store only the path is used, which never changes. */
 static int check_open(struct blob_check *c, const char *path)
 {
 	c->fd = disk_open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW, 0);
@@ -63,6 +63,7 @@ static int check_open(struct blob_check *c, const char *path)
 	return 0;
 }
 
+/* Hashes the next 32 MiB. */
 static int check_some(struct blob_check *c, const char *path)
 {
 	enum { PIECE = 1 << 18, PIECES = 128 };
@@ -93,7 +94,8 @@ bool blob_check_read(struct blob_check *c)
 	return !c->rc && !c->whole;
 }
 
-/* What the bytes say: 0, -EBADMSG, -ENOENT: no file, or why they are not known. */
+/* Returns 0 if the contents are right, -EBADMSG if they are wrong, -ENOENT if there is no file, or another -errno if
+ * they could not be read. */
 static int check_result(struct blob_check *c, struct error *e)
 {
 	struct blob_hash got;
@@ -108,7 +110,8 @@ static int check_result(struct blob_check *c, struct error *e)
 	return blob_hash_equal(&got, &c->hash) ? 0 : -EBADMSG;
 }
 
-/* Its contents are wrong, or there is none. */
+/* Marks a blob as missing. there: its file exists, with wrong contents, and is kept as damaged.NAME. Returns -EBADMSG.
+ */
 static int mark_gone(struct blob_store *s, struct blob_entry *n, bool there, struct error *e)
 {
 	char path[BLOB_PATH_MOST], damaged[BLOB_PATH_MOST + 16], hex[BLOB_HEX_SIZE];
@@ -127,9 +130,9 @@ int blob_check_end(struct blob_check *c, struct error *e)
 {
 	struct error ignored;
 	struct blob_store *s = c->store;
-	struct blob_entry *n = blob_find(s, &c->hash); /* it is held */
+	struct blob_entry *n = blob_find(s, &c->hash); /* exists, because the check holds it */
 	int rc = check_result(c, e ? e : &ignored);
-	if (n->checked > c->begun) { /* written or checked by another one meanwhile */
+	if (n->checked > c->begun) { /* it has been written again, or another check has succeeded, in the meantime */
 		rc = 0;
 	} else if (rc == -EBADMSG || rc == -ENOENT) {
 		rc = mark_gone(s, n, rc == -EBADMSG, e);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* SHA-256 of bytes, and as a name. Any thread. */
+/* SHA-256 hashes, and their hexadecimal form, which is a blob's name. Any thread. */
 #ifndef COMMON_BLOB_BLOB_HASH_H
 #define COMMON_BLOB_BLOB_HASH_H
 
@@ -15,9 +15,9 @@ struct blob_hash {
 	uint8_t bytes[BLOB_HASH_SIZE];
 };
 
-int blob_hash_bytes(const void *bytes, size_t size, struct blob_hash *out, struct error *e);
+int blob_hash_bytes(const void *bytes, size_t size, struct blob_hash *out, struct error *e); /* 0, or -EIO of OpenSSL */
 void blob_hex(const struct blob_hash *h, char hex[BLOB_HEX_SIZE]);
 bool blob_hash_equal(const struct blob_hash *a, const struct blob_hash *b);
-bool blob_from_hex(const char *hex, struct blob_hash *h);
+bool blob_from_hex(const char *hex, struct blob_hash *h); /* false if it is not 64 digits 0-9 and a-f */
 
 #endif

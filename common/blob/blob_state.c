@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Who may be evicted, and in which order: an entry leaves the list of idle ones with its first hold and enters it
- * again, as the most recently used, when its last hold is given back. One whose file is missing is in no list. No
- * failures.
+ * Keeps the list of idle blobs, those that may be evicted, in the order of eviction. An entry leaves the list with its
+ * first hold and enters it again, as the most recently used one, with its last release. A blob whose file is missing is
+ * not in the list. Nothing fails.
  */
 #include "common/blob/blob_state.h"
 

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Packing measures first, then writes message and payload into one frame. Unpacking splits the payload by the sizes in
- * the message, each checked against what is left, and decodes tiles and states into a batch that owns its memory.
+ * Converts batches and grants to frames and back. Packing first encodes the tiles and adds up the sizes, then allocates
+ * one frame and writes the message and the payload into it. Unpacking cuts the payload into pieces by the sizes in the
+ * message, each of which is checked against the bytes that remain, and decodes tiles and states into a batch or grant
+ * that owns its memory.
  *
- * Failures: -EBADMSG for sizes that contradict each other or the plan and for states with another digest, -ENOMEM. The
- * batch is then empty.
+ * Failures: -EBADMSG for sizes that contradict each other or the plan, and for states that do not match their digest;
+ * -ENOMEM. The batch or grant is empty after a failure.
  */
 #include "common/wire/batch_wire.h"
 
@@ -61,7 +63,7 @@ int states_digest(const struct chain_state *states, uint32_t count, struct blob_
 	return rc ? -ENOMEM : 0;
 }
 
-/* The message borrows the digest. */
+/* Computes the digest of the states for a message, which points to *h. Without states the message has no digest. */
 static int digest_to_wire(const struct chain_state *states, uint32_t count, struct blob_hash *h,
 			  ProtobufCBinaryData *out, struct error *e)
 {
@@ -79,6 +81,7 @@ int states_digest_from_wire(const ProtobufCBinaryData *m, struct blob_hash *out,
 	return 0;
 }
 
+/* Computes the digest of the states and compares it with that in the message. */
 static int check_digest(const struct chain_state *states, uint32_t count, const ProtobufCBinaryData *m,
 			struct blob_hash *out, struct error *e)
 {
@@ -190,19 +193,20 @@ int batch_pack(const struct batch *b, const struct plan *p, unsigned char **fram
 
 /* ---- unpacking ---- */
 
-/* Cuts `size` bytes off the front of the payload. */
+/* The part of a payload that has not been used yet. */
 struct cutter {
 	const unsigned char *at;
 	size_t left;
 };
 
-/* An empty range needs a valid pointer, too: that of states without bytes. */
+/* The pointer must not be NULL even if there is no payload: cut_bytes returns it for states of 0 bytes. */
 static struct cutter cutter_of(const unsigned char *payload, size_t size)
 {
 	static const unsigned char nothing[1];
 	return (struct cutter){payload ? payload : nothing, size};
 }
 
+/* Cuts `size` bytes off the front of the payload; NULL if it has fewer. */
 static const unsigned char *cut_bytes(struct cutter *c, size_t size)
 {
 	if (size > c->left)
@@ -280,8 +284,8 @@ int batch_unpack(struct batch *b, const struct plan *p, const Farm__LeaseResult 
 		rc = error_set(e, EBADMSG, "a batch with %zu counters of strategies", m->n_strategies);
 	if (!rc && m->n_classes != PATH_CLASSES)
 		rc = error_set(e, EBADMSG, "a batch with %zu path classes", m->n_classes);
-	/* Checks the counts against the plan before memory is allocated, and before thousands of tiles of a pixel are
-	 * read. */
+	/* Counts are checked against the plan before memory is allocated for them, and before a message with thousands
+	 * of tiny tiles costs time. */
 	if (!rc && m->n_tile_sizes > tiles_most(p))
 		rc = error_set(e, EBADMSG, "a batch with %zu tiles", m->n_tile_sizes);
 	if (!rc && m->n_state_sizes > chains_per_lease(p))

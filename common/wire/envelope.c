@@ -2,12 +2,13 @@
 /*
  * Packs messages into frames and unpacks them, with protobuf-c.
  *
- * envelope_unpack gives protobuf-c an allocator that takes blocks of memory up to a limit, a multiple of the message's
- * length; all of them are freed at once. Then the message is searched for fields that this version does not know.
- * Hello and its answer, whose frames have no checksum, end with one of their own, which is computed after packing.
+ * envelope_unpack gives protobuf-c an allocator that hands out pieces of a few blocks, up to a limit that is a multiple
+ * of the message's length; all blocks are freed at once. Then the message is searched for fields that this version does
+ * not know. The frames of Hello and its answer have no checksum; these messages contain one, which is computed after
+ * packing.
  *
- * A message that is refused leaves an empty envelope. Lack of memory is -ENOMEM, distinguished from a message that
- * needs more than its limit.
+ * Failures: a message that is refused (-EBADMSG, -EILSEQ) leaves an empty envelope. If memory is really out, the error
+ * is -ENOMEM, not that of a message that needs more than its limit.
  */
 #include "common/wire/envelope.h"
 
@@ -23,13 +24,15 @@
 
 enum {
 	BLOCK_BYTES = 1 << 14,
-	FIRST_BYTES =
-		512, /* and FIRST_TIMES the message's length, at most BLOCK_BYTES: thousands of small ones may wait */
+	/* The first block has FIRST_BYTES + FIRST_TIMES * the message's length, at most BLOCK_BYTES, because thousands
+	 * of small messages may be held at the same time. */
+	FIRST_BYTES = 512,
 	FIRST_TIMES = 4,
-	AMPLIFICATION =
-		16, /* memory allowed per byte of a message; valid ones need at most 8 (packed varints of one byte) */
+	/* Memory allowed per byte of a message, in addition to LEAST_BYTES. Valid messages need at most 8 (packed
+	 * varints of one byte each). */
+	AMPLIFICATION = 16,
 	LEAST_BYTES = 1 << 16,
-	CHECK_BYTES = 4, /* a fixed32 at the end of hello and its answer: its field number is the highest */
+	CHECK_BYTES = 4, /* the checksum, a fixed32 with the highest field number, so it comes last in the message */
 };
 
 struct envelope_block {
@@ -71,7 +74,7 @@ static void give_back(void *user, void *p)
 
 static bool is_known(const ProtobufCMessage *m);
 
-/* A sub-message field: absent, one, or many. */
+/* Returns whether all fields of the sub-messages in field f of m are known. */
 static bool field_is_known(const ProtobufCMessage *m, const ProtobufCFieldDescriptor *f)
 {
 	const char *base = (const char *)m;
@@ -91,13 +94,13 @@ static bool field_is_known(const ProtobufCMessage *m, const ProtobufCFieldDescri
 	return !one || is_known(one);
 }
 
-/* A peer of another version says so in hello, which may have fields that are new there; it must be answered. */
+/* Hello and its answer may have unknown fields: a peer of a newer version says so in Hello and must get an answer. */
 static bool may_be_newer(const ProtobufCMessage *m)
 {
 	return m->descriptor == &farm__hello__descriptor || m->descriptor == &farm__hello_ack__descriptor;
 }
 
-/* The schema is not recursive, so the depth is bounded by the schema. */
+/* Returns whether the message has no unknown fields. The schema is not recursive, so the depth is bounded. */
 static bool is_known(const ProtobufCMessage *m)
 {
 	if (m->n_unknown_fields && !may_be_newer(m))
@@ -110,7 +113,8 @@ static bool is_known(const ProtobufCMessage *m)
 	return true;
 }
 
-/* Their frame has no checksum, which other versions could not read. */
+/* Returns whether the message contains a checksum: Hello and its answer, of this version. Their frames have none, since
+ * other versions could not read it. */
 static bool has_check(const Farm__Envelope *m)
 {
 	return (m->body_case == FARM__ENVELOPE__BODY_HELLO && m->hello->version == FARM_VERSION) ||
@@ -216,7 +220,7 @@ int envelope_pack(const Farm__Envelope *message, const void *payload, size_t pay
 	Farm__HelloAck ack;
 	if (has_check(message) && message->body_case == FARM__ENVELOPE__BODY_HELLO) {
 		hello = *message->hello;
-		hello.check = 1; /* room for it: a value of 0 is not packed */
+		hello.check = 1; /* makes room for the checksum: a value of 0 would not be packed */
 		copy.hello = &hello;
 	} else if (has_check(message)) {
 		ack = *message->hello_ack;

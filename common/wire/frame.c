@@ -71,7 +71,7 @@ uint64_t frame_reader_size(const struct frame_reader *r)
 	return (uint64_t)r->header_size + r->payload_size;
 }
 
-/* Large buffers are freed, so that an idle connection holds little memory. */
+/* Frees large buffers, so that an idle connection holds little memory. */
 void frame_reader_drop(struct frame_reader *r)
 {
 	enum { KEEP = 1 << 16 };
@@ -90,6 +90,7 @@ static int refuse_changed(struct error *e)
 	return error_set(e, EILSEQ, "data was changed in transit: the checksum of a message does not match");
 }
 
+/* Checks the prefix, sets the sizes, and bounds the buffers by them. */
 static int take_prefix(struct frame_reader *r, struct error *e)
 {
 	if (r->checked && crc32c(0, r->prefix, 12) != read_u32(r->prefix + 12))
@@ -108,6 +109,7 @@ static int take_prefix(struct frame_reader *r, struct error *e)
 	return 0;
 }
 
+/* Appends bytes to one of the two buffers until it holds `want` bytes. */
 static int take_part(struct frame_reader *r, struct buf *b, size_t want, const unsigned char *bytes, size_t count,
 		     size_t *used, struct error *e)
 {

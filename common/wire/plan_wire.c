@@ -7,7 +7,7 @@
 
 static size_t unseen_to_wire(const struct plan_unseen *u, double **out)
 {
-	union { /* messages are only read: protobuf-c knows no const */
+	union { /* casts const away: protobuf-c's structures have no const, but packing only reads them */
 		const double *from;
 		double *to;
 	} borrowed = {u->at};

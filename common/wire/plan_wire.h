@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Converts plans, plan requests and lease keys to messages and back. Only what does not fit into the structures is
- * refused here; callers check the rest with plan_check or plan_make. Any thread.
+ * Converts plans, plan requests and lease keys to messages and back. The ..._from_wire functions return 0, or -EBADMSG
+ * for values that do not fit into the structure; plan_from_wire also applies plan_check. Requests are checked further
+ * by plan_make, and lease keys by their users. Any thread.
  */
 #ifndef COMMON_WIRE_PLAN_WIRE_H
 #define COMMON_WIRE_PLAN_WIRE_H
@@ -10,7 +11,7 @@
 #include "common/plan/plan.h"
 #include "common/wire/envelope.h"
 
-/* The message borrows the plan's text. */
+/* The ..._to_wire functions fill in a message that points to the texts of the structure. */
 void plan_to_wire(const struct plan *p, Farm__Plan *out);
 int plan_from_wire(const Farm__Plan *m, struct plan *p, struct error *e); /* ends with plan_check */
 
