@@ -1,17 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A store is a sorted array of entries (hash, size, holds) that mirrors a folder: opening reads the folder, looking up
- * is a binary search, and only contents are read from the disk. An entry that was evicted stays in the array as a
- * missing one, until a quarter of all are such: a store of a million files loses thousands of them to a large one.
+ * is a binary search, and the disk is only read for contents. The entry of an evicted blob stays in the array, marked
+ * as missing, until a quarter of all entries are: one large file may evict thousands of a million small ones, and each
+ * removal from the array would move the rest.
  *
- * Writing: blob_write_begin makes a temporary file, blob_write_add makes room, appends and hashes, blob_write_commit
- * compares the hash, flushes unless the store is a cache, renames and adds the entry. Until then the blob does not
- * exist. blob_write_keep leaves flushing and renaming to a batch; the entry is there from then on, but counts as
- * missing until blob_enter.
+ * Writing: blob_write_begin creates a temporary file; blob_write_add makes room, appends and hashes; blob_write_commit
+ * compares the hash, flushes (unless the store is a cache), renames, and adds the entry. Until then the blob does not
+ * exist. Instead of blob_write_commit, blob_write_keep leaves flushing and renaming to a batch; the entry then exists
+ * at once, but is marked as missing until blob_enter.
  *
- * Failures: a wrong hash or more bytes than announced are -EBADMSG, and the temporary file is removed. A full disk is
- * -ENOSPC, after every blob that is not held has been evicted and nobody has more room. blob_check drops a blob whose
- * file is gone or changed.
+ * Failures: more bytes than announced are -EMSGSIZE, a wrong hash is -EBADMSG, and the temporary file is removed. A
+ * full disk is -ENOSPC, once every blob that is not held has been evicted and the owner of the store has found no more
+ * room. blob_check removes blobs whose file is missing or damaged.
  */
 #include "common/blob/blob.h"
 
@@ -28,16 +29,19 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { BLOCK = 4096, EVICTIONS = 8 /* at once, whatever the size */ };
+enum {
+	BLOCK = 4096,  /* bytes that even the smallest file takes on the disk */
+	EVICTIONS = 8, /* evictions at a time that are always allowed */
+};
 
 struct blob_writer {
 	struct blob_store *store;
 	struct blob_hash hash;
-	uint64_t size, at;
-	int fd; /* -1: not open */
-	bool made;
+	uint64_t size, at;	   /* bytes announced; bytes written so far */
+	int fd;			   /* of the temporary file; -1: not open */
+	bool made;		   /* the temporary file has been created */
 	uint64_t number;	   /* of the temporary file */
-	char path[BLOB_PATH_MOST]; /* the same file's */
+	char path[BLOB_PATH_MOST]; /* of the temporary file */
 	EVP_MD_CTX *md;
 };
 
@@ -48,7 +52,7 @@ static void path_of(const struct blob_store *s, const char *name, char path[BLOB
 	snprintf(path, BLOB_PATH_MOST, "%s/%s", s->folder, name);
 }
 
-/* The index of the first entry that is not below it. */
+/* Returns the index of the first entry whose hash is not below h. */
 static size_t place_of(const struct blob_store *s, const struct blob_hash *h)
 {
 	size_t low = 0, high = s->count;
@@ -68,7 +72,7 @@ struct blob_entry *blob_find(struct blob_store *s, const struct blob_hash *h)
 	return i < s->count && blob_hash_equal(&s->entries[i]->hash, h) ? s->entries[i] : NULL;
 }
 
-/* NULL also if it is missing. */
+/* Like blob_find, but returns NULL also for an entry that is marked as missing. */
 static struct blob_entry *find_there(struct blob_store *s, const struct blob_hash *h)
 {
 	struct blob_entry *n = blob_find(s, h);
@@ -88,7 +92,7 @@ static int reserve(struct blob_store *s, size_t count, struct error *e)
 	return 0;
 }
 
-/* Puts it at this index. NULL: no memory. */
+/* Inserts an entry, marked as missing, at index i. Returns NULL if memory is out. */
 static struct blob_entry *add_entry(struct blob_store *s, size_t i, const struct blob_hash *h, struct error *e)
 {
 	struct blob_entry *n = reserve(s, s->count + 1, e) ? NULL : mem_alloc(1, sizeof *n);
@@ -108,6 +112,7 @@ static int by_hash(const void *a, const void *b)
 	return memcmp((*x)->hash.bytes, (*y)->hash.bytes, BLOB_HASH_SIZE);
 }
 
+/* A file found in the folder, and when it was last used. */
 struct found {
 	struct blob_hash hash;
 	uint64_t size;
@@ -139,7 +144,7 @@ static int read_folder(struct blob_store *s, struct error *e)
 			disk_unlink(path);
 		if (!blob_from_hex(name, &h))
 			continue;
-		if (disk_stat(path, &st)) { /* if it cannot be read it is kept */
+		if (disk_stat(path, &st)) { /* fails the whole opening: the blob must not be taken for missing */
 			rc = error_file(e, errno, path);
 			break;
 		}
@@ -196,7 +201,7 @@ static int refuse_excess(const struct blob_store *s, uint64_t need, struct error
 			 (unsigned long long)need, (unsigned long long)s->limit);
 }
 
-/* Whether `need` more bytes would fit into the limit beside the blobs that somebody holds. */
+/* Returns 0 if `need` more bytes would fit into the limit beside the blobs that are held. */
 static int could_fit(const struct blob_store *s, uint64_t need, struct error *e)
 {
 	uint64_t used = s->bytes - s->idle_bytes;
@@ -208,9 +213,9 @@ static int could_fit(const struct blob_store *s, uint64_t need, struct error *e)
 	return used > s->limit - need ? refuse_excess(s, need, e) : 0;
 }
 
-/* Evicts blobs until `need` more bytes fit into the limit, but only as many as may have so much on the disk, where the
- * smallest takes a block: of files of a few bytes, a megabyte would be tens of thousands, and seconds. What is left
- * over the limit then goes with the next bytes. */
+/* Evicts blobs until `need` more bytes fit into the limit, but no more files than take that much space on the disk,
+ * where each takes at least a block. Otherwise, a megabyte could mean evicting tens of thousands of files of a few
+ * bytes, which takes seconds. An excess over the limit is then evicted when the next bytes arrive. */
 static int make_room(struct blob_store *s, uint64_t need, struct error *e)
 {
 	uint64_t most = need / BLOCK + EVICTIONS;
@@ -263,7 +268,7 @@ void blob_store_ask(struct blob_store *s, bool (*more_room)(void *user), void *u
 	s->user = user;
 }
 
-/* The disk is full. */
+/* Makes room on a full disk; false if there is nothing left to remove. */
 static bool make_disk_room(struct blob_store *s)
 {
 	return (s->limit && blob_store_evict(s)) || (s->more_room && s->more_room(s->user));
@@ -284,6 +289,7 @@ uint64_t blob_store_bytes(const struct blob_store *s)
 	return s->bytes + s->arrived;
 }
 
+/* Marks a blob as the most recently used one, also on the disk for the next start. Returns NULL if it is missing. */
 static struct blob_entry *use_blob(struct blob_store *s, const struct blob_hash *h)
 {
 	struct blob_entry *n = find_there(s, h);
@@ -311,8 +317,9 @@ bool blob_has(struct blob_store *s, const struct blob_hash *h, uint64_t *size)
 bool blob_hold(struct blob_store *s, const struct blob_hash *h)
 {
 	struct blob_entry *n = find_there(s, h);
-	if (n &&
-	    !n->holds) /* otherwise its first holder has: thousands of files are held by an upload, then by its job */
+	/* A held blob has been marked as used by its first holder: skips thousands of files that an upload held before
+	 * its job. */
+	if (n && !n->holds)
 		use_blob(s, h);
 	if (n)
 		blob_take(s, n);
@@ -353,7 +360,7 @@ void blob_path(const struct blob_store *s, const struct blob_hash *h, char *path
 	snprintf(path, size, "%s/%s", s->folder, hex);
 }
 
-/* ---- expected ones ---- */
+/* ---- blobs that are expected ---- */
 
 int blob_expect(struct blob_store *s, const struct blob_hash *h, struct error *e)
 {
@@ -386,7 +393,7 @@ int blob_write_begin(struct blob_writer **out, struct blob_store *s, const struc
 	w->number = ++s->temporary;
 	blob_temporary_path(s, w->number, w->path, sizeof w->path);
 	w->fd = disk_open(w->path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-	if (w->fd < 0 && errno == ENOENT && disk_make_folder(s->folder, e) == 0) /* somebody removed it */
+	if (w->fd < 0 && errno == ENOENT && disk_make_folder(s->folder, e) == 0) /* the folder has been removed */
 		w->fd = disk_open(w->path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
 	w->made = w->fd >= 0;
 	if (!w->made)
@@ -460,7 +467,7 @@ static int check_written(struct blob_writer *w, struct error *e)
 	return 0;
 }
 
-/* Its file is there, and right. It is held. */
+/* Marks a held entry as present: its file has been written and its hash checked. */
 static void come_back(struct blob_store *s, struct blob_entry *n, uint64_t size)
 {
 	n->gone = n->given = false;
@@ -469,8 +476,8 @@ static void come_back(struct blob_store *s, struct blob_entry *n, uint64_t size)
 	n->checked = clock_seconds();
 }
 
-/* A cache's file is not flushed: a restart after a loss of power hashes it before use. Closing it tells whether a file
- * system that stores elsewhere took all of it; others reserve the room when it is written. */
+/* Makes a written file durable. The file of a cache is not flushed, because it is hashed before its first use after a
+ * restart. It is closed, though: only close reports errors of network file systems; local ones report them in write. */
 static int make_safe(struct blob_writer *w)
 {
 	int fd = w->fd;
@@ -545,7 +552,7 @@ int blob_write_keep(struct blob_writer *w, struct blob_kept *kept, struct error 
 		return rc;
 	}
 	*kept = (struct blob_kept){w->hash, w->size, w->number};
-	w->at = 0; /* what has arrived of it stays so */
+	w->at = 0; /* so that writer_free does not subtract the bytes from `arrived`; blob_let_go will */
 	writer_free(w);
 	return 0;
 }
@@ -560,7 +567,7 @@ void blob_enter(struct blob_store *s, const struct blob_kept *kept)
 bool blob_let_go(struct blob_store *s, const struct blob_kept *kept)
 {
 	s->arrived -= kept->size;
-	struct blob_entry *n = blob_find(s, &kept->hash); /* it is held */
+	struct blob_entry *n = blob_find(s, &kept->hash); /* exists, because it is held */
 	blob_put(s, n);
 	return n->holds == 0 && n->gone;
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A store's state: blob.c has the folder and writing, blob_check.c reads what is there. What nobody holds is in a list,
- * in the order in which it was last used or released, so that evicting one looks at no others. */
+/* The state of a store, shared by blob.c (folder, writing), blob_batch.c and blob_check.c. Blobs that are not held are
+ * in a list, in the order in which they were last used or released, so that evicting one need not search. */
 #ifndef COMMON_BLOB_BLOB_STATE_H
 #define COMMON_BLOB_BLOB_STATE_H
 
@@ -14,35 +14,36 @@
 enum { BLOB_PATH_MOST = 4096 };
 
 struct blob_entry {
-	TAILQ_ENTRY(blob_entry) order; /* among the idle ones */
+	TAILQ_ENTRY(blob_entry) order; /* position in the list of idle blobs */
 	struct blob_hash hash;
-	uint64_t size;
-	unsigned holds;
-	unsigned checks; /* that have begun and not ended */
-	double checked;	 /* when its contents were last verified, in s of a monotonic clock; 0: not since the start */
-	bool given;	 /* opened since then */
-	bool gone;	 /* or damaged: treated as missing, except for its holds */
+	uint64_t size;	 /* 0 while the blob is missing */
+	unsigned holds;	 /* number of holds */
+	unsigned checks; /* number of checks that have begun and not ended */
+	double checked;	 /* when the contents were last verified, s of the monotonic clock; 0: not since the start */
+	bool given;	 /* opened since then, so the file may have been changed */
+	bool gone;	 /* missing: the file does not exist or is damaged. Holds are kept */
 };
 
 struct blob_store {
 	char *folder;
-	uint64_t limit, bytes;
-	TAILQ_HEAD(blob_order, blob_entry) idle; /* there and not held, the least recently used first */
-	uint64_t idle_bytes;
-	size_t evicted;		       /* entries that are left of those, until the next sweep */
-	uint64_t arrived;	       /* of blobs that are being written */
-	uint64_t temporary;	       /* number of the last temporary file */
-	struct blob_entry **entries;   /* sorted by hash; there may be a million, and room is made between them */
-	bool (*more_room)(void *user); /* NULL: nobody has any */
+	uint64_t limit, bytes;			 /* most bytes (0: no limit), and bytes of all complete blobs */
+	TAILQ_HEAD(blob_order, blob_entry) idle; /* present and not held, the least recently used first */
+	uint64_t idle_bytes;			 /* bytes of the idle blobs */
+	size_t evicted;				 /* entries of evicted blobs since the last sweep */
+	uint64_t arrived;			 /* bytes received of blobs that are being written */
+	uint64_t temporary;			 /* number of the last temporary file */
+	struct blob_entry *
+		*entries; /* sorted by hash; pointers, since there may be a million and inserting moves them */
+	bool (*more_room)(void *user); /* see blob_store_ask; NULL: not set */
 	void *user;
-	size_t count, capacity;
-	bool cache; /* see blob_store_use_as_cache */
+	size_t count, capacity; /* of the entries */
+	bool cache;		/* see blob_store_use_as_cache */
 };
 
-/* All holds of an entry are taken and given back by these two. */
+/* Take and give back one hold of an entry. All holds go through these two. */
 void blob_take(struct blob_store *s, struct blob_entry *n);
 void blob_put(struct blob_store *s, struct blob_entry *n);
-/* A new entry, or one that was used although nobody holds it, is the last to be evicted. */
+/* Put an entry at the end of the list of idle blobs, which is evicted last, and remove it from the list. */
 void blob_idle_enter(struct blob_store *s, struct blob_entry *n);
 void blob_idle_leave(struct blob_store *s, struct blob_entry *n);
 
