@@ -93,7 +93,7 @@ int net_addr_allow(const struct net_addr *a, const char *host_port, bool safe, s
 		host_port);
 }
 
-/* Both kinds of addresses have it at the same place. */
+/* IPv4 and IPv6 addresses have the port at the same offset. */
 unsigned net_addr_port(const struct net_addr *a)
 {
 	struct sockaddr_in v4;

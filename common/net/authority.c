@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Each command locks the folder, reads what it needs, makes the certificate or list in memory, and replaces files in an
- * order in which a crash or a loss of power leaves a usable folder: keys before certificates, the record in issued/
- * before the certificate is handed out. Each file and its name are flushed before the next is written; key and
- * certificate get their names together.
+ * The commands of hslt-ca. Each locks the folder, reads the authority, makes a certificate or list in memory, and
+ * replaces files in an order in which a crash or power failure leaves a usable folder: keys before certificates, the
+ * record in issued/ before the certificate itself. Each file and its name are flushed before the next one is written;
+ * key and certificate are renamed together (write_pair).
  *
- * Failures: a folder that is not an authority's or is locked, a name that belongs to another role, errors of OpenSSL
- * (with its reason). Nothing is half issued.
+ * Failures: the folder is not an authority's, a name belongs to another role, a file cannot be read or written, OpenSSL
+ * fails (with its reason). A certificate that was not handed out completely is not recorded.
  */
 #include "common/net/authority.h"
 
@@ -27,8 +27,8 @@
 #include <sys/file.h>
 
 enum { PATH_SIZE = 4096, SERIAL_BYTES = 16, ENTRIES_MAX = 1 << 20 };
-/* Certificates and lists are valid from this many seconds before they are signed, since clocks of other machines may be
- * behind or be set back. */
+/* Certificates and lists are valid from this many seconds before they are signed, since the clocks of other machines
+ * may be behind or be set back. */
 enum { EARLIER = 86400 };
 
 struct authority {
@@ -223,7 +223,7 @@ static bool set_times(X509 *cert, double days, const X509 *issuer)
 	       ASN1_TIME_set(X509_getm_notAfter(cert), until);
 }
 
-/* A certificate without extensions and signature. */
+/* Returns a certificate without extensions and signature; NULL if OpenSSL fails. issuer NULL: it is the authority's. */
 static X509 *begin_cert(const char *name, EVP_PKEY *key, const X509 *issuer, double days)
 {
 	X509 *cert = X509_new();
@@ -258,7 +258,7 @@ static bool sign_other(const struct authority *a, X509 *cert, enum tls_role role
 
 /* ---- the revocation list ---- */
 
-/* Dates and signs it. It is valid as long as the authority: an expired list would lock everybody out. */
+/* Dates and signs the list. It is valid as long as the authority: an expired list would lock everybody out. */
 static int sign_list(struct authority *a, struct error *e)
 {
 	ASN1_TIME *from = ASN1_TIME_set(NULL, time(NULL) - EARLIER);
@@ -348,7 +348,7 @@ int authority_init(const char *folder, const char *name, double days, struct err
 	return rc;
 }
 
-/* Gives a file that was written under another name its own. */
+/* Renames a file in the folder of a name. */
 static int put_in_place(const struct authority *a, const char *name, const char *from, const char *to, struct error *e)
 {
 	char next[PATH_SIZE], path[PATH_SIZE];
@@ -358,8 +358,9 @@ static int put_in_place(const struct authority *a, const char *name, const char 
 	return !rc && disk_rename(next, path) ? error_file(e, errno, path) : rc;
 }
 
-/* Both are on the disk before either replaces the old one: on a full disk the old pair stays. Key first, and flushed: a
- * program that starts in between, or after a loss of power there, finds its certificate beside it (key_pair.c). */
+/* Writes both files before either replaces the old one, so that the old pair stays if the disk is full. The key is
+ * renamed first, and flushed: a program that starts in between, or after a power failure there, finds the certificate
+ * of this key beside it (key_pair.c). *in_use: the key has been replaced, so there is no way back to the old pair. */
 static int write_pair(const struct authority *a, const char *name, X509 *cert, EVP_PKEY *key, bool *in_use,
 		      struct error *e)
 {
@@ -370,7 +371,7 @@ static int write_pair(const struct authority *a, const char *name, X509 *cert, E
 		rc = write_pem(a->folder, name, "key.pem.next", pem_key(key), 0600, e);
 	if (!rc)
 		rc = put_in_place(a, name, "key.pem.next", "key.pem", e);
-	*in_use = !rc && has_file(a, name, "cert.pem"); /* there is no way back to the old pair */
+	*in_use = !rc && has_file(a, name, "cert.pem");
 	if (!rc && !(rc = path_in(path, e, a->folder, "", name)))
 		rc = disk_sync_folder(path, e);
 	if (!rc)
@@ -391,7 +392,7 @@ static int write_issued(const struct authority *a, const char *name, X509 *cert,
 	if (rc)
 		return rc;
 	snprintf(file, sizeof file, "%s.pem", who.serial);
-	/* Before anybody can use it: a certificate that is not recorded cannot be revoked by name. */
+	/* Recorded before anybody can use it: a certificate that is not recorded cannot be revoked by name. */
 	rc = write_pem(a->folder, "issued", file, pem_cert(cert), 0644, e);
 	if (!rc)
 		rc = write_pem(a->folder, name, "ca.pem", pem_cert(a->cert), 0644, e);
@@ -423,8 +424,8 @@ static int may_renew(const struct authority *a, const char *name, enum tls_role 
 	return rc;
 }
 
-/* Whether a folder was left by an interrupted call: it lacks the certificate, which is written last, and it has the
- * list of revocations, which is written first, or a part of it, or nothing. An empty folder is removed. */
+/* Returns whether an interrupted call has left the folder: it lacks the certificate, which is written last, and has the
+ * revocation list, which is written first, or a part of it, or is empty. An empty folder is removed. */
 static bool is_incomplete(const struct authority *a, const char *name, const char *path)
 {
 	return !has_file(a, name, "cert.pem") &&
@@ -465,8 +466,8 @@ int authority_issue(const char *folder, const char *name, enum tls_role role, do
 	return rc;
 }
 
-/* Calls `each` for every certificate in issued/, until it fails. Files that are not certificates are skipped; damage
- * says what is wrong with the first of them; "": all are certificates. */
+/* Calls `each` for every certificate in issued/, until it fails. Files that are not certificates are skipped; *damage
+ * describes the first of them, or is empty. */
 static int for_each_issued(const char *folder,
 			   int (*each)(void *user, X509 *cert, const struct tls_peer *who, struct error *e), void *user,
 			   struct error *damage, struct error *e)
@@ -499,7 +500,7 @@ struct revocation {
 	struct authority *a;
 	struct spelling near;
 	const char *what;
-	unsigned count, before; /* certificates: that it revokes, and that were revoked already */
+	unsigned count, before; /* numbers of certificates revoked now, and of those that were revoked before */
 };
 
 static int revoke_one(void *user, X509 *cert, const struct tls_peer *who, struct error *e)
@@ -542,7 +543,7 @@ int authority_revoke(const char *folder, const char *what, unsigned *count, stru
 			       spelling_hint(&r.near, hint, sizeof hint), *damage.text ? "; " : "", damage.text);
 	if (!rc && r.count)
 		rc = sign_list(&a, e);
-	if (!rc) /* also if all were revoked before: the coordinators may not have been told, if that was interrupted */
+	if (!rc) /* also if all were revoked before: an interrupted call may not have told the coordinators */
 		rc = write_list(&a, "", e);
 	*count = rc ? 0 : r.count;
 	if (!rc)

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Bytes that libuv reads go through TLS, if used, into the frame reader, which calls `message` for each complete frame.
- * Outgoing frames are the send queue's. A timer notices peers that are silent or stall, and certificates that expire or
- * are revoked meanwhile.
+ * Bytes that libuv reads go through TLS, if used, into the frame reader; `message` is called for each complete frame.
+ * Outgoing frames go through the send queue (send_queue.c). A timer notices peers that are silent or stall, and
+ * certificates that expire or are revoked meanwhile.
  *
- * A long frame takes its size from the pool, if there is one, where certificates take turns, or addresses without TLS.
- * While it waits for that, nothing more of its connection is read, and its peer counts as neither silent nor slow.
- * While others wait for the pool, whoever has a part of it must keep sending.
+ * A frame of more than 64 KB must get its size from the receive pool, in which certificates, or without TLS addresses,
+ * take turns. While a frame waits for that, its connection is not read, and its peer counts as neither silent nor slow.
+ * While others wait, a peer that has a part of the pool must keep sending.
  *
  * Failures end the connection, once, with a reason in words: frames beyond the limits, plaintext where TLS is required
  * (and the reverse), a peer that stalls, no memory.
@@ -23,46 +23,46 @@
 
 enum {
 	READ_BYTES = 1 << 16,
-	FRAMES_AT_ONCE = 16, /* after these, others are read first */
+	FRAMES_AT_ONCE = 16, /* frames of a connection that are handled before other connections are read */
 	TICK_MS = 250,
-	TICK_MS_MOST = 1000, /* if nothing is due earlier */
-	LINGER_MS = 5000,
-	REFUSED_MS = 1000,    /* time for a peer to read the reason */
-	HANDSHAKE_MS = 10000, /* of TLS records */
-	BYTES_PER_SECOND = 1 << 16,
-	SHORT = 1 << 16, /* a frame that needs nothing of the pool */
+	TICK_MS_MOST = 1000,	    /* longest tick, if the peer may be silent for long */
+	LINGER_MS = 5000,	    /* time for sending the rest */
+	REFUSED_MS = 1000,	    /* time for a refused peer to read the reason */
+	HANDSHAKE_MS = 10000,	    /* time for the TLS handshake */
+	BYTES_PER_SECOND = 1 << 16, /* least speed of a frame */
+	SHORT = 1 << 16,	    /* longest frame that does not need the pool */
 };
 
 struct conn {
 	uv_tcp_t tcp;
 	uv_timer_t timer;
-	uv_idle_t later; /* a timer of 0 ms would be called again and again before anything else */
+	uv_idle_t later; /* not a timer: one of 0 ms would run again and again before anything else */
 	uv_connect_t connecting;
 	struct conn_config config;
 	const struct conn_events *events;
 	void *user;
 	struct frame_reader reader;
 	struct tls_link *link;	  /* NULL: plaintext */
-	struct receive_turn turn; /* of the frame that is being received */
-	struct send_queue out;	  /* its state is the connection's */
+	struct receive_turn turn; /* the place in the pool of the frame being received */
+	struct send_queue out;	  /* its state is the connection's state */
 	uint64_t clock, ticked;	  /* ms of the connection's clock and of the loop's clock at the last tick */
-	uint64_t begun, last_read, frame_begun; /* ms of the connection's clock at that time */
-	uint64_t checked;			/* ms of the loop's clock: the next check of the peer's certificate */
-	uint64_t linger_until;			/* 0: not closing */
+	uint64_t begun, last_read, frame_begun; /* ms of the connection's clock */
+	uint64_t checked;			/* ms of the loop's clock: the last check of the peer's certificate */
+	uint64_t linger_until;			/* ms of the loop's clock; 0: not closing */
 	uint64_t paced_at; /* ms of the connection's clock: when the frame last had enough new bytes */
-	size_t paced;	   /* how many it had then */
+	size_t paced;	   /* bytes of its payload at that time */
 	int open_handles;
-	struct buf rest; /* plaintext that was read, and waits for the loop to come round; from rest_at on */
+	struct buf rest; /* plaintext that waits for the next iteration of the loop, from rest_at on */
 	size_t rest_at;
-	bool goes_on;	 /* the rest, or what the link has: until then nothing is read from the socket */
-	unsigned frames; /* delivered since others were read */
+	bool goes_on;	 /* there is such a rest; the socket is not read until it is used up */
+	unsigned frames; /* frames delivered since other connections could be read */
 	bool accepted, sniffed, garbled;
 	int distrust; /* as conn_distrust */
 	char why[256];
 };
 
-/* Holds what was just read or decrypted: libuv calls back with it before it reads more, and nothing is read inside a
- * callback. */
+/* Receives bytes read or decrypted. One buffer suffices: libuv calls back with it before it reads more, and nothing is
+ * read inside a callback. */
 static _Thread_local char chunk[READ_BYTES];
 
 static void give_back(struct conn *c)
@@ -99,8 +99,8 @@ void conn_close(struct conn *c, const char *why)
 
 /* ---- the connection's clock ---- */
 
-/* Stands still while the loop does: whatever arrived meanwhile has not been read yet, and no peer is to blame for
- * that. */
+/* Returns the connection's clock, which stands still while the loop is busy: bytes that arrive then have not been read
+ * yet, for which no peer is to blame. */
 static uint64_t clock_of(const struct conn *c)
 {
 	uint64_t since = uv_now(c->tcp.loop) - c->ticked, most = uv_timer_get_repeat(&c->timer);
@@ -119,10 +119,11 @@ static void tick_every(struct conn *c, uint64_t ms)
 
 /* ---- reading ---- */
 
-/* libuv reads a connection again and again while there is something to read, up to 32 times before any other. Without
- * room it goes on to the next connection. Of a read with thousands of short frames the rest waits likewise (on_later):
- * hundreds of connections may send as much at once, and others wait for all of them. What closed connections hold is
- * freed when the loop comes round; until then no requests are taken whose answers would need memory, too. */
+/* libuv reads a connection up to 32 times, while there is something to read, before it reads any other; without a
+ * buffer it goes on to the next one. This function refuses a buffer after FRAMES_AT_ONCE frames, so that hundreds of
+ * busy connections do not keep others waiting; the rest of a read with more short frames waits likewise (on_later). It
+ * also refuses while closed connections hold memory that the loop has yet to free: more requests need memory for
+ * answers. */
 static void on_alloc(uv_handle_t *h, size_t suggested, uv_buf_t *out)
 {
 	(void)suggested;
@@ -149,7 +150,7 @@ static void deliver_frames(struct conn *c)
 
 static void on_read(uv_stream_t *s, ssize_t count, const uv_buf_t *b);
 
-/* Unless what was read before comes first, or the pool has no room. */
+/* Reads from the socket, unless bytes read before come first, or the frame waits for the pool. */
 static void read_socket(struct conn *c)
 {
 	if (c->goes_on || c->turn.waits || c->out.state == SEND_CLOSED)
@@ -159,7 +160,7 @@ static void read_socket(struct conn *c)
 		conn_close(c, uv_strerror(rc));
 }
 
-/* The pool has room for its frame. */
+/* Called when the pool has room for the frame. */
 static void read_on(struct receive_turn *t)
 {
 	struct conn *c = (struct conn *)((char *)t - offsetof(struct conn, turn));
@@ -167,7 +168,7 @@ static void read_on(struct receive_turn *t)
 	read_socket(c);
 }
 
-/* Whoever has the peer's certificate, or its address. */
+/* Returns a hash of the name in the peer's certificate or, without one, of its address: the owner in the pool. */
 static uint64_t owner_of(const struct conn *c)
 {
 	char address[64];
@@ -177,7 +178,7 @@ static uint64_t owner_of(const struct conn *c)
 	return fnv_add(FNV_BEGIN, name, port ? (size_t)(port - name) : strlen(name));
 }
 
-/* Part of a frame is there. */
+/* Takes the size of a frame, of which a part has arrived, from the pool. */
 static void take_turn(struct conn *c)
 {
 	uint64_t size = frame_reader_size(&c->reader);
@@ -213,7 +214,7 @@ static void keep_pace(struct conn *c)
 
 static void on_later(uv_idle_t *h);
 
-/* Some frames in plaintext: how many bytes were used. */
+/* Handles some frames in plaintext. Returns the number of bytes used. */
 static size_t take_frames(struct conn *c, const unsigned char *bytes, size_t size)
 {
 	size_t at = 0;
@@ -233,14 +234,14 @@ static size_t take_frames(struct conn *c, const unsigned char *bytes, size_t siz
 			c->frames++;
 			deliver_frames(c);
 			frame_reader_drop(
-				&c->reader); /* now, rather than with the next frame, which may be seconds away */
+				&c->reader); /* now: the next frame, which would do it, may be long in coming */
 			give_back(c);
 		}
 	}
 	return at;
 }
 
-/* All that was read has been used. */
+/* All bytes that were read have been used. */
 static void wait_for_more(struct conn *c)
 {
 	if (!frame_reader_is_midway(&c->reader) || c->out.state != SEND_OPEN)
@@ -251,7 +252,7 @@ static void wait_for_more(struct conn *c)
 		c->events->partial(c->user);
 }
 
-/* Frames in plaintext, after decryption. */
+/* Handles plaintext; frames beyond FRAMES_AT_ONCE are kept for the next iteration of the loop. */
 static void receive(struct conn *c, const unsigned char *bytes, size_t size)
 {
 	size_t at = take_frames(c, bytes, size);
@@ -269,8 +270,8 @@ static void receive(struct conn *c, const unsigned char *bytes, size_t size)
 	uv_idle_start(&c->later, on_later);
 }
 
-/* Tells the peer the reason, if there is one, and gives it time to read: the kernel would discard it if data arrived
- * after the socket was closed. */
+/* Closes the connection, but gives the peer time to read an alert with the reason: the kernel would discard the alert
+ * if data arrived after the socket was closed. */
 static void refuse(struct conn *c, int rc, const char *why)
 {
 	c->distrust = rc == -EACCES || rc == -EKEYEXPIRED ? rc : 0;
@@ -283,7 +284,7 @@ static void refuse(struct conn *c, int rc, const char *why)
 		conn_close(c, why);
 }
 
-/* What the link has, until a rest of it has to wait. */
+/* Decrypts and handles the bytes in the link, until frames have to wait. */
 static void decrypt(struct conn *c)
 {
 	struct error e;
@@ -308,7 +309,7 @@ static void decrypt(struct conn *c)
 	}
 }
 
-/* Encrypted bytes; with none, starts the handshake. */
+/* Handles encrypted bytes; without any, starts the handshake. */
 static void take_encrypted(struct conn *c, const void *bytes, size_t size)
 {
 	struct error e;
@@ -321,7 +322,7 @@ static void take_encrypted(struct conn *c, const void *bytes, size_t size)
 	}
 }
 
-/* The loop has come round. */
+/* Called in the next iteration of the loop: handles the rest. */
 static void on_later(uv_idle_t *h)
 {
 	struct conn *c = h->data;
@@ -341,7 +342,7 @@ static void on_later(uv_idle_t *h)
 	read_socket(c);
 }
 
-/* No frame begins like a TLS record. */
+/* Recognises a peer that uses TLS by its first byte, since no frame begins like a TLS record, and refuses it. */
 static bool is_tls(struct conn *c, const char *bytes, size_t size)
 {
 	bool first = !c->sniffed && size;
@@ -384,7 +385,7 @@ static bool has_stalled(const struct conn *c)
 		(awaited && (double)(c->clock - c->paced_at) > 1000 * c->config.stall_seconds));
 }
 
-/* Checks the peer's certificate again: it may have expired, or been revoked. */
+/* Checks the peer's certificate again: it may have expired or been revoked. */
 static void check_again(struct conn *c, uint64_t now)
 {
 	struct error e;
@@ -398,7 +399,7 @@ static void check_again(struct conn *c, uint64_t now)
 		conn_close(c, e.text);
 }
 
-/* Its peer cannot send, and does not know why. */
+/* While the frame waits for the pool, the peer cannot send and is not to blame. Tells the owner, who may inform it. */
 static void wait_on(struct conn *c)
 {
 	c->last_read = c->frame_begun = c->clock;
@@ -432,7 +433,7 @@ static void on_send_failed(void *user, const char *why)
 	conn_close(user, why);
 }
 
-/* Where the peer is being told why it was refused, it has until linger_until to read that. */
+/* In SEND_REFUSED nothing is done: the peer has until linger_until to read why it was refused. */
 static void on_drained(void *user)
 {
 	struct conn *c = user;

@@ -5,7 +5,7 @@
 
 double jitter(double seconds)
 {
-	unsigned char random = 128; /* stays so where the system has none */
+	unsigned char random = 128; /* used if the system has no random numbers */
 	uv_random(NULL, NULL, &random, 1, 0, NULL);
 	return seconds * (0.5 + (double)random / 255);
 }

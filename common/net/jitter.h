@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Waiting times before something is tried again, spread so that a hundred workers or clients do not try at once. */
+/* Random waiting times before a retry, so that a hundred workers or clients do not retry at the same time. */
 #ifndef COMMON_NET_JITTER_H
 #define COMMON_NET_JITTER_H
 
-/* Between half and one and a half of that time, at random. Any thread. */
+/* Returns a random time between 0.5 and 1.5 times `seconds`. Any thread. */
 double jitter(double seconds);
 
 #endif

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A pair of two files cannot be replaced at once. hslt-ca writes the next certificate and the next key beside the old
- * ones, gives the key its name, and then the certificate (authority.c). If power is lost in between, the key is the
- * next certificate's, which is still under its own name: then that is used. Without a certificate for the key, what is
- * wrong with the first one is the failure.
+ * Two files cannot be replaced at once. hslt-ca therefore writes the next certificate and the next key beside the old
+ * ones, then renames the key, and then the certificate (authority.c). If the power fails in between, key.pem is the key
+ * of the next certificate, which still has the suffix, and that certificate is used. If neither certificate matches the
+ * key, the error is about the one without the suffix.
  */
 #include "common/net/key_pair.h"
 
@@ -11,7 +11,7 @@
 #include <stdbool.h>
 #include <stdio.h>
 
-/* The certificate first: OpenSSL drops a key that does not match a later certificate. */
+/* Loads the certificate before the key, because OpenSSL drops a key that does not match a certificate loaded later. */
 static bool use_both(SSL_CTX *context, const char *key, const char *cert)
 {
 	return SSL_CTX_use_certificate_chain_file(context, cert) == 1 &&

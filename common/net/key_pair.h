@@ -4,11 +4,11 @@
 
 #include <openssl/ssl.h>
 
-/* What a certificate is called before it replaces the one whose name is before it. */
+/* The suffix of a certificate's file name until it replaces the certificate without the suffix. */
 #define KEY_PAIR_NEXT ".next"
 
-/* Uses the key and the certificate in these files, or the next certificate if the key is that one's. Returns the path
- * of the file that is to blame, NULL: neither; OpenSSL's queue has the reason. */
+/* Uses the key and the certificate in these files or, if the key does not match the certificate, the next certificate.
+ * Returns NULL, or the path of the file that cannot be used; OpenSSL's queue has the reason. */
 const char *key_pair_use(SSL_CTX *context, const char *key, const char *cert);
 
 #endif

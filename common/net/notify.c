@@ -20,7 +20,7 @@ bool notify_send(const char *state)
 	if (length < 2 || length >= sizeof a.sun_path || (*path != '/' && *path != '@'))
 		return false;
 	memcpy(a.sun_path, path, length);
-	if (*path == '@') /* Abstract names on Linux begin with a zero byte, and their length is that of the address */
+	if (*path == '@') /* an abstract name, which begins with a zero byte and ends with the address */
 		a.sun_path[0] = 0;
 	int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
 	if (fd < 0)
@@ -32,7 +32,7 @@ bool notify_send(const char *state)
 	return sent == (ssize_t)size;
 }
 
-/* A whole number from an environment variable; -1: none. */
+/* Returns a whole number from an environment variable; -1 if it is not set or not such a number. */
 static long long env_number(const char *name)
 {
 	char *end;

@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * As many threads as the pool has are created, exist at the same time and end; then the pool creates its own, for which
- * there is room: the C library keeps the stacks of threads that have ended, and gives them to the next ones.
+ * First creates as many threads as the pool will have, all at the same time, and ends them. Then the pool can create
+ * its own: the C library keeps the stacks of threads that have ended and gives them to new ones.
  *
- * Failures: where one of them cannot be created, those before it end, and the pool is not touched.
+ * Failures: if a thread cannot be created, those before it end, and the pool is not touched.
  */
 #include "common/net/pool.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-enum { POOL_STANDARD = 4, POOL_MOST = 1024 }; /* libuv's */
+enum { POOL_STANDARD = 4, POOL_MOST = 1024 }; /* libuv's default and maximum */
 
 static unsigned pool_size(void)
 {

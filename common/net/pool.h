@@ -6,9 +6,8 @@
 
 #include <uv.h>
 
-/* Starts the threads of libuv's pool, which libuv itself does at the first use, and where it aborts the process if one
- * of them cannot be created. The loop must be new: it is run. -ENOMEM, or whatever else the system refuses threads
- * for. */
+/* Starts the threads of libuv's pool. libuv would start them at their first use, and abort the process if one of them
+ * could not be created. The loop must be new; it is run. Returns 0, -ENOMEM, or another -errno of creating threads. */
 int pool_start(uv_loop_t *loop, struct error *e);
 
 #endif

@@ -12,7 +12,7 @@ static void grant_bytes(struct receive_pool *p, struct receive_turn *t)
 	t->has = true;
 }
 
-/* In the present round, or that after the last in which its owner has a turn. */
+/* Lets a turn wait in the current round or, if its owner already waits, in the round after the owner's last turn. */
 static void enter_line(struct receive_pool *p, struct receive_turn *t)
 {
 	struct receive_turn **at = &p->first;

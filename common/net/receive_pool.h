@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Bounds the memory of frames that many connections receive at the same time. Each frame's size is taken from the pool
- * before it arrives; when the pool has not enough left, frames wait, and their senders with them. Owners take turns, so
- * that many connections of one do not keep others waiting. A frame larger than the pool is received alone. The loop's
- * thread.
+ * Bounds the memory of frames that many connections receive at the same time. Each frame takes its size from the pool
+ * before it arrives; if the pool does not have enough left, the frame waits, and its sender with it. Owners take turns,
+ * so that one owner with many connections does not keep the others waiting. A frame larger than the pool is received
+ * alone. The loop's thread.
  */
 #ifndef COMMON_NET_RECEIVE_POOL_H
 #define COMMON_NET_RECEIVE_POOL_H
@@ -11,25 +11,25 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* A connection's place; zeroed but for its owner: it has nothing and does not wait. */
+/* The place of a connection in the pool. Initially zeroed except for `owner` and `go`. */
 struct receive_turn {
 	uint64_t owner;
 	struct receive_turn *next;
-	uint64_t round; /* in which each owner that waits has one turn */
-	uint64_t bytes;
-	bool has, waits;
-	void (*go)(struct receive_turn *); /* it no longer waits, it has */
+	uint64_t round;			   /* in each round, each owner that waits has one turn */
+	uint64_t bytes;			   /* taken, or waited for */
+	bool has, waits;		   /* the bytes have been taken; they are waited for */
+	void (*go)(struct receive_turn *); /* called when bytes that were waited for have been taken */
 };
 
-/* Zeroed but for the limit: empty. */
+/* Initially zeroed except for the limit. */
 struct receive_pool {
 	uint64_t limit, used;	    /* bytes */
-	struct receive_turn *first; /* of those that wait, by rounds */
+	struct receive_turn *first; /* those that wait, in order of rounds */
 };
 
-/* false: it waits. */
+/* Takes bytes from the pool. Returns false if the turn has to wait; `go` is called later. */
 bool receive_pool_take(struct receive_pool *p, struct receive_turn *t, uint64_t bytes);
-/* Gives back what it has, or no longer waits. Others may go. */
+/* Gives back the bytes, or stops waiting. May call `go` of others. */
 void receive_pool_give(struct receive_pool *p, struct receive_turn *t);
 
 #endif

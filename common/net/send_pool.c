@@ -11,7 +11,8 @@ void send_pool_look(struct send_share *s, uint64_t now)
 	s->seen = left;
 }
 
-/* There is one: some queue holds something, and some queue at least the average. */
+/* Returns the share that must give way. There always is one when this is called: some share holds something, and some
+ * share at least the average. */
 static struct send_share *slowest_reader(const struct send_pool *p, uint64_t now)
 {
 	struct send_share *found = NULL;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Bounds the memory of what waits to be sent on many connections at the same time. When something more does not fit,
- * connections give way until it does: of those that hold at least the average of all that hold something, the one whose
- * peer has taken nothing for longest. So a peer that reads is the last to go, and one that holds little never goes.
- * What exceeds the limit alone may wait while nothing else does. The loop's thread.
+ * Bounds the memory of the bytes that wait to be sent on many connections at the same time. If more bytes would exceed
+ * the limit, connections are closed ("give way") until they fit: among the connections that hold at least the average,
+ * the one whose peer has taken nothing for the longest time. A peer that reads is therefore the last to be closed, and
+ * one that holds little never is. A single amount above the limit may wait while nothing else does. The loop's thread.
  */
 #ifndef COMMON_NET_SEND_POOL_H
 #define COMMON_NET_SEND_POOL_H
@@ -13,34 +13,35 @@
 #include <stdint.h>
 #include <sys/queue.h>
 
-/* What one connection holds; zeroed but for the first three: nothing. */
+/* The share of one connection. Initially zeroed except for the first three members. */
 struct send_share {
 	struct send_pool *pool;			     /* NULL: no limit */
 	uint64_t (*left)(const struct send_share *); /* bytes that the kernel has not taken; called at any time */
-	void (*give_way)(struct send_share *);	     /* the connection must be closed */
-	LIST_ENTRY(send_share) next;		     /* of those that hold something */
-	uint64_t bytes, seen;			     /* what it holds, and what was left when last looked at */
-	uint64_t moved;				     /* ms: when its peer last took something, or nothing waited */
-	bool leaves;				     /* its connection is being closed */
+	void (*give_way)(struct send_share *);	     /* must close the connection */
+	LIST_ENTRY(send_share) next;		     /* in the list of shares that hold something */
+	uint64_t bytes, seen;			     /* bytes held; result of left() when it was last called */
+	uint64_t moved;				     /* ms: when the peer last took something, or nothing waited */
+	bool leaves;				     /* the connection is being closed */
 };
 
-/* Zeroed but for the limit: empty. */
+/* Initially zeroed except for the limit. */
 struct send_pool {
-	uint64_t limit, used; /* bytes */
-	uint64_t leaving;     /* bytes of connections that are being closed: the loop frees them when it comes round */
-	LIST_HEAD(, send_share) waiting;
+	uint64_t limit, used;		 /* bytes */
+	uint64_t leaving;		 /* bytes of connections being closed, freed in the loop's next iteration */
+	LIST_HEAD(, send_share) waiting; /* shares that hold something */
 };
 
-/* `now`: ms of the loop's clock. false: it gave way itself, and holds no more than before. */
+/* Adds bytes to a share; closes connections if necessary. now: ms of the loop's clock. Returns false if this connection
+ * itself had to give way; its share is then unchanged. */
 bool send_pool_add(struct send_share *s, uint64_t bytes, uint64_t now);
-/* The kernel has taken them, or they were dropped. */
+/* Subtracts bytes that the kernel has taken or that were dropped. */
 void send_pool_sub(struct send_share *s, uint64_t bytes, uint64_t now);
-/* It holds so much more (or less) in memory than was added, which is no sign of its peer, and nobody gives way before
- * something is added. Only while something else of it is held. */
+/* Corrects a share, while it is not empty, by memory that is used in addition (or no longer). Unlike send_pool_add and
+ * send_pool_sub, this does not count as activity of the peer and closes no connection. */
 void send_pool_adjust(struct send_share *s, int64_t bytes);
-/* Notes whether its peer has taken something. */
+/* Notes whether the peer has taken something since the last call. */
 void send_pool_look(struct send_share *s, uint64_t now);
-/* Its connection is being closed: it may only give back. */
+/* Call when the connection is being closed: its bytes no longer count as used, and none may be added. */
 void send_pool_leave(struct send_share *s);
 
 #endif

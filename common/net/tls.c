@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A context is made from the folder's files, and made again when one changes. A link is the TLS state of one
+ * An SSL_CTX is made from the folder's files, and made again when one of them changes. A link is the TLS state of one
  * connection, between two memory buffers of OpenSSL: received bytes go into one, bytes to send come out of the other.
- * The verification callback checks the peer's role, revocation and expiry.
+ * OpenSSL checks chain, revocation and expiry of the peer's certificate; verify_certificate() then checks the role.
  *
- * A folder that cannot be read while it changes keeps the old context. A link that fails has an error of tls.h and, as
- * its last output, an alert for the peer; explain_failure() puts into words why either side does not accept a
+ * If the files cannot be used after a change, the old SSL_CTX stays. A link that fails returns an error of tls.h and,
+ * as its last output, an alert for the peer; explain_failure() puts into words why either side does not accept a
  * certificate.
  */
 #include "common/net/tls.h"
@@ -38,7 +38,7 @@ const unsigned char tls_none_here[7] = {ALERT_RECORD, 3, 3, 0, 2, 2, PROTOCOL_VE
 enum { FILES = 4 };
 static const char *const file_names[FILES] = {"ca.pem", "cert.pem", "key.pem", "crl.pem"};
 
-struct stamp { /* of a file; zeros: it does not exist */
+struct stamp { /* identifies a version of a file; zeros: the file does not exist */
 	ino_t inode;
 	off_t size;
 	struct timespec changed;
@@ -48,21 +48,21 @@ struct tls {
 	char folder[3072];
 	SSL_CTX *context;
 	struct stamp stamps[FILES]; /* of the files in use */
-	struct stamp seen[FILES];   /* ... and of those read last, usable or not */
+	struct stamp seen[FILES];   /* of the files that were read last, usable or not */
 	struct tls_peer self;
 	time_t authority_until;
-	time_t warned; /* 0: not since the files were read */
-	double recheck;
+	time_t warned;	/* time of the last tls_warning_due that returned true; 0: not since the files were read */
+	double recheck; /* s */
 };
 
 struct tls_link {
 	struct tls *tls;
 	SSL *ssl;
-	BIO *in, *out; /* owned by the SSL */
+	BIO *in, *out; /* owned by `ssl` */
 	struct tls_peer peer;
-	size_t taken; /* before the handshake was complete */
+	size_t taken; /* bytes received before the handshake was complete */
 	bool listening, begun, open;
-	char distrust[128]; /* why the peer's certificate is refused although it is valid */
+	char distrust[128]; /* why the peer's certificate is refused although its chain is valid */
 };
 
 bool tls_is_first_byte(unsigned char c)
@@ -108,7 +108,7 @@ static enum tls_role role_of(const ASN1_IA5STRING *uri)
 	return TLS_NOBODY;
 }
 
-/* Exactly one role: what a certificate with two may do would be unclear. */
+/* Returns the role of a certificate; TLS_NOBODY unless it has exactly one: with two, its rights would be unclear. */
 static enum tls_role read_role(X509 *cert)
 {
 	enum tls_role found = TLS_NOBODY;
@@ -233,7 +233,7 @@ static int set_file_error(struct error *e, int code, const char *path)
 	return error_set(e, code, "%s: %s", path, text ? text : "cannot be used");
 }
 
-/* At depth 0 the chain is valid already: checks whether the certificate allows what the peer does. */
+/* Called by OpenSSL for each certificate of the chain. At depth 0, the chain is valid: checks the peer's role. */
 static int verify_certificate(int good, X509_STORE_CTX *sc)
 {
 	if (!good || X509_STORE_CTX_get_error_depth(sc) != 0)
@@ -253,8 +253,8 @@ static int verify_certificate(int good, X509_STORE_CTX *sc)
 	return 0;
 }
 
-/* Keeps the old lists when the file is lost, so that revoked certificates stay revoked. The number of lists; -1: no
- * memory. */
+/* Copies the revocation lists of an old context, so that certificates stay revoked if crl.pem is lost. Returns their
+ * number; -1 if memory is out. */
 static int keep_lists(SSL_CTX *from, X509_STORE *to)
 {
 	int count = 0;
@@ -277,7 +277,7 @@ static int load_store(const struct tls *t, SSL_CTX *context, bool revocations, s
 		X509_STORE_free(store);
 		return set_file_error(e, EBADMSG, path);
 	}
-	SSL_CTX_set_cert_store(context, store); /* which now owns it */
+	SSL_CTX_set_cert_store(context, store); /* the context now owns the store */
 	int kept = revocations || !t->context ? 0 : keep_lists(t->context, store);
 	if (kept < 0)
 		return error_set(e, ENOMEM, "no memory for TLS");
@@ -308,7 +308,7 @@ static int load_own(const struct tls *t, SSL_CTX *context, struct tls_peer *self
 	return rc ? error_prefix(e, rc, "%s", path) : 0;
 }
 
-/* There are several while one authority replaces another. */
+/* Returns when the certificate of the authority expires; the latest, if one authority is being replaced by another. */
 static time_t find_authority(SSL_CTX *context)
 {
 	time_t last = 0;
@@ -482,7 +482,8 @@ int tls_link_take(struct tls_link *l, const void *bytes, size_t size, struct err
 	return 0;
 }
 
-/* A certificate that is valid at another time says that this machine's clock may be wrong. */
+/* Sets the error for a certificate that OpenSSL refuses. If its dates are the reason, this machine's clock may be
+ * wrong, so the sentence names the time. */
 static int refuse(struct error *e, const char *what, int verdict)
 {
 	char clock[64] = "";
@@ -496,7 +497,7 @@ static int refuse(struct error *e, const char *what, int verdict)
 			 clock);
 }
 
-/* The alert says why the peer refuses. OpenSSL sends a bad certificate for one that is not valid yet. */
+/* Sets the error for an alert of the peer. OpenSSL sends "bad certificate" for one that is not valid yet. */
 static int refused(struct error *e, int alert)
 {
 	bool dated = alert == CERTIFICATE_EXPIRED || alert == BAD_CERTIFICATE;
@@ -505,7 +506,7 @@ static int refused(struct error *e, int alert)
 			 alert == CERTIFICATE_EXPIRED ? " by the clock of its machine" : "");
 }
 
-/* OpenSSL's error, worded for the person who has to fix it. */
+/* Sets the error for a failure of OpenSSL, worded for the person who has to fix it. */
 static int explain_failure(struct tls_link *l, struct error *e)
 {
 	unsigned long code = ERR_peek_error();
@@ -525,8 +526,8 @@ static int explain_failure(struct tls_link *l, struct error *e)
 	return error_set(e, EPROTO, "TLS: %s", text ? text : "invalid data on the wire");
 }
 
-/* OpenSSL's buffers stay as large as they ever were: 87 KB after 64 KiB came at once, for each of thousands of peers.
- * Once *b, which `set` gives to the link, is empty, a new one takes its place. */
+/* OpenSSL's buffers never shrink: after 64 KiB came at once they hold 87 KB, for each of thousands of peers. Replaces
+ * *b by a new buffer if it is large and empty; `set` gives it to the SSL object. */
 static void replace_large_buffer(struct tls_link *l, BIO **b, void (*set)(SSL *, BIO *))
 {
 	enum { KEPT = 4096 };
@@ -551,8 +552,7 @@ ssize_t tls_link_read(struct tls_link *l, void *out, size_t size, struct error *
 		return (ssize_t)got;
 	int rc;
 	switch (SSL_get_error(l->ssl, ok)) {
-	case SSL_ERROR_WANT_READ: /* all input has been consumed: bytes after the handshake do not count towards its
-				     limit */
+	case SSL_ERROR_WANT_READ: /* all input is used up. (Bytes that follow the handshake do not count against it.) */
 		if (!l->open && l->taken > BEFORE_OPEN_MAX)
 			return error_set(e, EPROTO, "the TLS handshake is longer than %d bytes", BEFORE_OPEN_MAX);
 		replace_large_buffer(l, &l->in, SSL_set0_rbio);
