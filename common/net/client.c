@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * client_open connects and says hello. client_call sends a message and runs the loop until the answer with its number
+ * client_open connects and exchanges Hello. client_call sends a message and runs the loop until the next message
  * arrives, a deadline passes, or the connection is lost. Fetching reads chunk by chunk into a temporary file that is
- * renamed when complete, and removed when a signal ends the program before. A fetch that the coordinator drops on the
- * way begins again, a few times.
+ * renamed when complete, and removed if a signal ends the program before. A fetch that the coordinator drops on the way
+ * begins again, a few times.
  *
  * Failures: -ECONNREFUSED, -ECONNRESET and -ETIMEDOUT may be retried (client_exit_code has the exit code of each); a
  * refusal carries the coordinator's sentence.
@@ -28,14 +28,15 @@
 enum {
 	HEADER_LIMIT = 1 << 22,
 	PAYLOAD_LIMIT = 1 << 21,
-	WAITING_MAX = 4096,	 /* messages received but not asked for yet */
-	WAITING_BYTES = 1 << 26, /* of them */
+	WAITING_MAX = 4096,	 /* most messages received before client_wait asks for them */
+	WAITING_BYTES = 1 << 26, /* most bytes of these messages */
 	ANSWER_SECONDS = 60,
 	HELLO_SECONDS = 10,
 	FETCH_TRIES = 5,
 };
-static const double first_fetch_pause = 0.5; /* s; twice as long each time, with jitter */
+static const double first_fetch_pause = 0.5; /* s before the second attempt; doubles each time; with jitter */
 
+/* A message that client_wait has not returned yet. */
 struct waiting {
 	STAILQ_ENTRY(waiting) next;
 	struct client_message message;
@@ -46,13 +47,14 @@ struct client {
 	uv_timer_t timeout, heartbeat;
 	struct conn *conn; /* NULL: closed */
 	STAILQ_HEAD(, waiting) received;
-	uint64_t patience_ms; /* from whoever waits */
-	unsigned waiting_count;
-	size_t waiting_bytes;
-	struct tls *tls; /* NULL: plaintext */
+	uint64_t patience_ms;	/* how long the current call waits without any message */
+	unsigned waiting_count; /* messages in `received` */
+	size_t waiting_bytes;	/* their memory */
+	struct tls *tls;	/* NULL: plaintext */
 	bool opened, timed_out;
-	int distrust; /* as conn_distrust */
-	char name[128], why[256], warning[384], note[256];
+	int distrust;		      /* as conn_distrust */
+	char name[128], why[256];     /* the program; why the connection was closed */
+	char warning[384], note[256]; /* for client_print_notes */
 };
 
 static void on_opened(void *user)
@@ -70,7 +72,7 @@ static void on_timeout(uv_timer_t *t)
 static void on_message(void *user, struct envelope *env, const unsigned char *payload, size_t size)
 {
 	struct client *cl = user;
-	if (env->message->body_case == FARM__ENVELOPE__BODY_HEARTBEAT) { /* the answer takes longer */
+	if (env->message->body_case == FARM__ENVELOPE__BODY_HEARTBEAT) { /* the coordinator still works on the answer */
 		if (uv_is_active((uv_handle_t *)&cl->timeout))
 			uv_timer_start(&cl->timeout, on_timeout, cl->patience_ms, 0);
 		return;
@@ -207,11 +209,11 @@ static int say_hello(struct client *cl, const char *host_port, struct error *e)
 	return rc;
 }
 
-/* One of a name's addresses; cl->opened: it answers. */
+/* Tries one of a name's addresses; cl->opened tells whether a connection was opened. */
 static int connect_to(struct client *cl, const struct net_addr *a, struct error *e)
 {
 	const struct conn_config config = {{HEADER_LIMIT, PAYLOAD_LIMIT}, 1 << 23, 30, 0, cl->tls, NULL, NULL};
-	if (cl->conn) /* the one before did not answer in time */
+	if (cl->conn) /* of the address before */
 		conn_close(cl->conn, "no answer in time");
 	while (cl->conn)
 		uv_run(&cl->loop, UV_RUN_ONCE);
@@ -323,7 +325,7 @@ static int fetch_chunk(struct client *cl, uint64_t job, Farm__What what, uint64_
 	if (rc)
 		return rc;
 	const Farm__FetchChunk *c = answer->envelope.message->fetch_chunk;
-	if (*c->error) /* -EAGAIN: what was there before, so it may be again */
+	if (*c->error) /* -EAGAIN after the first chunk: the file was there before, so it may be there again */
 		rc = error_set(e, offset ? EAGAIN : ENOENT, "%s", c->error);
 	else if (c->offset != offset || (answer->payload.size == 0 && offset < c->size) ||
 		 answer->payload.size > c->size - offset)
@@ -333,7 +335,7 @@ static int fetch_chunk(struct client *cl, uint64_t job, Farm__What what, uint64_
 	return rc;
 }
 
-/* path: what it is called in a message. */
+/* path: the name of the file in an error. */
 static int write_all(int fd, const char *path, const unsigned char *bytes, size_t size, struct error *e)
 {
 	int rc = io_write_all(fd, bytes, size);
@@ -360,7 +362,7 @@ static int fetch_rest(struct client *cl, struct client_message *first, uint64_t 
 	return rc;
 }
 
-/* The coordinator's heartbeats are answered meanwhile. */
+/* Waits while the loop keeps running, so that heartbeats are still sent. */
 static void wait_connected(struct client *cl, double seconds)
 {
 	uint64_t end = uv_hrtime() + (uint64_t)(1e9 * seconds);
@@ -382,7 +384,8 @@ static int begin_again(struct client *cl, uint64_t job, Farm__What what, int fd,
 	return rc;
 }
 
-/* Into a file, where it may begin again. Not from where it was: there may be another image by now. */
+/* Fetches all chunks into a file, and begins again from the first one if the coordinator has dropped the fetch: it may
+ * have another image by now. */
 static int fetch_whole(struct client *cl, struct client_message *first, uint64_t job, Farm__What what, int fd,
 		       const char *path, struct error *e)
 {
@@ -396,8 +399,8 @@ static int fetch_whole(struct client *cl, struct client_message *first, uint64_t
 	return rc == -EAGAIN ? error_prefix(e, rc, "given up after %d attempts", FETCH_TRIES) : rc;
 }
 
-/* Unless there is a file of that name. Not every file system can tell while it renames, and not every one has hard
- * links: then an empty file takes the name first. */
+/* Renames a file, unless there is one of the new name. On file systems without RENAME_NOREPLACE, an empty file reserves
+ * the name first; hard links would not work on all of them. */
 static int rename_to_new(const char *temporary, const char *path)
 {
 	if (renameat2(AT_FDCWD, temporary, AT_FDCWD, path, RENAME_NOREPLACE) == 0)
@@ -416,7 +419,7 @@ static int rename_to_new(const char *temporary, const char *path)
 	return -1;
 }
 
-/* replace: whether an existing file of that name is replaced. */
+/* Renames a temporary file. replace: an existing file of that name is replaced, otherwise it is -EEXIST. */
 static int give_name(const char *temporary, const char *path, bool replace, struct error *e)
 {
 	if ((replace ? rename(temporary, path) : rename_to_new(temporary, path)) == 0)
@@ -434,7 +437,8 @@ static int copy(int from, int to, const char *path, struct error *e)
 	return n < 0 ? error_set(e, EIO, "a temporary file: %s", strerror(errno)) : rc;
 }
 
-/* Received completely before a byte is written: what a pipe has taken cannot be taken back if the connection breaks. */
+/* Fetches into a temporary file, then copies it to the target: bytes written to a pipe could not be taken back if the
+ * connection broke. */
 static int fetch_through(struct client *cl, struct client_message *first, uint64_t job, Farm__What what,
 			 const struct target *t, const char *name, struct error *e)
 {
@@ -453,7 +457,7 @@ static int fetch_through(struct client *cl, struct client_message *first, uint64
 	return rc;
 }
 
-/* What comes in one piece needs no file: that may be where a disk is full. */
+/* A log that fits into one chunk needs no temporary file, for which a full disk may have no room. */
 int client_fetch_log(struct client *cl, uint64_t job, int fd, struct error *e)
 {
 	static const char name[] = "stdout";
@@ -558,8 +562,8 @@ int client_fetch_preview(struct client *cl, uint64_t job, const char *path, bool
 	return rc;
 }
 
-/* Turns a name that somebody else chose into a safe file name: not hidden, and not like an option. That of the image
- * stays free while there is only a preview. */
+/* Turns the name of a job's image, which somebody else chose, into a safe file name: without folders, not hidden, and
+ * not like an option. A preview gets a name of its own. */
 static int take_name(const char *output, bool preview, char name[CLIENT_NAME_BYTES], struct error *e)
 {
 	struct stat st;

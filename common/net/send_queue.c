@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * In plaintext a frame goes to libuv at once, as two buffers: its checked prefix and its bytes. With TLS it waits in a
- * list and is encrypted piece by piece while libuv has less than WINDOW bytes to write. A frame's memory is freed with
- * its last piece, so until then the pool counts the pieces before that, too, which may exceed its limit until something
- * else is to be sent. `on_written` encrypts more, and says when nothing is left.
+ * list and is encrypted piece by piece while libuv has less than WINDOW bytes to write. A frame's memory is only freed
+ * after its last piece, so until then the pool counts the encrypted pieces in addition (count_copied); they may exceed
+ * the pool's limit until something else is to be sent. on_written encrypts more, and calls `drained` when nothing is
+ * left.
  *
- * Failures are told once to the owner, who closes the stream: no memory, an error of the stream or of TLS, a peer that
- * does not read what is sent to it, here or while all queues together hold too much.
+ * A failure is reported once to the owner, who closes the stream: no memory, an error of the stream or of TLS, or a
+ * peer that does not read, if this queue or all queues together hold too much.
  */
 #include "common/net/send_queue.h"
 
@@ -18,11 +19,11 @@
 
 enum {
 	PIECE = 1 << 16,  /* bytes encrypted at a time */
-	WINDOW = 1 << 20, /* encrypted bytes that the kernel has not taken yet */
-	FRAME_COST = 256, /* overhead of a frame that waits besides its bytes */
+	WINDOW = 1 << 20, /* most encrypted bytes that the kernel has not taken yet */
+	FRAME_COST = 256, /* memory per waiting frame besides its bytes */
 };
 
-/* Replaces the prefix of a frame. */
+/* The bytes that are sent in place of a frame's prefix. */
 struct head {
 	unsigned char bytes[FRAME_CHECKED_PREFIX];
 	size_t size;
@@ -30,18 +31,19 @@ struct head {
 
 struct send_frame {
 	STAILQ_ENTRY(send_frame) next;
-	struct head head; /* empty: it is being sent */
+	struct head head; /* empty once it has been encrypted */
 	unsigned char *bytes;
-	size_t size, at, plain; /* plaintext: what it counts for in `unsent` */
+	size_t size, at; /* of the bytes; offset of the next one to encrypt */
+	size_t plain;	 /* part of `unsent` that has not been passed on to a struct writing */
 };
 
-/* What libuv writes. */
+/* A write of libuv. */
 struct writing {
 	uv_write_t request;
 	struct send_queue *queue;
 	struct head head;
 	unsigned char *bytes;
-	size_t size, plain; /* what it counts for in in_flight and in unsent */
+	size_t size, plain; /* its parts of in_flight and of unsent */
 };
 
 static uint64_t loop_ms(const struct send_queue *q)
@@ -49,7 +51,7 @@ static uint64_t loop_ms(const struct send_queue *q)
 	return uv_now(q->stream->loop);
 }
 
-/* Bytes of frames wait, or no longer do. */
+/* Adds to the bytes that wait; false if this connection has to give way. */
 static bool count(struct send_queue *q, size_t bytes)
 {
 	if (!send_pool_add(&q->share, bytes, loop_ms(q)))
@@ -147,7 +149,7 @@ static void on_written(uv_write_t *r, int status)
 		q->events->drained(q->user);
 }
 
-/* Takes the mem_alloc'd bytes; sends `head`, then the bytes after the first `skip`. */
+/* Sends `head`, then the bytes after the first `skip`. Frees the bytes, also after a failure. */
 static void to_kernel(struct send_queue *q, struct head head, unsigned char *bytes, size_t size, size_t skip,
 		      size_t plain)
 {
@@ -186,7 +188,7 @@ void send_queue_raw(struct send_queue *q, const void *bytes, size_t size)
 	copy_to_kernel(q, bytes, size, 0);
 }
 
-/* Sends what TLS has produced, which contains `plain` bytes of frames. */
+/* Sends the output of TLS, which stands for `plain` bytes of frames. */
 static void flush(struct send_queue *q, size_t plain)
 {
 	const unsigned char *bytes;
@@ -200,7 +202,9 @@ static void flush(struct send_queue *q, size_t plain)
 	tls_link_output_taken(q->link);
 }
 
-/* Encrypts the next piece of the first frame: 1 if that was its last, 0 if more is left, or -1 after a failure. */
+/* Encrypts the next piece of the first frame. Returns 1 if it was the last piece, 0 if more is left, -1 after a
+ * failure.
+ */
 static int encrypt_piece(struct send_queue *q)
 {
 	static _Thread_local unsigned char joined[PIECE];
@@ -208,7 +212,7 @@ static int encrypt_piece(struct send_queue *q)
 	struct error e;
 	size_t most = PIECE - f->head.size, size = f->size - f->at < most ? f->size - f->at : most;
 	const unsigned char *bytes = f->bytes + f->at;
-	if (f->head.size) { /* in one record with what follows it */
+	if (f->head.size) { /* joined, so that it shares a TLS record with the following bytes */
 		memcpy(joined, f->head.bytes, f->head.size);
 		memcpy(joined + f->head.size, bytes, size);
 		bytes = joined;
@@ -250,7 +254,7 @@ void send_queue_opened(struct send_queue *q)
 	send_pending(q);
 }
 
-/* Takes the bytes, also on failure. */
+/* Appends a frame to the list. Takes ownership of the bytes, also after a failure. */
 static void append(struct send_queue *q, struct head head, unsigned char *bytes, size_t size, size_t skip)
 {
 	struct send_frame *f = mem_alloc(1, sizeof *f);
