@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * connect_now and hello, then a cycle: the lease queue says how many leases to ask for, grants start work (work.c),
- * finished leases are sent and kept until they are acknowledged. Timers: heartbeat, reconnection with growing pauses,
- * and a check for threads that make no progress.
+ * Connection and lifetime of the worker daemon. connect_now resolves the coordinator's name and connects; after Hello
+ * is accepted, messages go to the lease queue (lease_queue.c), which requests leases, starts them and sends results.
+ * Timers send heartbeats, reconnect with growing pauses, and look for threads that make no progress. On SIGTERM the
+ * worker leaves: it waits for running leases until the grace period is over, says Bye and ends.
  *
- * Failures: a lost connection is made again, forever; a permanent refusal (another version, a certificate) ends the
- * daemon with its code; a hanging thread ends the process after its other leases are returned.
+ * Failures: after a lost connection the worker reconnects, for ever; a permanent refusal (another version, a
+ * certificate) ends the daemon with AGENT_REFUSED; a hanging thread ends the process with AGENT_HUNG, after the other
+ * threads have finished.
  */
 #include "worker/daemon/agent.h"
 
@@ -37,7 +39,7 @@ static void on_retry(uv_timer_t *t)
 	connect_now(t->data);
 }
 
-/* Twice as long each time, with jitter, so that a hundred workers do not reconnect at once. */
+/* Reconnects after a pause that doubles each time, with jitter, so that a hundred workers do not reconnect at once. */
 static void try_later(struct agent *a)
 {
 	double wait = jitter(a->back_off);
@@ -57,7 +59,7 @@ static void on_opened(void *user)
 		  NULL, 0);
 }
 
-/* New certificates and revocation lists are used while the worker runs. */
+/* Takes up new certificates and revocation lists without a restart. */
 static void refresh_tls(struct agent *a)
 {
 	struct error e;
@@ -88,7 +90,7 @@ static void take_hello_ack(struct agent *a, const Farm__HelloAck *ack)
 	}
 	uint64_t ms = ack->heartbeat_ms >= 10 ? ack->heartbeat_ms : 10;
 	a->welcome = true;
-	a->attempt--; /* this address first when the connection is lost */
+	a->attempt--; /* so that this address is tried first when the connection is lost */
 	a->back_off = first_back_off;
 	log_event(LOG_CONNECT, "coordinator=%s start=%llu", a->config.coordinator,
 		  (unsigned long long)a->cache.identity.restarts);
@@ -161,7 +163,8 @@ static void on_resolved(uv_getaddrinfo_t *r, int status, struct addrinfo *found)
 		fail_to_connect(a, &e);
 }
 
-/* The name may have another address by now. Looking it up may take long: libuv's pool does. */
+/* Looks the name up again for each attempt, since its address may have changed. This may take long, so libuv's pool
+ * does it. */
 static void connect_now(struct agent *a)
 {
 	const struct addrinfo hints = {.ai_socktype = SOCK_STREAM, .ai_flags = AI_NUMERICSERV};
@@ -242,7 +245,7 @@ static void on_watch(uv_timer_t *t)
 static void on_signal(uv_signal_t *h, int number)
 {
 	struct agent *a = h->data;
-	if (a->leaving) { /* a second signal: at once */
+	if (a->leaving) { /* a second signal ends the worker at once */
 		log_event(LOG_STOP, "signal=%d text=\"at once\"", number);
 		_exit(0);
 	}
@@ -266,7 +269,8 @@ static void on_pulse(uv_timer_t *t)
 	begin_leaving(a);
 }
 
-/* Often enough to be watched; not sent if nobody watches. */
+/* Starts the timer that notifies the watchdog, at three times the expected rate, and checks for idleness. It is not
+ * needed if there is neither a watchdog nor a limit on idle time. */
 static void start_pulse(struct agent *a)
 {
 	double watchdog = notify_watchdog(), idle = a->config.idle_seconds, wait = 1;
@@ -369,13 +373,13 @@ int agent_run(const struct agent_config *c, struct error *e)
 {
 	struct agent *a;
 	int rc = agent_open(&a, c, e);
-	if (rc) /* -EACCES means that a coordinator refuses, not a file */
+	if (rc) /* an -EACCES of a file, which must not be taken for the coordinator's refusal */
 		return rc == -EACCES ? -EIO : rc;
-	notify_send("READY=1"); /* it may wait for its coordinator for long */
+	notify_send("READY=1"); /* without waiting for a connection, which may take long */
 	while (!a->gone || a->conn)
 		uv_run(&a->loop, UV_RUN_ONCE);
 	if (a->hung || a->resolves ||
-	    thread_pool_pending(a->thread_pool)) /* its threads cannot be joined; everything has been sent */
+	    thread_pool_pending(a->thread_pool)) /* busy threads cannot be joined; everything has been sent */
 		_exit(a->hung ? AGENT_HUNG : a->refused ? AGENT_REFUSED : 0);
 	int refused = a->refused ? error_set(e, EACCES, "%s refuses: %s", a->config.coordinator, a->why) : 0;
 	agent_close(a);

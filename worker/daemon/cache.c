@@ -28,8 +28,8 @@ static int make_folders(char *path, struct error *e)
 	}
 }
 
-/* Whoever made the folder or can write to it could choose what we render, because only names are checked when a worker
- * starts. So it must be ours; its parent may be root's. */
+/* Refuses a folder of another user, or one that others can write to: they could choose what this worker renders. The
+ * parent folder (or_root) may be root's. */
 static int check_owner(const char *path, bool or_root, struct error *e)
 {
 	struct stat st;
@@ -71,7 +71,7 @@ static int base_folder(const char *folder, char path[PATH_BYTES], struct error *
 	return rc ? rc : check_owner(path, true, e);
 }
 
-/* A worker without a counted identity can still work. */
+/* Counts this start of the slot. A failure is only logged, since the worker can work without a counted identity. */
 static void begin_life(struct cache *c, const char *base, int slot)
 {
 	char name[32];
@@ -81,7 +81,7 @@ static void begin_life(struct cache *c, const char *base, int slot)
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 }
 
-/* -EWOULDBLOCK: another worker has it. */
+/* Locks a slot; -EWOULDBLOCK if another worker has it. */
 static int lock_slot(const char *base, int slot, int *lock, struct error *e)
 {
 	char path[PATH_BYTES + 32];
@@ -144,7 +144,7 @@ int cache_mend(struct cache *c, struct error *e)
 	slot_path(base, c->slot, path);
 	if (stat(path, &st) == 0 || errno != ENOENT)
 		return 0;
-	if (fstat(c->lock, &st) == 0 && st.st_nlink == 0) { /* the lock's file is gone as well */
+	if (fstat(c->lock, &st) == 0 && st.st_nlink == 0) { /* the lock's file has been removed, too */
 		rc = lock_slot(base, c->slot, &lock, e);
 		if (rc)
 			return rc;

@@ -13,8 +13,8 @@ struct agent_config {
 	uint64_t cache_bytes;
 	unsigned threads;
 	double grace_seconds;
-	double idle_seconds;  /* exits after so long without a lease; 0: never */
-	double stall_seconds; /* a lease or a build without progress for so long counts as hung; 0: not checked */
+	double idle_seconds;  /* the worker exits after this time without a lease; 0: never */
+	double stall_seconds; /* a lease or build without progress for this time counts as hung; 0: not checked */
 	bool insecure;
 };
 

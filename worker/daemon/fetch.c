@@ -54,7 +54,7 @@ struct fetch *fetch_answered(struct agent *a, const Farm__BlobChunk *c)
 	return NULL;
 }
 
-/* What exceeds the limit is too large for this worker's settings; wrong bytes are the coordinator's fault. */
+/* Files beyond the limit and wrong bytes are failures of the fetch; any other error is one of this machine's disk. */
 static enum fetch_end failed(int rc)
 {
 	return rc == -EFBIG || rc == -EMSGSIZE || rc == -EBADMSG ? FETCH_FAILED : FETCH_UNSTORED;

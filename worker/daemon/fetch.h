@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Files that are being fetched from the coordinator into the cache, at most FETCHES_MOST. A file is fetched once,
- * however many jobs want it: when a chunk arrives, one of the jobs that still want it stores it. Chunks that were not
- * requested are ignored. A file that no job wants any more stays listed until the chunk that was requested arrives or
- * the connection ends. The loop's thread.
+ * The files that are being fetched from the coordinator into the cache, at most FETCHES_MOST. A file is fetched once,
+ * however many jobs want it, and each chunk is stored as long as any job still wants the file. A file that no job wants
+ * any more stays listed until the requested chunk arrives or the connection ends. The loop's thread.
  */
 #ifndef WORKER_DAEMON_FETCH_H
 #define WORKER_DAEMON_FETCH_H
@@ -18,25 +17,28 @@ struct agent;
 struct fetch {
 	struct fetch *next;
 	struct blob_hash hash;
-	struct blob_writer *writer; /* from the first chunk on */
-	bool asked;		    /* on this connection, and not answered yet */
+	struct blob_writer *writer; /* NULL before the first chunk */
+	bool asked;		    /* a chunk has been requested on this connection and not arrived yet */
 };
 
 enum fetch_end {
-	FETCH_MORE,
-	FETCH_WHOLE, /* in the cache, and held once */
-	FETCH_FAILED,
+	FETCH_MORE,	/* more chunks are needed */
+	FETCH_WHOLE,	/* the file is in the cache, and held once */
+	FETCH_FAILED,	/* the coordinator sent no file, or one that is wrong or exceeds the cache */
 	FETCH_UNSTORED, /* failed because of this machine: its disk is full, read-only or broken */
 };
 
-/* Requests the next chunk, unless that was done. -ENOMEM, -ENOBUFS. */
+/* Requests the next chunk of a file, unless that has been done. Returns 0, -ENOMEM, or -ENOBUFS if too many files are
+ * being fetched. */
 int fetch_want(struct agent *a, const struct blob_hash *h, struct error *e);
-/* The fetch that the chunk belongs to; NULL: it was not requested. */
+/* Returns the fetch to which a chunk belongs, which is then no longer awaited; NULL if the chunk was not requested. */
 struct fetch *fetch_answered(struct agent *a, const Farm__BlobChunk *c);
+/* Stores a chunk. */
 enum fetch_end fetch_add(struct fetch *f, struct blob_store *s, const Farm__BlobChunk *c, const unsigned char *payload,
 			 size_t size, struct error *e);
+/* Removes a fetch from the list, with the part of the file that has been stored. */
 void fetch_drop(struct agent *a, struct fetch *f);
-/* A new connection: nothing has been requested on it. */
+/* Call on a new connection, on which nothing has been requested yet. */
 void fetch_reconnected(struct agent *a);
 
 #endif

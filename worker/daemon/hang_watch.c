@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Threads count ticks while they work (task.ticks). Each look compares the count of every lease and scene in work with
- * that of the last look; after STALL_LOOKS looks without a difference the thread counts as hung. Its lease fails, or
- * the leases that wait for its scene do. The thread itself cannot be ended: agent.c lets the others finish, and the
- * worker exits.
+ * Threads count ticks while they work (task.ticks). Each look compares the ticks of every lease and scene in work with
+ * those of the last look; after STALL_LOOKS looks without a difference the thread counts as hung, and its lease fails,
+ * or all leases that wait for its scene do. The thread itself cannot be ended: agent.c lets the other threads finish,
+ * and the worker exits.
  */
 #include "worker/daemon/hang_watch.h"
 
@@ -12,7 +12,7 @@
 
 #include <stdio.h>
 
-/* Counts looks, not seconds: in a worker that was stopped as a whole (SIGSTOP) no thread hangs. */
+/* Looks are counted, not seconds, so that a worker that was stopped as a whole (SIGSTOP) does not count as hung. */
 static bool has_hung(struct task *t)
 {
 	unsigned long long now = atomic_load(&t->ticks);

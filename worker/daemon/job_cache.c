@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A job arrives as JobInfo. Its files are requested until the cache has them all, then a thread reads the scene through
- * the cache and builds the world. What this worker reads of film, integrator, settings and mixture is compared with the
- * plan before a lease runs.
+ * A job arrives as JobInfo (job_cache_set_info). job_cache_look checks which of its files are in the cache and
+ * undamaged; the caller fetches the others. Once all are there, a thread of the pool reads the scene from the cached
+ * files and builds the world (job_cache_build). Film, integrator, settings and mixture as this worker reads them are
+ * compared with the plan before any lease runs.
  *
- * Failures: a scene that does not build, or that differs from the plan, fails the job's leases with the reason; a file
- * that has disappeared from the cache is fetched again.
+ * Failures: a scene that cannot be built, or that differs from the plan, puts the job into JOB_CACHE_FAILED with the
+ * reason. A file that is missing in the cache or damaged is fetched again.
  */
 #include "worker/daemon/job_cache.h"
 
@@ -26,7 +27,7 @@
 enum {
 	PATH_BYTES = 4200,
 	DEFINES_MAX = 256,
-	CHECKED_SECONDS = 60 /* a file verified so recently is not read again */
+	CHECKED_SECONDS = 60 /* a file that was verified within this time is not read again */
 };
 
 static const Farm__JobInfo *info_of(const struct job_cache *b)
@@ -95,8 +96,7 @@ int job_cache_set_info(struct job_cache *b, struct envelope *info, struct error 
 		mem_free(paths);
 		return error_set(e, ENOMEM, "no memory for a job");
 	}
-	b->plan.rounds =
-		UINT64_MAX; /* the bound may be changed while the job runs, and does not affect what a lease computes */
+	b->plan.rounds = UINT64_MAX; /* the bound may be changed while the job runs, and no lease depends on it */
 	b->held = held;
 	b->paths = paths;
 	b->info = *info;
@@ -105,6 +105,7 @@ int job_cache_set_info(struct job_cache *b, struct envelope *info, struct error 
 	return 0;
 }
 
+/* Packs a description without the job's bounds, for comparison. NULL if memory is out. */
 static unsigned char *pack_unbounded(const Farm__JobInfo *m, size_t *size)
 {
 	Farm__JobInfo job = *m;
@@ -152,7 +153,8 @@ static void on_read(uv_work_t *work, int status)
 	b->reading.done(b);
 }
 
-/* Files in the cache may have been damaged since they arrived: those are fetched again. */
+/* Looks for one file in the cache. It may have been damaged since it arrived, so it is read again, by libuv's pool,
+ * unless that was done recently; a damaged file counts as missing. */
 static enum job_cache_files look_for(struct job_cache *b, size_t i, uv_loop_t *loop)
 {
 	b->wanted = file_hash_from_wire(info_of(b)->files[i]);
@@ -237,7 +239,8 @@ static void close_asset(void *user, struct asset *a)
 
 /* ---- the world ---- */
 
-/* What this worker reads must equal what the client read, or the image would not be the planned one. */
+/* Compares film, integrator and settings, as this worker reads them from the scene, with the plan, which holds what the
+ * client read: with a difference, the image would not be the planned one. */
 static int check_plan(const struct job_cache *b, const struct scene *s, const struct render_options *o, struct error *e)
 {
 	struct scene_settings set;
@@ -352,7 +355,8 @@ int job_cache_build(struct job_cache *b, struct thread_pool *c, struct error *e)
 
 static bool takes_memory(const struct job_cache *b)
 {
-	return b->state == JOB_CACHE_BUILDING || b->world; /* which its thread writes while BUILDING */
+	/* The world is not read while BUILDING, since the thread writes it. */
+	return b->state == JOB_CACHE_BUILDING || b->world;
 }
 
 void job_cache_note_company(struct job_cache *b, struct job_cache *all, bool building)

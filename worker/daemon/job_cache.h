@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A job at a worker: its description (JobInfo), its files in the cache, its world. The world is built on a thread of
- * the pool and shared by all leases; files that the cache has are read by libuv's pool, some megabytes at a time;
- * everything else is the loop's thread.
+ * A job at a worker: its description (JobInfo), its files in the cache, and its world, the scene ready for rendering.
+ * The world is built on a thread of the pool and shared by all leases. Cached files are checked by libuv's pool, some
+ * megabytes at a time. Everything else runs on the loop's thread.
  */
 #ifndef WORKER_DAEMON_JOB_CACHE_H
 #define WORKER_DAEMON_JOB_CACHE_H
@@ -14,74 +14,74 @@
 #include "worker/render/render.h"
 
 enum job_cache_state {
-	JOB_CACHE_ASKED,    /* JobGet was sent */
-	JOB_CACHE_FETCHING, /* files are missing */
-	JOB_CACHE_BUILDING, /* its world is being built */
-	JOB_CACHE_READY,
-	JOB_CACHE_FAILED, /* error is the reason */
+	JOB_CACHE_ASKED,    /* JobGet has been sent */
+	JOB_CACHE_FETCHING, /* files are missing or being checked */
+	JOB_CACHE_BUILDING, /* the world is being built */
+	JOB_CACHE_READY,    /* leases can be rendered */
+	JOB_CACHE_FAILED,   /* `error` is the reason */
 };
 
 enum job_cache_files {
-	JOB_CACHE_HAS,	 /* all of them */
-	JOB_CACHE_LACKS, /* `wanted` must be fetched */
-	JOB_CACHE_READS, /* `wanted` is being read by libuv's pool: `read` is called, then ask again */
+	JOB_CACHE_HAS,	 /* all files are in the cache */
+	JOB_CACHE_LACKS, /* the file `wanted` must be fetched */
+	JOB_CACHE_READS, /* `wanted` is being read by libuv's pool: look again once reading.done has been called */
 };
 
 struct job_cache {
-	struct task task; /* building */
+	struct task task; /* builds the world */
 	struct job_cache *next;
 	uint64_t job;
 	enum job_cache_state state;
 	struct envelope info; /* JobInfo, owned */
 	struct plan plan;
 	struct blob_store *blobs;
-	bool *held;		 /* by file: in the cache, and held */
-	char **paths;		 /* by file, for the builder's thread */
-	struct blob_hash wanted; /* while FETCHING: the blob being waited for */
+	bool *held;		 /* by file: it is in the cache, and held for this job */
+	char **paths;		 /* by file, for the thread that builds the world */
+	struct blob_hash wanted; /* while FETCHING: the file being waited for */
 	struct {
 		uv_work_t work;
-		struct blob_check *check; /* NULL: nothing is being read */
-		size_t file;
-		bool more;
-		bool failed;			  /* the file cannot be used: it is fetched */
-		const bool *stop;		  /* there is nothing more to read */
-		void (*done)(struct job_cache *); /* on the loop's thread */
+		struct blob_check *check;	  /* NULL: nothing is being read */
+		size_t file;			  /* index of the file */
+		bool more;			  /* its end has not been reached */
+		bool failed;			  /* the file cannot be used and must be fetched */
+		const bool *stop;		  /* set when the worker stops: ends the reading */
+		void (*done)(struct job_cache *); /* called on the loop's thread when a file has been read */
 	} reading;
 	struct world *world;
 	struct brightness *map; /* see render_map_new */
 	struct lease_key waits; /* one of the leases that wait for the world; job 0: none */
-	unsigned users;		/* number of leases that need it */
+	unsigned users;		/* number of leases that need the world */
 	uint64_t last_used;	/* value of the counter of uses */
-	bool ended;		/* the coordinator does not need it any more */
-	bool confirmed;		/* on this connection: the coordinator's job of this number is this one */
+	bool ended;		/* the job has ended at the coordinator */
+	bool confirmed;		/* on this connection, the coordinator has said that this number is still this job's */
 	double build_seconds;
 	void *owner;
-	void (*built)(struct job_cache *); /* called on the loop's thread: READY or FAILED */
+	void (*built)(struct job_cache *); /* called on the loop's thread when the state is READY or FAILED */
 	struct error error;
-	bool own;	/* FAILED: because of this machine, not the job */
-	bool no_memory; /* FAILED: there was not enough for its world */
-	bool beside;	/* other worlds have been in memory since its build, or since its last lease, began */
+	bool own;	/* FAILED because of this machine, not the job */
+	bool no_memory; /* FAILED because there was not enough memory for the world */
+	bool beside;	/* other worlds have been in memory since the build, or since the last lease, began */
 };
 
-struct job_cache *job_cache_find(struct job_cache *all, uint64_t job); /* NULL: none has this number */
-int job_cache_new(struct job_cache **b, uint64_t job, struct blob_store *blobs, struct error *e);
-/* Not while BUILDING, nor while a file is being read. */
+struct job_cache *job_cache_find(struct job_cache *all, uint64_t job); /* NULL if none has this number */
+int job_cache_new(struct job_cache **b, uint64_t job, struct blob_store *blobs, struct error *e); /* 0 or -ENOMEM */
+/* Must not be called while BUILDING, nor while a file is being read. */
 void job_cache_free(struct job_cache *b);
 
-/* Takes the answer to JobGet; then call job_cache_look. -EBADMSG. */
+/* Takes the answer to JobGet, which it then owns; call job_cache_look next. Returns 0, -EBADMSG or -ENOMEM. */
 int job_cache_set_info(struct job_cache *b, struct envelope *info, struct error *e);
-/* Whether it is the same job: number and everything but the bounds, which may have been changed. If that cannot be
- * known: false. */
+/* Returns whether a description is that of this job: all but the bounds, which may have been changed, must be equal.
+ * False also if memory is out. */
 bool job_cache_is_of(const struct job_cache *b, const Farm__JobInfo *info);
-/* Holds the files in the cache, up to the first that it lacks, or that has to be read first. b->reading.stop and done
- * must be set. */
+/* Holds the job's files that are in the cache, up to the first that is missing or must be read first. reading.stop and
+ * reading.done must be set. */
 enum job_cache_files job_cache_look(struct job_cache *b, uv_loop_t *loop);
-/* All files are there: builds the world in the thread pool. */
+/* Builds the world in the thread pool, after job_cache_look has returned JOB_CACHE_HAS. Returns 0 or -ENOMEM. */
 int job_cache_build(struct job_cache *b, struct thread_pool *c, struct error *e);
 
-/* A lease of b begins, or building its world does: notes which of all the worlds are in memory beside that of b. */
+/* Call when a lease of b begins, or the building of its world does: notes whether other worlds are in memory. */
 void job_cache_note_company(struct job_cache *b, struct job_cache *all, bool building);
-/* An allocation failed for b. If other worlds had that memory, it is noted for the worker (work.h). */
+/* Call when an allocation has failed for b. If other worlds were in memory, tells work_memory_short. */
 void job_cache_lacked_memory(const struct job_cache *b);
 
 #endif

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A linked list, in the order of grants, that is searched from the front: a worker holds a few leases for each thread.
- * Nothing here fails. A lease that a thread works on cannot be freed, so it is marked as unwanted, and whoever gets it
- * back from the thread drops it.
+ * A linked list in the order of grants, searched from the front: a worker holds only a few leases per thread. A lease
+ * that a thread works on cannot be freed; it is marked as unwanted and dropped when the thread returns it. Nothing here
+ * fails.
  */
 #include "worker/daemon/lease_list.h"
 

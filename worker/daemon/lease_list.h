@@ -1,26 +1,28 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The leases that the worker holds, from the grant until the coordinator has acknowledged the result. Loop's thread. */
+/* The leases that the worker holds, from the grant until the coordinator has acknowledged the result. The loop's
+ * thread. */
 #ifndef WORKER_DAEMON_LEASE_LIST_H
 #define WORKER_DAEMON_LEASE_LIST_H
 
 #include "worker/daemon/agent_state.h"
 
-/* NULL: there is none, or it was forgotten. */
+/* Returns a lease; NULL if there is none, or if it has been forgotten. */
 struct lease_task *lease_list_find(const struct agent *a, const struct lease_key *k);
-/* Frees it at once: no thread may have it. */
+/* Removes and frees a lease, which no thread may have. */
 void lease_list_drop(struct agent *a, struct lease_task *l);
-/* The same for one that nobody wants any more, also if a thread has it: then it is dropped when the thread returns. */
+/* Drops a lease whose result is not wanted any more; if a thread has it, tells the thread to stop, and the lease is
+ * dropped when the thread returns it. */
 void lease_list_forget(struct agent *a, struct lease_task *l);
-/* Tells the coordinator that all leases that wait for this scene have failed, with this error, and drops them. */
+/* Returns all leases that wait for this scene as failed, with this error, and drops them. */
 void lease_list_fail(struct agent *a, struct job_cache *b, const struct error *e);
 
 /* Call when the number of results has changed. If leases are short and the coordinator's disk is slow, results pile up:
  * then no more leases are requested until enough results have been acknowledged. */
 void lease_list_limit_backlog(struct agent *a);
-/* Far more leases were granted than were requested: no correct coordinator does that. */
+/* Returns whether far more leases have been granted than were requested, which no correct coordinator does. */
 bool lease_list_is_flood(const struct agent *a);
-/* So many results wait to be acknowledged that further grants are returned. Nobody is at fault, so the connection
- * stays: ending it would only send them all again. */
+/* Returns whether so many results wait to be acknowledged that further grants must be returned. The connection stays:
+ * nobody is at fault, and on a new connection all results would be sent again. */
 bool lease_list_is_stuffed(const struct agent *a);
 
 #endif

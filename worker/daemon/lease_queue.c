@@ -1,20 +1,21 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Jobs and leases of the worker daemon. One thread, the event loop's; renders and builds run in the thread pool and
- * come back through it.
+ * Jobs and leases of the worker daemon. Everything here runs on the event loop's thread; leases are rendered and scenes
+ * built in the thread pool, which calls back on the loop's thread.
  *
- * Happy path: take_grant queues a lease and finds or creates its job's cache. The cache asks for the job
- * (take_job_info), fetches missing files (take_blob) and builds the scene (on_built); then its leases start. A
- * rendered lease is sent (on_rendered) and kept until the coordinator acknowledges it (take_ack), also across
+ * Happy path: take_grant queues a lease and finds or creates the cache of its job. The cache asks for the job's
+ * description (take_job_info), fetches missing files (take_blob) and builds the scene (on_built); then its leases
+ * start. A rendered lease is sent (on_rendered) and kept until the coordinator acknowledges it (take_ack), also across
  * connections.
  *
- * Failures: a job whose files cannot be fetched or whose scene cannot be built fails all its waiting leases with a
- * sentence. A lease that is revoked, or whose job has ended, is dropped; what a thread is working on is dropped when
- * the thread returns. A message that makes no sense closes the connection. When too many results wait to be sent, no
- * more leases are asked for.
- * After SIGKILL has ended a rendering process, which the system sends where memory is not enough, or an allocation has
- * failed while several scenes were in memory, leases of one job at a time are accepted for a while (scenes_kept_admit):
- * otherwise two jobs whose scenes do not fit together would end each other again and again.
+ * Failures: if files of a job cannot be fetched or its scene cannot be built, all its waiting leases fail with a
+ * sentence. A lease that is revoked, or whose job has ended, is dropped; if a thread works on it, it is dropped when
+ * the thread returns it. A message that makes no sense closes the connection. If too many results wait to be
+ * acknowledged, no more leases are requested.
+ *
+ * After SIGKILL has ended a rendering process, which the system sends when memory is short, or an allocation has failed
+ * while several scenes were in memory, leases of only one job at a time are accepted for a while (scenes_kept_admit).
+ * Otherwise two jobs whose scenes do not fit into memory together would end each other again and again.
  */
 #include "worker/daemon/lease_queue.h"
 
@@ -27,7 +28,7 @@
 
 /* ---- scenes ---- */
 
-/* The next scenes_kept_tidy drops it. */
+/* Fails a job's waiting leases. The next scenes_kept_tidy drops the job. */
 static void fail_job_cache(struct agent *a, struct job_cache *b, const struct error *e)
 {
 	b->state = JOB_CACHE_FAILED;
@@ -43,8 +44,8 @@ static void start_lease(struct agent *a, struct lease_task *l)
 	lease_task_start(l, a->thread_pool);
 }
 
-/* A lack of memory is the machine's fault: another one may have more, and the client that submitted the scene had
- * enough. */
+/* Returns no_memory, which means that this machine is at fault, not the job: the client that submitted the scene had
+ * enough memory, and other workers may have. */
 static bool lacked_memory(const struct job_cache *b, bool no_memory)
 {
 	if (no_memory)
@@ -71,8 +72,8 @@ static void on_built(struct job_cache *b)
 
 static void on_file_read(struct job_cache *b);
 
-/* Requests the next missing chunk, unless another job has done so, or builds, once the files of the cache are read. Not
- * for a worker that leaves: it has given back what has not begun. */
+/* Requests the next missing chunk of a job's files, unless another job has done so. If no file is missing, builds the
+ * scene. Does nothing in a worker that is leaving, which has returned all leases that have not begun. */
 static void fetch_or_build(struct agent *a, struct job_cache *b)
 {
 	struct error e;
@@ -136,7 +137,7 @@ static void on_rendered(struct lease_task *l)
 	}
 	lease_list_limit_backlog(a);
 	scenes_kept_tidy(a);
-	fetch_or_build_all(a); /* it may have waited for this thread to stop */
+	fetch_or_build_all(a); /* a scene may have waited for this thread to stop */
 	scenes_kept_tidy(a);
 	a->settle(a);
 }
@@ -167,11 +168,11 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 	struct job_cache *b;
 	struct lease_task *l = lease_list_find(a, &g.key);
 	if (l && !blob_hash_equal(&l->grant.digest,
-				  &g.digest)) { /* the previous epoch was computed again: this is another lease */
+				  &g.digest)) { /* the epoch before was computed again: this is another lease */
 		lease_list_forget(a, l);
 		l = NULL;
 	}
-	if (l) { /* it is being rendered already, from an earlier connection */
+	if (l) { /* granted on an earlier connection, and in work or rendered */
 		if (l->state == LEASE_RENDERED)
 			send_result(a, l);
 		grant_fini(&g);
@@ -199,7 +200,7 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 		return;
 	}
 	b->last_used = ++a->clock;
-	struct lease_task **end = &a->leases; /* the oldest first, so that rounds complete in order */
+	struct lease_task **end = &a->leases; /* appended, so that rounds complete in order */
 	while (*end)
 		end = &(*end)->next;
 	*end = l;
@@ -235,7 +236,7 @@ static void take_revoke(struct agent *a, const Farm__LeaseRevoke *m)
 	struct lease_key k;
 	struct error e;
 	struct lease_task *l = lease_key_from_wire(m->key, &k, &e) ? NULL : lease_list_find(a, &k);
-	if (l && l->state != LEASE_RENDERED) /* a result that was sent is acknowledged all the same */
+	if (l && l->state != LEASE_RENDERED) /* a result is kept: the coordinator will acknowledge it */
 		lease_list_forget(a, l);
 	scenes_kept_tidy(a);
 }
@@ -255,8 +256,9 @@ static void take_job_end(struct agent *a, uint64_t job)
 	scenes_kept_tidy(a);
 }
 
-/* The coordinator has started over, and the job's number is now another job's: the results of the old one are
- * useless. What it has granted meanwhile is of the new one, and is given back; it ignores what it has not granted. */
+/* The coordinator has started with an empty spool and given the number to another job: results of the old job are
+ * useless. All its leases are returned. Some may have been granted for the new job in the meantime; the coordinator
+ * ignores the return of the others. */
 static void drop_old_job(struct agent *a, struct job_cache *b)
 {
 	log_event(LOG_JOB_NOTE, "job=j%llu text=\"the coordinator has another job with this number\"", log_u64(b->job));
@@ -287,14 +289,14 @@ static void take_job_info(struct agent *a, struct envelope *env)
 	if (b->state == JOB_CACHE_ASKED && job_cache_set_info(b, env, &e))
 		fail_job_cache(a, b, &e);
 	fetch_or_build(a, b);
-	for (struct lease_task *l = a->leases; l; l = l->next) /* the job is not over: earlier results are welcome */
+	for (struct lease_task *l = a->leases; l; l = l->next) /* the job still runs: send results of it */
 		if (l->job_cache == b && l->state == LEASE_RENDERED)
 			send_result(a, l);
 	scenes_kept_tidy(a);
 }
 
-/* If it cannot be fetched for one job, the others that want it try for themselves: what the first one held is
- * released. */
+/* Stores a chunk for the first job that wants the file. If the file cannot be stored, that job fails, which releases
+ * the files that it held, and the other jobs that want the file request it again. */
 static void take_blob(struct agent *a, const Farm__BlobChunk *c, const unsigned char *payload, size_t size)
 {
 	struct error e;
@@ -355,7 +357,7 @@ void lease_queue_message(struct agent *a, struct envelope *env, const unsigned c
 
 /* ---- connection and leaving ---- */
 
-/* Reports the leases of earlier processes that a signal ended, before any lease is requested. */
+/* Reports the leases of earlier processes that a signal has ended; called before any lease is requested. */
 static void tell_lost(struct agent *a)
 {
 	struct lost_lease *l;
@@ -366,7 +368,8 @@ static void tell_lost(struct agent *a)
 		}
 }
 
-/* The coordinator grants anew what it had granted: of what has not begun, no more stays than it would grant. */
+/* On a new connection the coordinator grants open leases again. Of those that have not begun, keeps no more than it
+ * would grant. */
 static void drop_old_leases(struct agent *a)
 {
 	unsigned open = 0;
@@ -386,7 +389,7 @@ void lease_queue_welcome(struct agent *a)
 		l->sent = false;
 	tell_lost(a);
 	fetch_reconnected(a);
-	/* Asks whether the jobs still live. The answers resume unfinished fetches and send unsent results. */
+	/* Ask whether the jobs still exist. The answers resume unfinished fetches and send unsent results. */
 	for (struct job_cache *b = a->job_caches; b; b = b->next) {
 		b->confirmed = false;
 		if (!b->ended)
@@ -414,7 +417,7 @@ void lease_queue_stop_all(struct agent *a)
 		atomic_store(&l->stop, true);
 }
 
-/* Whether nothing runs, apart from hanging threads and scenes that are being built for jobs that are over. */
+/* Hanging threads and scenes being built do not count. */
 bool lease_queue_is_idle(const struct agent *a)
 {
 	unsigned left = 0;
@@ -433,7 +436,7 @@ void lease_queue_close(struct agent *a)
 	while (a->leases)
 		lease_list_drop(a, a->leases);
 	while (a->job_caches) {
-		if (a->job_caches->state == JOB_CACHE_BUILDING) /* its thread is gone */
+		if (a->job_caches->state == JOB_CACHE_BUILDING) /* the thread has ended without calling back */
 			a->job_caches->state = a->job_caches->world ? JOB_CACHE_READY : JOB_CACHE_FAILED;
 		scenes_kept_drop(a, a->job_caches);
 	}

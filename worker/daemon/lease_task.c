@@ -28,7 +28,8 @@ void lease_task_free(struct lease_task *l)
 	mem_free(l);
 }
 
-/* Packed in the render thread, so that the loop's thread never encodes a film. */
+/* Renders a lease on a render thread, and packs the result there, too, so that the loop's thread never encodes films.
+ */
 static void render(struct task *t)
 {
 	struct lease_task *l = (struct lease_task *)t; /* its first member */
@@ -42,8 +43,7 @@ static void render(struct task *t)
 	work_begin(&l->grant.key, l->job_cache->info.message->job_info->scene);
 	if (!atomic_load(&l->stop))
 		l->rc = render_lease(l->job_cache->world, p, &l->grant.key, &in, &l->stop, &l->end, &batch, &l->error);
-	if (!l->rc && l->end == LEASE_DONE) /* what the coordinator would refuse is the scene's fault, so it is reported
-					       before it is sent */
+	if (!l->rc && l->end == LEASE_DONE) /* the coordinator would refuse such a result: report a failure instead */
 		l->rc = batch_check(&batch, p, &l->error);
 	if (l->rc)
 		error_prefix(&l->error, l->rc, "%s", l->job_cache->info.message->job_info->scene);

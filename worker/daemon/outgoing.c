@@ -24,10 +24,10 @@ void send_job_get(struct agent *a, uint64_t job)
 	send_message(a, ENVELOPE(JOB_GET, job_get, .job = job));
 }
 
-/* Whose fault it is: the job's, this machine's, or none, because another scene is in memory. */
+/* Who is at fault for a failed lease: the job, this machine, or nobody (another scene is in memory). */
 enum fault { FAULT_JOB, FAULT_OWN, FAULT_LATER };
 
-/* states: digest of the chain states that are at fault; NULL: none are. */
+/* states: digest of the chain states that could not be used; NULL: they are not at fault. */
 static void send_failure(struct agent *a, const struct lease_key *k, const char *text, enum fault fault,
 			 const struct blob_hash *states)
 {
@@ -69,7 +69,7 @@ void send_result(struct agent *a, struct lease_task *l)
 	if (!a->conn || !a->welcome || l->sent || !l->job_cache->confirmed)
 		return;
 	unsigned char *copy = mem_alloc(l->frame_size, 1);
-	if (!copy) { /* sent again after the next connect */
+	if (!copy) { /* the result will be sent on the next connection */
 		conn_close(a->conn, "no memory to send a result");
 		return;
 	}

@@ -1,24 +1,25 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Messages that a worker sends; nothing happens while it is not connected. Loop's thread. If a message cannot be packed
- * for lack of memory, the connection ends: everything is sent again on the next one.
+ * The messages that a worker sends; nothing happens while it is not connected. If memory for a message is out, the
+ * connection ends, and everything is sent again on the next one. The loop's thread.
  */
 #ifndef WORKER_DAEMON_OUTGOING_H
 #define WORKER_DAEMON_OUTGOING_H
 
 #include "worker/daemon/agent_state.h"
 
-void send_message(struct agent *a, const Farm__Envelope *m); /* after welcome */
-void send_request(struct agent *a);			     /* how many leases it wants to hold */
-void send_job_get(struct agent *a, uint64_t job);
-/* An empty text returns the lease without blame; own: this machine is at fault, not the job. */
+void send_message(struct agent *a, const Farm__Envelope *m); /* any message */
+void send_request(struct agent *a);			     /* how many leases the worker wants to hold */
+void send_job_get(struct agent *a, uint64_t job);	     /* asks for the description of a job */
+/* Returns a lease as failed. With an empty text, nobody is blamed; own: this machine is at fault, not the job. */
 void send_failed(struct agent *a, const struct lease_key *k, const char *text, bool own);
-/* Returns a lease because the scene of another job is in memory (LeaseFailed.later): the coordinator asks again soon.
- */
+/* Returns a lease because the scene of another job is in memory (LeaseFailed.later): the coordinator will offer it
+ * again soon. */
 void send_later(struct agent *a, const struct lease_key *k, const char *text);
-/* The maker of the chain states in the grant is at fault. */
+/* Returns a lease because the chain states in its grant are invalid: the worker that made them is at fault. */
 void send_bad_states(struct agent *a, const struct grant *g, const char *text);
-/* Once per connection, and not before the coordinator has described the job: another one may have its number now. */
+/* Sends a result once per connection, and only after the coordinator has described the job on this connection: its
+ * number may have been given to another job. */
 void send_result(struct agent *a, struct lease_task *l);
 
 #endif

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A scene is in use while leases of its job are here or a thread builds it or reads for it; only others are dropped.
+ * A scene is in use while the worker has leases of its job, or a thread builds it or reads its files. Only scenes that
+ * are not in use are dropped.
  *
- * While one scene at a time is kept, the first job that gets a lease has the turn. Leases of other jobs are refused,
- * and so, after turn_seconds, are new leases of the job that has the turn: its last lease ends, its scene is dropped,
- * and the next job to be granted a lease has the turn. So neither job waits for the whole of the other. A scene
- * whose threads have been told to stop no longer has the turn: leases of the next job are accepted, and its scene is
- * built when they have stopped.
+ * While only one scene at a time may be in memory, the first job that gets a lease has the turn. Leases of other jobs
+ * are refused. If another job waits, new leases of the job that has the turn are refused, too, after turn_seconds: then
+ * its last lease ends, its scene is dropped, and the next job that is granted a lease has the turn. In this way no job
+ * has to wait for the end of another. A scene whose threads have been told to stop has lost the turn: leases of the
+ * next job are accepted, and the next scene is built when these threads have stopped.
  */
 #include "worker/daemon/scenes_kept.h"
 
@@ -32,7 +33,8 @@ struct job_cache *scenes_kept_who_wants(const struct agent *a, const struct blob
 	return NULL;
 }
 
-/* A requested file is kept until it is answered, so that the answer is not taken for another's. */
+/* Drops the fetches that no job wants. One that has been requested stays until the answer arrives, so that the answer
+ * is recognised. */
 static void tidy_fetches(struct agent *a)
 {
 	for (struct fetch *f = a->fetches, *next; f; f = next) {
@@ -71,7 +73,8 @@ void scenes_kept_tidy(struct agent *a)
 	tidy_fetches(a);
 }
 
-/* In use only by threads that were told to stop: its leases were revoked, or its job has ended. */
+/* Returns whether a scene is in use only by threads that have been told to stop, because its leases were revoked or its
+ * job has ended. */
 static bool is_ending(const struct agent *a, const struct job_cache *b)
 {
 	for (const struct lease_task *l = a->leases; l; l = l->next)
@@ -105,10 +108,11 @@ static struct job_cache *keep_one(struct agent *a, struct job_cache *next)
 	return left;
 }
 
-/* How long a scene stays while another job waits. A job that has not been granted for asked_seconds counts as waiting
- * no more: it has ended, or other workers compute it. */
+/* turn_seconds: how long a job keeps the turn while another one waits. A job of which no lease has been granted for
+ * asked_seconds no longer counts as waiting: it has ended, or other workers compute it. */
 static const double turn_seconds = 300, asked_seconds = 60;
 
+/* Refuses a lease of a job that does not have the turn, and notes that the job waits. */
 static int wait_for(struct agent *a, uint64_t job, double now, struct error *e)
 {
 	struct scene_turn *t = &a->turn;

@@ -19,14 +19,14 @@
 static const double first_pause = 0.05, longest_pause = 10, long_life = 30;
 
 struct supervisor {
-	sigset_t signals, mask; /* the signals that it waits for; the previous mask */
+	sigset_t signals, mask; /* the signals that it waits for; the mask at the start */
 	pid_t child;
-	int asked;    /* the last signal passed on; 0: none */
-	bool again;   /* an earlier process was ended by a signal */
-	double pause; /* s before the next start */
+	int asked;    /* the last signal passed on to the process; 0: none */
+	bool again;   /* an earlier process has been lost, so a process that cannot start is tried again */
+	double pause; /* pause before the next start, s */
 };
 
-/* nohup ignores SIGHUP, and so does the rendering process. sigwaitinfo would receive it all the same. */
+/* Under nohup SIGHUP is ignored, also by the rendering process; sigwaitinfo would receive it nevertheless. */
 static bool is_ignored(int number)
 {
 	struct sigaction a;
@@ -44,7 +44,7 @@ static void choose_signals(struct supervisor *s)
 	sigprocmask(SIG_BLOCK, &s->signals, &s->mask);
 }
 
-/* The rendering process feeds the service manager's watchdog. */
+/* Lets the rendering process notify the service manager's watchdog instead of the supervisor. */
 static void take_over_watchdog(pid_t parent)
 {
 	const char *of = getenv("WATCHDOG_PID");
@@ -70,7 +70,7 @@ static int start(struct supervisor *s, int (*run)(void *), void *user)
 	exit(run(user));
 }
 
-/* Waits until the process has ended; its status. */
+/* Waits until the process has ended, passing on signals. Returns its status. */
 static int wait_for_end(struct supervisor *s)
 {
 	for (;;) {
@@ -85,7 +85,7 @@ static int wait_for_end(struct supervisor *s)
 	}
 }
 
-/* false: it is to end instead. */
+/* Returns false if a signal asks the program to end during the pause. */
 static bool pause_before_start(struct supervisor *s)
 {
 	double end = clock_seconds() + s->pause;
@@ -98,14 +98,15 @@ static bool pause_before_start(struct supervisor *s)
 	return true;
 }
 
-/* Only a process that cannot start ends with these: a name is not resolved at the moment, a certificate is being
- * replaced, the disk is full. */
+/* Exit codes 1 and 2 mean that the process could not start, for instance because a name is not resolved at the moment,
+ * a certificate is being replaced, or the disk is full. */
 static bool says_it_cannot_start(int status)
 {
 	return WIFEXITED(status) && (WEXITSTATUS(status) == 1 || WEXITSTATUS(status) == 2);
 }
 
-/* Waits for a process that was started. true: another one is to follow. Otherwise *code is the program's exit code. */
+/* Waits for the end of a process that was started. Returns true if it must be replaced; otherwise *code is the
+ * program's exit code. */
 static bool is_lost(struct supervisor *s, int *code)
 {
 	int status = wait_for_end(s), number = WIFSIGNALED(status) ? WTERMSIG(status) : 0;

@@ -9,20 +9,22 @@
 #include <string.h>
 #include <sys/mman.h>
 
+/* The work of one thread. */
 struct work {
-	atomic_bool busy;
+	atomic_bool busy; /* key and scene are valid */
 	struct lease_key key;
 	char scene[WORK_SCENE];
 };
 
 struct shared {
 	unsigned threads;
-	atomic_uint taken;   /* entries that a thread has */
-	atomic_bool claimed; /* a thread writes the next three: number last, which says that the others are written */
-	atomic_int number;   /* of the signal that ended the process; 0: none */
-	atomic_int hit;	     /* the entry of the thread that received it; -1: none of these */
+	atomic_uint taken; /* entries of `of` that belong to a thread */
+	/* Written by the first thread that receives a signal, which sets `claimed` first, and `number` last. */
+	atomic_bool claimed;
+	atomic_int number; /* of the signal that ended the process; 0: none */
+	atomic_int hit;	   /* the entry of the thread that received it; -1: a thread without work */
 	char text[CRASH_TEXT];
-	double short_seconds, short_until; /* the period of work_memory_was_short, and its end; 0: it never was */
+	double short_seconds, short_until; /* length and end of the last period of short memory; 0: none yet */
 	unsigned lost_count;
 	struct lost_lease lost[WORK_THREADS];
 	struct work of[WORK_THREADS];
@@ -45,7 +47,7 @@ int work_share(unsigned threads, struct error *e)
 static void last_words(int number, const char *text)
 {
 	if (atomic_exchange(&shared->claimed, true))
-		return; /* another thread came first; perhaps it ends the process before that one is done */
+		return; /* another thread came first. Returning may end the process before that thread is done */
 	atomic_store(&shared->hit, own && atomic_load(&own->busy) ? (int)(own - shared->of) : -1);
 	memcpy(shared->text, text, sizeof shared->text);
 	atomic_store(&shared->number, number);
@@ -92,7 +94,7 @@ static void add_lost_lease(const struct work *w, const char *text, bool machine)
 		   k->part, (unsigned long long)k->epoch);
 }
 
-/* Drops what has been reported. */
+/* Removes the leases that have been reported. */
 static void drop_reported(void)
 {
 	unsigned kept = 0;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The identity of a worker across restarts, so that a coordinator recognises it: a home, which is a random number made
- * with the folder (hashed with the machine's name, so that a copy of the folder elsewhere is another home), and the
- * number of starts from it. One thread.
+ * The identity of a worker across restarts, by which a coordinator recognises it: a "home" and the number of starts
+ * from it. The home is a random number that is stored in the cache's folder, hashed with the machine's name, so that a
+ * copy of the folder on another machine is another home. One thread.
  */
 #ifndef WORKER_DAEMON_WORKER_IDENTITY_H
 #define WORKER_DAEMON_WORKER_IDENTITY_H
@@ -18,8 +18,8 @@ struct worker_identity {
 	uint64_t restarts;
 };
 
-/* Increments the count in folder/name, durably; the caller holds a lock for that name. An invalid file starts a new
- * home. If it cannot be written, home is "". */
+/* Increments the number of starts in folder/name, durably; the caller holds a lock for that name. If the file is
+ * missing or invalid, a new home begins. Returns 0, or -errno if the file cannot be written; the home is then "". */
 int worker_identity_begin(struct worker_identity *l, const char *folder, const char *name, struct error *e);
 
 #endif
