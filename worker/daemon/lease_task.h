@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A lease at a worker: from the grant, through a render thread, to the frame with its result, which is kept until the
- * coordinator has acknowledged it. Loop's thread, except for the rendering itself.
+ * coordinator has acknowledged it. The loop's thread, except for the rendering itself.
  */
 #ifndef WORKER_DAEMON_LEASE_TASK_H
 #define WORKER_DAEMON_LEASE_TASK_H
@@ -12,9 +12,9 @@
 #include <stdatomic.h>
 
 enum lease_task_state {
-	LEASE_WAITING, /* for its job cache */
-	LEASE_QUEUED,  /* for a thread, or running */
-	LEASE_RENDERED /* frame holds the result */
+	LEASE_WAITING, /* waits for its job's world */
+	LEASE_QUEUED,  /* waits for a thread, or is being rendered */
+	LEASE_RENDERED /* `frame` holds the result */
 };
 
 struct lease_task {
@@ -23,21 +23,23 @@ struct lease_task {
 	struct grant grant;
 	struct job_cache *job_cache;
 	enum lease_task_state state;
-	atomic_bool stop;
-	bool unwanted; /* nobody wants it: dropped when its thread returns */
-	bool sent;     /* on this connection */
+	atomic_bool stop; /* tells the thread to stop */
+	bool unwanted;	  /* the result is not wanted any more: dropped when the thread returns it */
+	bool sent;	  /* the result has been sent on this connection */
 	unsigned char *frame;
 	size_t frame_size;
-	/* set by the thread */
+	/* These three are set by the thread. */
 	enum lease_end end;
 	int rc;
 	struct error error;
 	void *owner;
-	void (*finished)(struct lease_task *);
+	void (*finished)(
+		struct lease_task *); /* called on the loop's thread when the render thread returns the lease */
 };
 
-int lease_task_new(struct lease_task **l, struct grant *g, struct job_cache *b, struct error *e); /* takes the grant */
-void lease_task_free(struct lease_task *l); /* not while a thread has it */
+/* Creates a lease, which then owns the contents of *g. Returns 0 or -ENOMEM. */
+int lease_task_new(struct lease_task **l, struct grant *g, struct job_cache *b, struct error *e);
+void lease_task_free(struct lease_task *l); /* must not be called while a thread has the lease */
 void lease_task_start(struct lease_task *l, struct thread_pool *c);
 
 #endif
