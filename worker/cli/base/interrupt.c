@@ -15,7 +15,8 @@ static void interrupt(int signal_number)
 	atomic_store(&interrupted, true);
 }
 
-/* When a terminal is closed, SIGHUP may come from the kernel and from the shell; nohup has it ignored. */
+/* Handles SIGHUP, unless it is ignored, as under nohup. The handler of interrupt_watch stays installed, because closing
+ * a terminal may send the signal twice, by the kernel and by the shell. */
 static void handle_hangup(void (*handler)(int), int flags)
 {
 	struct sigaction act = {.sa_handler = handler, .sa_flags = flags}, before;
@@ -41,7 +42,7 @@ static const char *_Atomic last_words;
 static void say_and_end(int signal_number)
 {
 	const char *text = atomic_load(&last_words);
-	/* The handler has been reset (SA_RESETHAND); the signal is delivered when this one returns. */
+	/* SA_RESETHAND has restored the default action, which raise triggers when this handler returns. */
 	if (write(STDERR_FILENO, text, strlen(text)) < 0)
 		_exit(128 + signal_number);
 	raise(signal_number);

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * One table: each option checks its argument at once and says what is expected. What depends on the scene (the film's
- * aspect, the default mixture) is filled in by render_plan_from_scene, which ends with plan_make.
+ * The table of the options that several programs share, and the functions that take their arguments. Each option checks
+ * its argument at once and says what is expected. Values that depend on the scene, such as the film's size and the
+ * default mixture, are filled in by render_plan_from_scene; the plan itself is made by plan_make.
  *
- * A wrong argument is -EINVAL with a sentence that names the option; it leaves the arguments half filled, and the
- * programs exit with it.
+ * A wrong argument is -EINVAL with a sentence that names the option. The arguments are then half filled, and the
+ * programs exit with a usage error.
  */
 #include "worker/cli/base/options.h"
 
@@ -104,7 +105,7 @@ static int take_integrator(void *target, char *arg, struct error *e)
 	return 0;
 }
 
-/* "640x360", or "640": the height follows from the scene's aspect. */
+/* Takes "640x360", or "640" if the height is to follow from the scene's aspect ratio. */
 static int take_size(void *target, char *arg, struct error *e)
 {
 	struct render_arguments *a = target;
@@ -153,7 +154,7 @@ static int take_mutations(void *target, char *arg, struct error *e)
 	return 0;
 }
 
-/* Every setting, with default, range and meaning. */
+/* Prints every setting with its default, range and meaning, and exits. */
 static void list_settings(void)
 {
 	const struct render_setting *k;
@@ -196,7 +197,7 @@ static int set_sensor(struct render_arguments *a, uint32_t n, struct error *e)
 	return add_setting(a, set, e);
 }
 
-/* Anything but a number is an id, which is looked up in the scene. */
+/* Takes the number of a sensor. Anything else is an id, which is looked up later in the scene (find_sensor). */
 static int take_sensor(void *target, char *arg, struct error *e)
 {
 	struct render_arguments *a = target;
@@ -374,7 +375,7 @@ static int check(void *target, struct error *e)
 
 const struct option_table render_table = {groups, check};
 
-/* Whether it renders what the scene has. open: it is not settled yet. */
+/* Checks that the integrator can render everything in the scene. open: the integrator is still to be chosen. */
 static int check_finds(const struct render_integrator *i, const struct render_summary *summary, bool open,
 		       struct error *e)
 {
@@ -391,11 +392,11 @@ int render_plan_from_scene(struct render_arguments *a, const struct render_summa
 {
 	struct plan_request *p = &a->plan;
 	const struct scene_settings *s = &summary->settings;
-	bool open = integrator_is_open(p), chains = a->mixture || p->chains; /* options of mutations imply them */
+	bool open = integrator_is_open(p), chains = a->mixture || p->chains; /* options for chains imply chains */
 	if (open)
 		text_copy(p->integrator, sizeof p->integrator,
 			  chains ? RENDER_INTEGRATOR_CHAINS : RENDER_INTEGRATOR_DEFAULT);
-	if (open && !chains && summary->rolls) { /* nothing is left to choose */
+	if (open && !chains && summary->rolls) { /* only `path` can render it, so nothing is left to choose */
 		text_copy(p->integrator, sizeof p->integrator, "path");
 		open = false;
 	}
@@ -425,7 +426,8 @@ int render_plan_from_scene(struct render_arguments *a, const struct render_summa
 			"these (hide_emitters); --max-depth 2 shows what they light");
 	if (!p->min_depth)
 		p->min_depth = s->hide_emitters ? 2 : 1;
-	/* Longer paths carry no light; but the requested minimum must be measured against something. */
+	/* Longer paths carry no light in this scene. Not if the requested minimum is longer still, which would leave
+	 * no paths. */
 	if (p->max_depth > summary->useful_depth && summary->useful_depth >= p->min_depth)
 		p->max_depth = summary->useful_depth;
 	if (!plan_request_is_bounded(p))
@@ -445,14 +447,14 @@ void option_depth_note(const char *integrator, uint32_t max_depth, char *text, s
 			i->name, i->max_depth);
 }
 
-/* The error for a scene file that does not exist, with the nearest name in its folder. */
+/* Sets the error for a scene file that does not exist, with the nearest name in its folder. */
 static int no_scene(const char *path, const char *folder, const char *name, struct error *e)
 {
 	struct spelling near = {.wanted = name};
 	struct dirent *entry;
 	char hint[512] = "";
 	struct stat link;
-	if (lstat(path, &link) == 0) /* its own name would be the nearest */
+	if (lstat(path, &link) == 0) /* a dangling link, whose own name would be the nearest one */
 		return error_set(e, ENOENT, "%s: a link to a file that is not there", path);
 	DIR *d = opendir(folder);
 	while (d && (entry = readdir(d)))

@@ -5,7 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
-/* Length of the file's name in "name:12: ..."; 0: the text begins otherwise. */
+/* Returns the length of the file's name in "name:12: ..."; 0 if the text begins otherwise. */
 static size_t place_length(const char *text)
 {
 	for (const char *at = strchr(text, ':'); at; at = strchr(at + 1, ':')) {

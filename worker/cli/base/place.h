@@ -1,15 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Messages about a scene begin with a file and a line, "room.xml:12: ...", with names relative to the scene's folder,
- * as images and farms keep them. On a terminal they are shown such that the file can be opened from here.
+ * Messages about a scene begin with a file and a line, "room.xml:12: ...". Names are relative to the scene's folder, as
+ * they are stored in images and on farms; printed messages get the folder in front, so that the file can be opened from
+ * the current folder.
  */
 #ifndef WORKER_CLI_BASE_PLACE_H
 #define WORKER_CLI_BASE_PLACE_H
 
 #include <stdio.h>
 
-/* Prints `label`, the text and a newline. If the text begins with a file of the scene's folder and a line, the folder
- * comes before them, as in `scene`, the argument of the command line. Any thread. */
+/* Prints `label`, the text and a newline. If the text begins with a line of a file in the scene's folder, the folder is
+ * printed before it, as it is written in `scene`, the argument of the command line. Any thread. */
 void place_print(FILE *to, const char *label, const char *scene, const char *text);
 
 #endif

@@ -11,20 +11,22 @@
 
 struct text_file {
 	struct buf text;
-	bool full;
+	bool full; /* memory was out, or a line too long: text_file_write will fail */
 };
 
 __attribute__((format(printf, 2, 3))) void text_file_put(struct text_file *p, const char *format, ...);
 void text_file_bytes(struct text_file *p, const void *bytes, size_t count);
-/* For XML and HTML: special characters are escaped; invalid UTF-8 and characters that XML does not allow become '?'. */
+/* Appends text to XML or HTML: special characters are escaped; invalid UTF-8 and characters that XML does not allow
+ * become '?'. */
 void text_file_escaped(struct text_file *p, const char *text);
-/* A field of comma-separated values, in quotes if necessary. */
+/* Appends a field of comma-separated values, in quotes if necessary. */
 void text_file_field(struct text_file *p, const char *text);
 void text_file_base64(struct text_file *p, const unsigned char *bytes, size_t count);
+/* Writes the file atomically. Returns -ENOMEM if any text could not be appended, or an error of image_file_write. */
 int text_file_write(const struct text_file *p, const char *path, struct error *e);
 void text_file_fini(struct text_file *p);
 
-/* Bytes of the character at `at`, if it is UTF-8 that XML allows; otherwise 0. */
+/* Returns the bytes of the character at `at`, if it is valid UTF-8 and allowed in XML; otherwise 0. */
 size_t text_file_character(const char *at);
 
 #endif

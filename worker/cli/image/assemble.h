@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Assembles crops of one render, each an image with its place in the film, into one image. Their groups and chains are
- * independent, so the errors of pixels remain valid, and relMSE is the mean over pixels. One thread; holds the whole
- * film and one crop.
+ * Assembles crops of one render, each an image with its place in the film, into one image. The groups and chains of
+ * different crops are independent, so the errors of pixels remain valid, and relMSE is the mean over pixels. One
+ * thread; holds the whole film and one crop in memory.
  */
 #ifndef WORKER_CLI_IMAGE_ASSEMBLE_H
 #define WORKER_CLI_IMAGE_ASSEMBLE_H
@@ -12,9 +12,9 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* bytes: the EXR file of the rectangle covered by the crops, mem_alloc'd. disagree: the chains of some crop
- * disagree. -EINVAL: they overlap, leave out pixels, or are not of one render (film, layers, version, scene,
- * integrator, depths, --set, --effects). */
+/* Reads the crops and returns the EXR file of the rectangle that they cover; *bytes is freed with mem_free. *disagree:
+ * the chains of some crop disagree. Returns -EINVAL if crops overlap, leave out pixels, or are not of the same render
+ * (film, layers, version, scene, integrator, depths, --set, --effects). */
 int assemble(const char *const *paths, size_t count, unsigned char **bytes, size_t *size, bool *disagree,
 	     struct error *e);
 

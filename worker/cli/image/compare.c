@@ -40,7 +40,7 @@ static double mean(const float *plane, size_t n)
 	return sum / (double)n;
 }
 
-/* Keeps relative errors of black pixels finite: (0.01 m)^2. */
+/* Returns (0.01 m)^2, m the mean of the reference, which keeps relative errors of black pixels finite. */
 static double floor_of(const struct picture *b)
 {
 	double sum = 0;
@@ -56,7 +56,7 @@ static struct pixel_error error_at(const struct picture *a, const struct picture
 		double reference = (double)b->rgb[k][i], d = (double)a->rgb[k][i] - reference;
 		r.squared += d * d / 3;
 		r.relative +=
-			d == 0 ? 0 : d * d / (reference * reference + least) / 3; /* least is 0 for a black reference */
+			d == 0 ? 0 : d * d / (reference * reference + least) / 3; /* avoids 0 / 0 for a black image */
 	}
 	if (!isfinite(r.squared))
 		r = (struct pixel_error){INFINITY, INFINITY};
@@ -77,7 +77,7 @@ static int ascending(const void *p, const void *q)
 	return a < b ? -1 : a > b;
 }
 
-/* Over all values of the three channels, by nearest rank. */
+/* Computes a percentile of all values of the three channels, by nearest rank. */
 static int percentile(const struct picture *b, double share, double *value, struct error *e)
 {
 	size_t n = pixels_of(b);
@@ -143,6 +143,7 @@ int compare(const struct picture *a, const struct picture *b, double trim, struc
 	return 0;
 }
 
+/* Returns the colour for t in [0,1]. */
 static void heat(double t, unsigned char rgb[3])
 {
 	static const double stops[6][3] = {{0, 0, 0},	   {70, 0, 110},   {190, 20, 60},

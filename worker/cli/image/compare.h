@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The difference of image A from reference B: the figures of docs/design.md, rules 4. One thread.
+ * Measures the difference of image A from reference B by the figures of docs/design.md, rules 4. One thread.
  */
 #ifndef WORKER_CLI_IMAGE_COMPARE_H
 #define WORKER_CLI_IMAGE_COMPARE_H
@@ -9,21 +9,22 @@
 
 /*
  * relMSE = mean over pixels and channels of (A-B)^2 / (B^2 + (0.01 m)^2), m the mean of B over pixels and channels.
- * Errors omit the worst pixels by relMSE; means, m and the peak are over all pixels. Values of A that are not finite
- * make their pixel infinitely wrong.
+ * relMSE, RMSE and PSNR omit the pixels with the largest relative errors, if asked to; means, m and the peak are over
+ * all pixels. A pixel with a value of A that is not finite has an infinite error.
  */
 struct compare_result {
 	double rel_mse, relative_error, rmse; /* relative_error: square root of rel_mse */
-	double psnr, peak;		      /* dB; peak: 99.5th percentile of B's values. Infinite for equal images */
-	double mean_a[3], mean_b[3], ratio[3], luminance_ratio; /* A's over B's */
-	size_t pixels, left_out, not_finite;			/* not_finite: number of pixels of A */
+	double psnr, peak; /* dB, infinite for equal images; 99.5th percentile of B's values, the peak of the PSNR */
+	double mean_a[3], mean_b[3], ratio[3], luminance_ratio; /* ratios of A to B */
+	size_t pixels, left_out, not_finite; /* pixels in all; omitted; of A with values that are not finite */
 };
 
-/* trim: the share of pixels to omit, in [0,1). -EINVAL: different sizes, or B is not finite everywhere. */
+/* Compares two images of equal size. trim: the share of pixels to omit, in [0,1). Returns -EINVAL if the sizes differ
+ * or a value of B is not finite, or -ENOMEM. */
 int compare(const struct picture *a, const struct picture *b, double trim, struct compare_result *r, struct error *e);
 
-/* Colours of relative errors, from black (0.1 %) through violet, red and orange to white (100 %); not finite: cyan.
- * Sizes as above. */
+/* Shows the relative error of each pixel as a colour, from black (0.1 %) through violet, red and orange to white
+ * (100 %), and cyan if it is not finite. rgb: 3 bytes per pixel. Errors as for compare. */
 int compare_heatmap(const struct picture *a, const struct picture *b, unsigned char *rgb, struct error *e);
 
 #endif

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The program: two images and their differences (compare.h), as text or JSON, optionally with a heat map; --exact
- * compares bits and headers and prints the first difference.
+ * The program hslt-compare: prints the difference of two images (compare.h) as text or JSON, and optionally writes a
+ * heat map. With --exact it compares bits and headers, and prints the first difference.
  *
- * Exit code 1: a failure (images of different sizes, or with different channels), a difference with --exact, or more
- * than --max-relmse.
+ * The exit code is 1 after a failure (images of different sizes, or without R, G and B), if there is a difference with
+ * --exact, or if the relMSE is above --max-relmse.
  */
 #include "common/base/mem.h"
 #include "common/base/program.h"
@@ -23,10 +23,10 @@
 
 struct arguments {
 	const char *path[2], *heatmap;
-	double trim, most; /* most: negative: none */
-	uint32_t width, height;
+	double trim, most;	/* most: --max-relmse; negative: not given */
+	uint32_t width, height; /* --size; 0: not given */
 	bool exact, json;
-	int dashes; /* images from stdin */
+	int dashes; /* number of images from stdin */
 };
 
 static int take_size(void *target, char *arg, struct error *e)
@@ -100,7 +100,7 @@ static void print_json(json_t *o)
 	json_decref(o);
 }
 
-/* JSON has no infinity. */
+/* Returns a JSON number; null for infinity and NaN, which JSON does not have. */
 static json_t *json_of(double x)
 {
 	return isfinite(x) ? json_real(x) : json_null();

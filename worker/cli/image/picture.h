@@ -11,20 +11,21 @@
 
 struct picture {
 	struct exr_image image; /* all channels, as read */
-	const float *rgb[3];	/* its planes */
+	const float *rgb[3];	/* the planes of R, G and B in `image` */
 };
 
-/* The error names the file. -EINVAL: it lacks R, G or B. */
+/* Reads an EXR file. Errors name the file; -EINVAL if it lacks R, G or B. */
 int picture_read(struct picture *p, const char *path, struct error *e);
 void picture_fini(struct picture *p);
 
-/* Means of equal boxes, of R, G and B only. -EINVAL: width and height do not divide the image's. */
+/* Reduces the image to this size by averaging equal boxes; keeps R, G and B only. -EINVAL if width and height do not
+ * divide the image's. */
 int picture_shrink(struct picture *p, uint32_t width, uint32_t height, struct error *e);
 
-/* rgb: 3 bytes per pixel, sRGB. bytes are mem_alloc'd. */
+/* Encodes an sRGB image, 3 bytes per pixel, as PNG; *bytes is freed with mem_free. */
 int picture_encode_png(const unsigned char *rgb, uint32_t width, uint32_t height, unsigned char **bytes, size_t *size,
 		       struct error *e);
-/* Temporary file and rename. */
+/* Writes a PNG file atomically (image_file_write). */
 int picture_write_png(const char *path, const unsigned char *rgb, uint32_t width, uint32_t height, struct error *e);
 
 #endif

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The data becomes a script for gnuplot on its standard input; its SVG or PNG comes back in a temporary file. Both are
- * complete before the other side reads, so that neither waits for the other. Every name and number is quoted or printed
- * by us.
+ * The data is written as a script for gnuplot, which reads it on its standard input and writes an SVG or PNG to its
+ * standard output. Script, output and messages are files in memory (memfd), each complete before it is read, so that
+ * neither side waits for the other. Every name in the script is quoted here, and every number printed here, so that
+ * nothing from outside can become a command.
  *
- * Failures: no gnuplot (-ENOENT), a gnuplot that exits with an error (its first line is in the sentence), no room for
+ * Failures: gnuplot is not installed (-ENOENT), gnuplot exits with an error (the sentence has its message), no room for
  * its output.
  */
 #include "worker/cli/plot/plot.h"
@@ -31,8 +32,8 @@ enum { OUTPUT_MAX = 1 << 26 };
 
 extern char **environ;
 
-/* In single quotes gnuplot interprets only the quote itself; a line cannot continue there, so control characters
- * become blanks. */
+/* Appends a text in single quotes, in which gnuplot interprets only the quote itself. Such a text cannot contain a line
+ * break, so control characters become blanks. */
 static void put_quoted(struct text_file *s, const char *text)
 {
 	enum { LONGEST = 400 };
@@ -51,8 +52,8 @@ static void put_quoted(struct text_file *s, const char *text)
 	text_file_bytes(s, "'", 1);
 }
 
-/* Blue, vermilion, green, purple, orange, sky (Okabe and Ito 2008): distinguishable with all kinds of colour vision,
- * on white and in print. */
+/* Blue, vermilion, green, purple, orange, sky (Okabe and Ito 2008), which can be distinguished with all kinds of colour
+ * vision, on white and in print. */
 static const char *const colours[] = {"#0072b2", "#d55e00", "#009e73", "#aa4499", "#e69f00", "#56b4e9"};
 static const int shapes[] = {7, 5, 9, 13, 11, 4};
 
@@ -178,8 +179,8 @@ static int write_script(struct text_file *s, const struct plot *p, bool png, str
 		put_series(&body, p, k);
 	}
 	text_file_put(&body, "\n");
-	/* Plots in one page need distinct ids for their parts: derived from their contents, so that they are
-	 * reproducible. */
+	/* Plots in the same page need distinct ids for their parts; these are derived from the contents, so that they
+	 * are reproducible. */
 	put_style(s, png, fnv_add(FNV_BEGIN, body.text.bytes, body.text.size));
 	text_file_bytes(s, body.text.bytes, body.text.size);
 	s->full = s->full || body.full;
@@ -187,7 +188,8 @@ static int write_script(struct text_file *s, const struct plot *p, bool png, str
 	return s->full ? error_set(e, ENOMEM, "the plot '%.80s' has too many points", p->title) : 0;
 }
 
-/* The script is complete before gnuplot reads, and its output before we do, so neither waits for the other. */
+/* Runs gnuplot with these files as stdin, stdout and stderr, and waits for its end. Returns -EIO without a sentence if
+ * gnuplot fails. */
 static int spawn(const int fd[3], struct error *e)
 {
 	char name[] = "gnuplot", settings[] = "--default-settings", input[] = "-";
@@ -203,7 +205,8 @@ static int spawn(const int fd[3], struct error *e)
 	posix_spawnattr_init(&attributes);
 	for (int i = 0; i < 3; i++)
 		posix_spawn_file_actions_adddup2(&actions, fd[i], i);
-	/* A process group of its own: an interrupt from the terminal is for us, and we then finish the report. */
+	/* In a process group of its own, gnuplot does not get an interrupt from the terminal: this program handles it
+	 * and finishes its report, for which it needs the plot. */
 	posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
 	posix_spawnattr_setpgroup(&attributes, 0);
 	posix_spawnattr_setsigmask(&attributes, &none);
@@ -222,7 +225,7 @@ static int spawn(const int fd[3], struct error *e)
 	return WIFEXITED(status) && WEXITSTATUS(status) == 0 ? 0 : -EIO;
 }
 
-/* The whole file, followed by a 0. */
+/* Reads the whole file and appends a 0. */
 static int read_whole(int fd, char **bytes, size_t *size, struct error *e)
 {
 	struct stat st;
@@ -277,7 +280,7 @@ static int draw(const struct plot *p, bool png, char **bytes, size_t *size, stru
 	return rc;
 }
 
-/* gnuplot gives each part a meaningless title, which browsers show at the pointer. */
+/* Removes the meaningless titles that gnuplot gives to each part, and that browsers show at the pointer. */
 static void drop_titles(char *svg, size_t *size)
 {
 	char *to = svg;

@@ -31,7 +31,7 @@ static void add_tic(struct plot_axis *a, double value)
 		a->tic[a->tic_count++] = value;
 }
 
-/* 1, 2 or 5 times a power of 10, such that about five of them fill the range. */
+/* Returns 1, 2 or 5 times a power of 10, such that about five such steps fill the range. */
 static double round_step(double range)
 {
 	double step = pow(10, floor(log10(range / 5)));
@@ -55,7 +55,8 @@ static void place_tics(struct plot_axis *a)
 			add_tic(a, set[i] * pow(10, k));
 }
 
-/* Margin around the points; a range of amounts starts at 0 if that costs little, so that lengths can be compared. */
+/* Adds a margin around the points. An axis of amounts begins at 0 if that costs little space, so that heights can be
+ * compared. */
 static void widen_axis(struct plot_axis *a, bool amounts)
 {
 	if (a->log) {

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * One function for each part of the page, each of which goes through a table of the reader: plug-ins by class, what
- * becomes of integrators, elements of values, kinds of spectra, names of older versions, and what --lenient replaces.
+ * Prints the page docs/compatibility.md. One function prints each part, from a table by which the reader of scenes
+ * works: plug-ins by class, the images of integrators, elements of values, kinds of spectra, names of older versions,
+ * and the replacements of --lenient. The page therefore cannot disagree with the reader.
  *
- * Nothing can fail but the stream, which the caller checks.
+ * Only writing to the stream can fail; the caller checks that.
  */
 #include "worker/cli/scene/compatibility.h"
 
@@ -67,7 +68,8 @@ static void print_image(FILE *out, const struct integrator_image *image)
 	fprintf(out, image->no_media ? "; no media without `--set media=shown`, with a note |\n" : " |\n");
 }
 
-/* What becomes of each integrator, whose parameters are those of "any"; those of one kind in one row. */
+/* Prints a table of the light that the image shows for each integrator of a scene, with one row for all integrators
+ * that show the same. Their parameters are those of the type "any" in the table before. */
 static void print_integrators(FILE *out)
 {
 	struct integrator_image image, other;
@@ -123,7 +125,7 @@ static void print_class(FILE *out, enum plugin_class cls)
 		print_samplers(out);
 }
 
-/* "a|b|c" as `a`, `b`, `c`. */
+/* Prints the list "a|b|c" as `a`, `b`, `c`. */
 static void print_names(FILE *out, const char *list)
 {
 	char name[64];

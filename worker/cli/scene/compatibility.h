@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Prints docs/compatibility.md, generated from the registries: what is supported of Mitsuba's scenes, and what
- * replaces the rest. */
+/* Prints docs/compatibility.md, generated from the registries: which parts of Mitsuba's scenes are supported, and what
+ * --lenient puts in place of the others. */
 #ifndef WORKER_CLI_SCENE_COMPATIBILITY_H
 #define WORKER_CLI_SCENE_COMPATIBILITY_H
 

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The scene is read such that every problem is found (scene_read_all). Then all meshes, images and combinations of
- * values are checked as a worker would check them; problems that only follow from one that the reader has found are
- * not reported. `show` collects everything as JSON, from which the text is made.
+ * `check` reads the scene in a way that does not stop at the first problem (scene_read_all). Then it checks meshes,
+ * images and combinations of values as a worker would; problems that may only follow from one that the reader has found
+ * are not reported. `show` collects everything as JSON, from which the text is made.
  *
- * For a scene that cannot be rendered the exit code is 1, with one line per problem; a file that cannot be read at all
- * gets only that line.
+ * If the scene cannot be rendered, the exit code is 1, and there is one line per problem. If the file cannot be read at
+ * all, that is the only line.
  */
 #include "worker/cli/scene/scene_report.h"
 
@@ -48,11 +48,12 @@ static const char *plural(uint64_t n)
 	return n == 1 ? "" : "s";
 }
 
-/* Lines "file:12: ...", printed by file as they came, and in a file by line. */
+/* A line "file:12: ...". Problems are printed by file, in the order in which files first occur, and within a file by
+ * line. */
 struct problem {
 	char *text;
-	size_t file; /* the first problem of its file */
-	size_t index;
+	size_t file;  /* index of the first problem of the same file */
+	size_t index; /* of this problem */
 	unsigned long line;
 };
 
@@ -61,7 +62,7 @@ struct problem_list {
 	struct problem *at;
 };
 
-/* "file:12" -> 4 and 12. */
+/* Returns the length of the file's name, and the line: 4 and 12 for "file:12". */
 static size_t place_of(const char *text, unsigned long *line)
 {
 	const char *colon = strchr(text, ':');
@@ -109,7 +110,8 @@ static void print_problems(struct problem_list *p, const char *scene)
 	mem_free(p->at);
 }
 
-/* Files that cannot be opened, all of them. Others are as their users find them. */
+/* Adds a problem for each file that cannot be opened, and returns their number. The contents of the others are checked
+ * later, by find_deeper. */
 static uint32_t find_missing(const struct scene *s, const struct asset_source *assets, struct problem_list *list)
 {
 	uint32_t missing = 0;
@@ -132,15 +134,15 @@ static uint32_t find_missing(const struct scene *s, const struct asset_source *a
 	return missing;
 }
 
-/* Whether two problems are of one line of one file. */
+/* Returns whether a problem is at this line of this file. */
 static bool same_place(const char *text, const char *file, size_t n, unsigned long line)
 {
 	unsigned long own;
 	return place_of(text, &own) == n && memcmp(text, file, n) == 0 && own == line;
 }
 
-/* Whether a problem of building may only follow from one of reading: it has no line, or that of a problem or of an
- * object that lacks something. */
+/* Returns whether a problem found by building may only follow from one of the first `count` problems, found by reading:
+ * it has no line, or the line of such a problem, or of an object that lacks something. */
 static bool may_follow(const struct scene *s, const struct problem_list *list, size_t count, const char *text)
 {
 	unsigned long line;
@@ -157,7 +159,8 @@ static bool may_follow(const struct scene *s, const struct problem_list *list, s
 	return false;
 }
 
-/* What the reader cannot see, in meshes, pictures and values that do not go together: in all that was read. */
+/* Adds the problems that the reader cannot see: in meshes, pictures, and values that do not fit together. Returns their
+ * number. */
 static uint32_t find_deeper(const struct scene *s, const struct asset_source *assets, struct problem_list *list,
 			    struct render_summary *m)
 {
@@ -183,7 +186,7 @@ static uint32_t find_deeper(const struct scene *s, const struct asset_source *as
 	return problems;
 }
 
-/* ", N segments of curves"; nothing without any. */
+/* Prints ", N segments of curves", or nothing if there are none. */
 static const char *segments_text(uint64_t n, char *text, size_t size)
 {
 	text[0] = '\0';
@@ -192,7 +195,8 @@ static const char *segments_text(uint64_t n, char *text, size_t size)
 	return text;
 }
 
-/* That is looked at when all else is right. */
+/* Prints problems, notes and the summary. Meshes and images are checked if the reader has found no problem, or if
+ * enough of the scene could be read. */
 static int print_check(const struct scene *s, const struct asset_source *assets, const char *scene, bool *bad)
 {
 	static struct render_summary m; /* large */
@@ -242,7 +246,7 @@ int scene_report_check(const struct render_arguments *a, bool lenient, bool *bad
 	return rc;
 }
 
-/* {"name", "bytes", "sha256"} of one file. */
+/* Returns {"name", "bytes", "sha256"} of one file; NULL, with the error set, after a failure. */
 static json_t *file_of(const struct asset_source *assets, const char *name, struct error *e)
 {
 	struct asset a;
@@ -284,7 +288,8 @@ static json_t *effects_of(const struct render_summary *m)
 	return on;
 }
 
-/* Everything that `show` knows, as JSON; the text is made from it. */
+/* Returns everything that `show` prints, as JSON, from which the text is made, too. NULL, with the error set, after a
+ * failure. */
 static json_t *describe(const struct scene *s, const struct opened *o, struct error *e)
 {
 	static struct render_summary m; /* large */
@@ -317,7 +322,8 @@ static json_t *describe(const struct scene *s, const struct opened *o, struct er
 	return all;
 }
 
-/* Small meshes are copied; what moves may share one without an instance. */
+/* Prints the numbers of instances and of shapes that share meshes. They differ: small meshes are copied for each
+ * instance, and moving shapes may share a mesh without being instances. */
 static void print_instances(long long instances, long long sharing, long long meshes)
 {
 	printf(" (");

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A pilot on a farm (pilot.h): a probe and a short render as separate jobs, whose error estimates come with their
- * status. One thread; shows progress on stderr.
+ * A pilot on a farm (pilot.h): a probe and a short render, each a job of its own, whose estimates of the error come
+ * with the job's status. One thread; shows progress on stderr.
  */
 #ifndef WORKER_CLI_SUBMIT_FARM_PILOT_H
 #define WORKER_CLI_SUBMIT_FARM_PILOT_H
@@ -9,17 +9,17 @@
 #include "worker/cli/submit/submit.h"
 
 struct farm_pilot {
-	/* in */
+	/* Set by the caller. */
 	struct client *client;
-	const struct submit_request *request; /* of the render, its plan request complete */
+	const struct submit_request *request; /* the render to be predicted; its plan request is complete */
 	const struct scene_files *files;
-	double seconds;
-	/* out */
-	struct plan render, plan; /* of the render being predicted; of the pilot */
-	struct submit_end end;	  /* of the pilot */
+	double seconds; /* time for the pilot */
+	/* Set by farm_pilot. */
+	struct plan render, plan; /* the plans of the render and of the pilot */
+	struct submit_end end;	  /* the end of the pilot, with its estimates */
 };
 
-/* -ECANCELED: a job failed. */
+/* Runs the pilot. Returns 0, -ECANCELED if one of its jobs failed, or an error of the connection. */
 int farm_pilot(struct farm_pilot *p, struct error *e);
 
 #endif

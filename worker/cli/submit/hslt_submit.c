@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The program: options, the scene's files and their hashes, integrator and plan as in hslt-render, submission. With
- * --wait it shows progress, fetches the image and verifies its hash. A lost connection is re-established (reconnect.h);
- * the job continues meanwhile.
+ * The program hslt-submit. It reads the scene and hashes its files, checks that the coordinator accepts it, chooses
+ * integrator and plan as hslt-render does, and submits the job. With --wait it shows progress until the job ends and
+ * fetches the image; a lost connection is made again (reconnect.h), and the job continues in the meantime. With
+ * --estimate it runs a pilot on the farm instead (farm_pilot.h).
  *
- * Exit codes are those of the job if it ended (docs/design.md), 1 for a local failure; after a signal it prints how to
- * continue with the job.
+ * The exit code is that of the job if it ended (docs/design.md, rules 6), otherwise that of the failure
+ * (client_exit_code). After a signal the program prints how to continue with the job.
  */
 #include "common/base/crash.h"
 #include "common/base/program.h"
@@ -120,7 +121,7 @@ static const struct program program = {
 	.word = option_scene,
 };
 
-/* The default name for a later fetch. The farm does not need the folder. */
+/* Returns the default name for a later fetch: without the folder, which the farm does not need. */
 static const char *last_part(const char *path)
 {
 	const char *slash = strrchr(path, '/');
@@ -142,11 +143,11 @@ static void print_id(const struct arguments *a, uint64_t job, const char *plan, 
 	} else {
 		puts(id);
 	}
-	if (fflush(stdout) || ferror(stdout)) /* the job exists all the same */
+	if (fflush(stdout) || ferror(stdout)) /* the job exists, so its id must not be lost */
 		fprintf(stderr, "hslt-submit: the job's id is %s\n", id);
 }
 
-/* Ending the wait does not end the job. */
+/* Prepares the text for a signal: ending this program does not end the job. */
 static void say_at_the_end(const struct arguments *a, uint64_t job)
 {
 	static char text[512];
@@ -215,14 +216,14 @@ static int estimate(const struct arguments *a, struct client *cl, const struct s
 	return client_local(estimate_report(&m, a->json, a->plot, e));
 }
 
-/* Whether the coordinator can make a plan of it. */
+/* Checks that the coordinator will be able to make a plan of the request. */
 static int check_plan(const struct arguments *a, struct error *e)
 {
 	struct plan plan;
 	return a->estimate ? pilot_render_plan(&a->render.plan, &plan, e) : plan_make(&a->render.plan, &plan, e);
 }
 
-/* The duration of leases is measured only if it matters; with --epoch it is known. */
+/* Measures the speed of a thread, which determines the length of epochs, unless it does not matter for this plan. */
 static void measure(struct arguments *a, const struct scene_files *files)
 {
 	struct plan plan;
@@ -239,8 +240,8 @@ static void measure(struct arguments *a, const struct scene_files *files)
 		plan.kind == PLAN_CHAINS ? "mutations" : "samples");
 }
 
-/* Checks that a coordinator accepts us before a pilot is rendered. The connection is closed again, since nothing would
- * keep it alive during the pilot. */
+/* Checks, before a pilot is rendered, that the coordinator accepts this client. The connection is closed again, since
+ * nothing would keep it alive during the pilot. */
 static int check_access(const struct arguments *a, struct error *e)
 {
 	struct client *cl;
@@ -252,7 +253,7 @@ static int check_access(const struct arguments *a, struct error *e)
 	return 0;
 }
 
-/* The name of a job without --name: the scene's file's, which may be longer, or no UTF-8. */
+/* Returns the name of a job without --name: that of the scene file, cut to fit and made valid UTF-8. */
 static const char *name_of_file(const char *file, char name[NAME_MOST + 1])
 {
 	text_copy(name, NAME_MOST + 1, file);

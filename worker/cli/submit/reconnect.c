@@ -22,14 +22,15 @@ static int try_once(struct client *cl, const struct submitted *job, const char *
 		    struct error *e)
 {
 	int rc = submit_wait(cl, job, end, e);
-	/* A job that made an image which is gone is no success: the coordinator says what became of it. */
+	/* Fetches also if the job made an image that has been deleted since: the coordinator's error tells that. */
 	if (!rc && (end->has_result || end->exit_code != 3))
 		rc = client_fetch(cl, job->job, FARM__WHAT__WHAT_RESULT, output, e);
 	return rc;
 }
 
-/* Connects again and again until somebody answers. Who was let in before may be so again when a certificate that has
- * expired meanwhile is renewed, or a clock is set right. */
+/* Connects again and again, with growing pauses, until a coordinator answers or the patience is over. A certificate
+ * that has expired is no reason to give up: this client was accepted before, and may be again once the certificate is
+ * renewed or a clock is corrected. */
 static int call_again(struct client **cl, const struct reconnect *o, struct error *e)
 {
 	double gone = clock_seconds(), pause = first_pause;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Waits for a job across restarts of its coordinator: reconnects, with growing pauses, and continues to watch. One
- * thread.
+ * Waits for a job across restarts of its coordinator: reconnects, with growing pauses, and continues to watch the job.
+ * One thread.
  */
 #ifndef WORKER_CLI_SUBMIT_RECONNECT_H
 #define WORKER_CLI_SUBMIT_RECONNECT_H
@@ -11,12 +11,13 @@
 struct reconnect {
 	const char *coordinator, *tls;
 	bool insecure;
-	double patience; /* s without a coordinator */
+	double patience; /* how long to wait for a coordinator, s */
 };
 
 /* Waits for the job's end and fetches its result, if there is one, into `output`. *cl may be another connection
- * afterwards, or NULL. -ECONNREFUSED: nobody answered for longer than `patience`; -EKEYEXPIRED: a certificate had
- * expired for as long; the sentence says how to get the image later. -ESTALE: another job has its number. */
+ * afterwards, or NULL. Returns -ECONNREFUSED if no coordinator answered within `patience`, -EKEYEXPIRED if a
+ * certificate stayed expired for as long (in both cases the sentence says how to get the image later), -ESTALE if
+ * another job has the number now, or another error of the client. */
 int reconnect_job(struct client **cl, const struct reconnect *o, const struct submitted *job, const char *output,
 		  struct submit_end *end, struct error *e);
 

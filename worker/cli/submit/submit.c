@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The scene is read through a folder that hashes each of its files while it is read and checked as a worker will. Then
- * the job is sent; the coordinator answers which files it lacks, and those are sent in chunks, each compared with the
- * hash.
+ * The parts of hslt-submit. scene_files_read reads and checks the scene as a worker will, through a folder that records
+ * and hashes each file that is opened. submit_send sends the job; the coordinator answers which files it lacks, and
+ * those are hashed again and sent in chunks. submit_wait watches the job and shows its progress until it ends.
  *
- * Failures: a scene that cannot be rendered (with the place), a file that changes while it is sent, a refusal with the
- * coordinator's sentence, a lost connection (-ECONNRESET, may be tried again).
+ * Failures: a scene that cannot be rendered (the error names file and line), a file that has changed since it was
+ * hashed, a refusal with the coordinator's sentence, a lost connection (-ECONNRESET, which may be tried again).
  */
 #include "worker/cli/submit/submit.h"
 
@@ -23,8 +23,8 @@ enum { CHUNK = 1 << 20 };
 
 /* ---- the scene's files ---- */
 
-/* A folder that records which files were opened, with their hashes: the world is built here as by workers, so they
- * need exactly these. One thread. */
+/* A folder that records which files were opened, with their hashes. Workers build the world in the same way, so they
+ * need exactly these files. One thread. */
 struct opened {
 	struct asset_source folder;
 	struct scene_files *files;
@@ -116,7 +116,7 @@ void scene_files_fini(struct scene_files *files)
 
 /* ---- sending ---- */
 
-/* The lists of a message; their texts are borrowed. */
+/* The lists of a message, whose texts belong to others. */
 struct lists {
 	Farm__File *files, **file_at;
 	Farm__Define *defines, **define_at;
@@ -240,8 +240,8 @@ static int send_chunk(struct client *cl, const struct scene_file *f, uint64_t of
 			   bytes, size, e);
 }
 
-/* Opened as before, below the scene's folder or one of --path; only the bytes that were read then leave this
- * machine. */
+/* Opens a file as when the scene was read, below the scene's folder or one of --path, and sends it only if it still has
+ * the hash of that time. */
 static int send_file(struct client *cl, const struct scene_files *files, const struct scene_file *f, struct error *e)
 {
 	struct asset_source folder = asset_search(&files->folders);
@@ -303,7 +303,7 @@ int submit_send(struct client *cl, const struct submit_request *r, const struct 
 
 /* ---- waiting ---- */
 
-/* "120 k/s, 31 min left (25 min - 40 min), error 3.2 %, half costs 12 min" */
+/* Prints a text such as "120 k/s, 31 min left (25 min - 40 min), error 3.2 %, halved in 12 min". */
 static void describe(const Farm__JobStatus *s, const char *rate, char *text, size_t size)
 {
 	char eta[32], low[32], high[32] = "?", range[80] = "", error[80] = "";
@@ -349,7 +349,7 @@ static void take_looks(const Farm__JobStatus *s, struct submit_end *end)
 	}
 }
 
-/* ended: it has. */
+/* Shows a status and stores its contents in *end. *ended: the job has ended. */
 static int take_status(struct progress *p, const Farm__JobStatus *s, const struct submitted *job,
 		       struct submit_end *end, bool *ended, struct error *e)
 {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What hslt-submit does: collects a scene's files by hash, sends the job and the files that the coordinator lacks,
- * waits for it and fetches its result. One thread.
+ * The steps of hslt-submit: collects a scene's files and their hashes, sends the job and the files that the coordinator
+ * lacks, and waits for its end. One thread.
  */
 #ifndef WORKER_CLI_SUBMIT_H
 #define WORKER_CLI_SUBMIT_H
@@ -12,11 +12,11 @@
 #include "common/exr/output_files.h"
 #include "worker/cli/base/options.h"
 
-/* A scene and its files, as read here. */
+/* A scene and its files, as read on this machine. */
 struct scene_files {
-	char *folder; /* of the scene file; names of files are relative to it, or to a folder of --path */
+	char *folder; /* of the scene file; names of files are relative to this folder, or to one of --path */
 	struct asset_folders folders;
-	char *scene; /* the scene file's name in it */
+	char *scene; /* name of the scene file in its folder */
 	size_t count;
 	struct scene_file {
 		char *name;
@@ -28,40 +28,41 @@ struct scene_files {
 	char **notes;
 };
 
-/* Reads and checks the scene with everything that it needs; files that building its world did not need are not part
- * among them. No output may replace one of them. The error names file, line and element. */
+/* Reads and checks the scene, and lists the files that building its world needs. -EINVAL if an output would replace one
+ * of them. Errors name file, line and element. */
 int scene_files_read(struct scene_files *files, const char *path, struct render_arguments *a,
 		     const struct output_files *outputs, struct error *e);
 void scene_files_fini(struct scene_files *files);
 
 struct submit_request {
-	const char *name, *output; /* output: a file's name for a later fetch, or "" */
+	const char *name, *output; /* output: name of the image file for a later fetch, or "" */
 	int priority;
-	bool mixed;
-	double verify; /* share of the epochs computed by two workers */
+	bool mixed;    /* workers of any numeric fingerprint may take part */
+	double verify; /* share of the epochs that two workers compute */
 	const struct render_arguments *args;
 };
 
-/* A job of a coordinator. A new spool counts from 1 again, so the number alone could mean another job. */
+/* Identifies a job of a coordinator. A new spool counts from 1 again, so the number alone could mean another job. */
 struct submitted {
 	uint64_t job;
-	double at; /* s since 1970, by the coordinator */
+	double at; /* when it was submitted, s since 1970 by the coordinator's clock */
 };
 
-/* -EACCES: refused, with the coordinator's sentence. plan_text: what was chosen, and by which rule. */
+/* Sends a job and the files that the coordinator lacks. plan_text: the plan, and by which rules it was made. Returns
+ * -EACCES, with the coordinator's sentence, if the job is refused. */
 int submit_send(struct client *cl, const struct submit_request *r, const struct scene_files *files,
 		struct submitted *job, char *plan_text, size_t plan_size, struct error *e);
 
 struct submit_end {
-	uint32_t exit_code; /* of a program that waited */
+	uint32_t exit_code; /* exit code for a program that waits for the job */
 	bool has_result;
-	char state[16];		       /* done, failed, cancelled */
-	struct forecast_history looks; /* estimates of the error; seconds from the first round on */
+	char state[16];		       /* "done", "failed" or "cancelled" */
+	struct forecast_history looks; /* estimates of the error; their times count from the first round on */
 	double cpu_seconds, bootstrap_cpu_seconds, bootstrap_seconds;
 	char why[256], note[1024]; /* why there is no result; notes on the image */
 };
 
-/* Shows progress on stderr until the job has ended. -ESTALE: another job has its number. */
+/* Shows progress on stderr until the job has ended. Returns -ESTALE if another job has the number now. */
 int submit_wait(struct client *cl, const struct submitted *job, struct submit_end *end, struct error *e);
 
 #endif
