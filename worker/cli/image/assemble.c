@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Crops are added one by one: the first determines what all must share (plan, seed, film), each copies its pixels and
- * adds its sums, and the last completes the header. Pixels without a crop are cut off at the border; elsewhere they are
- * an error.
+ * Crops are added one by one (add_crop). The first determines the film, the layers and the attributes that all must
+ * share; each crop is checked against the first, its pixels are copied, and the numbers in its header are added up. At
+ * the end, the film is cut to the rectangle that the crops cover (close_up), and the header is written (write).
  *
- * Failures name the file and the attribute in which it differs.
+ * Failures name the file, and the attribute or pixel that is wrong: crops of different renders, crops that overlap, or
+ * a pixel inside the rectangle that no crop has.
  */
 #include "worker/cli/image/assemble.h"
 
@@ -19,8 +20,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Attributes that must be equal, that are added, or that have a rule of their own; others are kept if all crops
- * agree. */
+/* Attributes that must be equal in all crops (alike), whose numbers are added up (added), or that have rules of their
+ * own in add_header and write (own). Any other attribute is kept if all crops agree on it. */
 static const char *const alike[] = {"hslt:version",  "hslt:scene",    "hslt:integrator",
 				    "hslt:minDepth", "hslt:maxDepth", "hslt:effects"};
 static const char *const added[] = {"hslt:mutations",	"hslt:accepted",   "hslt:independent",
@@ -35,9 +36,11 @@ enum { TEXT = 8192 };
 
 struct sums {
 	uint64_t added[ADDED];
-	bool in_all[ADDED];		  /* present in every crop */
-	double mse, below, above, pixels; /* relMSE times pixels; squared distances from the ends of its interval */
-	bool has_mse;
+	bool in_all[ADDED];  /* the attribute is present in every crop */
+	double mse;	     /* sum of relMSE times pixels */
+	double below, above; /* sums of squares: distance of relMSE from the ends of its interval, times pixels */
+	double pixels;	     /* number of pixels */
+	bool has_mse;	     /* every crop has a relMSE and its interval */
 	double cpu, wall;
 	int mixed;
 	bool too_short, disagree, agree;
@@ -46,9 +49,9 @@ struct sums {
 
 struct assembly {
 	struct exr_image film;
-	unsigned char *covered;
-	bool *kept;		/* of the attributes of the first crop */
-	struct exr_image first; /* only its header */
+	unsigned char *covered; /* [pixel]: 1 if a crop has it */
+	bool *kept;		/* [attribute of the first crop]: all crops so far agree on it */
+	struct exr_image first; /* header of the first crop */
 	struct sums sums;
 };
 
@@ -73,7 +76,7 @@ static double number_of(const struct exr_image *img, const char *name)
 	return a && a->type == EXR_ATTRIBUTE_DOUBLE ? a->number : NAN;
 }
 
-/* The argument of an option in hslt:options ("--set A=1 ..."), up to a space. */
+/* Returns whether an option has the same argument, up to the next space, in two texts of hslt:options. */
 static bool same_option(const char *a, const char *b, const char *option)
 {
 	const char *x = strstr(a, option), *y = strstr(b, option);
@@ -216,7 +219,7 @@ static int add_crop(struct assembly *a, const char *path, struct error *e)
 	return rc ? error_prefix(e, rc, "%s", path) : 0;
 }
 
-/* The covered rectangle becomes the image; moves its rows to the front. */
+/* Reduces the film to the rectangle that the crops cover. */
 static int close_up(struct assembly *a, struct error *e)
 {
 	struct exr_image *f = &a->film;
@@ -263,7 +266,7 @@ static void put_string(struct exr_image *f, const char *name, const char *text)
 		(struct exr_attribute){.name = name, .type = EXR_ATTRIBUTE_STRING, .string = text};
 }
 
-/* Names and texts are borrowed from the table, the first crop and the sums. */
+/* Writes the image. The names and texts of its attributes belong to the tables, the first crop and the sums. */
 static int write(struct assembly *a, size_t count, unsigned char **bytes, size_t *size, struct error *e)
 {
 	struct exr_image *f = &a->film;

@@ -9,12 +9,12 @@
 enum plot_style { PLOT_POINTS, PLOT_LINE, PLOT_BAND /* between low and high */ };
 
 struct plot_series {
-	const char *name; /* "": not in the legend */
+	const char *name; /* in the legend; "": not there */
 	enum plot_style style;
 	size_t count;
-	const double *x, *y, *low,
-		*high; /* [count]; low and high may be NULL: no bars. Points that are not finite are left out */
-	const char *const *labels; /* [count], beside the points; NULL: none */
+	const double *x, *y;	   /* [count]; points that are not finite are left out */
+	const double *low, *high;  /* [count], the ends of error bars, or of the band; NULL: no bars */
+	const char *const *labels; /* [count], printed beside the points; NULL: none */
 };
 
 struct plot {
@@ -22,7 +22,7 @@ struct plot {
 	bool log_x, log_y;
 	size_t series_count;
 	const struct plot_series *series;
-	const char *const *x_names; /* [x_name_count], at x = 1, 2, ... in place of numbers; NULL: numbers */
+	const char *const *x_names; /* [x_name_count], printed at x = 1, 2, ... instead of numbers; NULL: numbers */
 	size_t x_name_count;
 };
 
