@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The list of settings to compare: the default, the reference, each accuracy setting over its sweep, mixtures of
- * strategies with one removed or added, presets. A value without effect in this scene (accuracy_settings' `place`,
- * effects that are off) is left out with the reason, so that no time is spent on it.
+ * Makes the list of settings to compare: the default, the reference, each accuracy setting with the values of its
+ * sweep, other depths, other shares of independent proposals, mixtures of strategies with one removed or added, and
+ * presets. A parameter without effect in this scene (because the integrator has no chains, or an effect is off) is left
+ * out with the reason, so that no time is spent on it. What does not fit into the tables is left out.
  *
- * Fails if the user names a parameter or value that does not exist (-EINVAL, with the nearest name), or more settings
- * than the table holds.
+ * Fails if --parameters names a parameter that does not exist (-EINVAL, with the nearest name).
  */
 #include "worker/cli/accuracy/accuracy_design.h"
 
@@ -17,8 +17,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The reference: values for which the bias of a parameter is far below what can be measured. Those of roughness and
- * tessellation are the finest ones worth a sweep. */
+/* The settings of the reference: values whose bias is far too small to be measured. Those of roughness and tessellation
+ * are the finest values of their sweeps. */
 static const struct {
 	const char *parameter, *value;
 } careful[] = {{"tolerance", "1e-06"},
@@ -27,12 +27,12 @@ static const struct {
 	       {"roughness", "0"},
 	       {"tessellation", "2"}};
 
-/* Presets for a user in a hurry. */
+/* Settings that belong together and are tried as one. */
 static const struct {
 	const char *name, *accuracy;
 } presets[] = {{"fast", "tolerance=0.01,iterations=6,reverse-tolerance=0.01"}};
 
-/* Parameters that are not in the list of worker/render/settings/accuracy_settings.h. */
+/* Names of the parameters that are not settings of worker/render/settings/accuracy_settings.h. */
 #define DEPTH "max-depth"
 #define SHARE "independent"
 #define MIXTURE "mixture"
@@ -99,7 +99,8 @@ static struct accuracy_setting *new_setting(struct planner *p, const char *param
 	return s;
 }
 
-/* The sweep's next value; setting 0 if it is the default's. */
+/* Appends a value to the sweep. setting: the index of the setting that has it; ACCURACY_DEFAULT if it is the default's
+ * value. Returns false if the sweep is full. */
 static bool add_value(struct accuracy_sweep *s, const char *value, size_t setting)
 {
 	if (s->count == ACCURACY_VALUES)
@@ -119,7 +120,7 @@ static struct accuracy_setting *add_swept_setting(struct planner *p, struct accu
 	return setting;
 }
 
-/* Adds one setting to the base's; false: it is the base's value already, or invalid. */
+/* Sets one value in the settings `base`. Returns false if it is the base's value already, or is invalid. */
 static bool with_setting(const char *base, const char *name, const char *value, char out[PLAN_ACCURACY_MAX])
 {
 	char text[2 * PLAN_ACCURACY_MAX];
@@ -128,7 +129,7 @@ static bool with_setting(const char *base, const char *name, const char *value, 
 	return render_settings_canonical(text, out, &e) == 0 && strcmp(out, base) != 0;
 }
 
-/* Why a parameter of the renderer has no effect here; NULL: it has one. */
+/* Returns why a setting of the renderer has no effect in this scene; NULL if it has one. */
 static const char *why_no_effect(const struct planner *p, const struct render_setting *k)
 {
 	if (!k->sweep[0])
@@ -196,7 +197,7 @@ struct entry {
 	bool independent;
 };
 
-/* A canonical mixture: NAME=WEIGHT for each strategy. */
+/* Reads a canonical mixture, which has NAME=WEIGHT for each strategy. Returns the number of strategies. */
 static int entries_of(const char *mixture, struct entry entry[PLAN_MAX_STRATEGIES])
 {
 	int n = plan_strategy_count(mixture);
@@ -282,7 +283,8 @@ static void try_mixture(struct planner *p, struct accuracy_sweep *s, const struc
 		memcpy(setting->mixture, mixture, sizeof mixture);
 }
 
-/* Mixtures with each present strategy removed, and each absent one added. */
+/* Adds mixtures with one strategy removed, for each that is present and has less than half of the weight, and with one
+ * added, for each that is absent and has an effect in this scene. */
 static void sweep_mixture(struct planner *p)
 {
 	struct entry base[PLAN_MAX_STRATEGIES], changed[PLAN_MAX_STRATEGIES + 1];
@@ -355,7 +357,7 @@ static void add_reference(struct planner *p)
 	}
 }
 
-/* The i-th name that --parameters accepts; NULL: no more. */
+/* Returns the i-th name that --parameters accepts; NULL after the last. */
 static const char *parameter_at(size_t i)
 {
 	static const char *const own[] = {DEPTH, SHARE, MIXTURE, PRESET};

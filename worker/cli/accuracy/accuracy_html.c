@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The report as one HTML page without scripts: a summary paragraph, facts about machine and scene, tables with an
- * interval in each row, plots as SVG (accuracy_plots.h). All text from scenes is escaped. Unknown numbers are printed
- * as such, never as 0.
+ * Writes the report as one HTML page without scripts: a summary, the image, facts about machine and scene, tables with
+ * intervals, and plots as SVG (accuracy_plots.h). All text from scenes is escaped. An unknown number is printed as a
+ * dash, never as 0.
  *
- * Without memory, for the text or the picture, or if the file cannot be written, there is an error and no page.
+ * Fails, and writes no page, if memory is out or the file cannot be written.
  */
 #include "worker/cli/accuracy/accuracy_html.h"
 
@@ -43,7 +43,7 @@ static void paragraph(struct text_file *p, const char *text)
 	text_file_put(p, "</p>\n");
 }
 
-/* "12.3 (11.9 to 12.8)", in percent. */
+/* Appends a cell such as "12.3 (11.9 to 12.8)", in percent. sign: print + or -; seen: mark it as significant. */
 static void cell(struct text_file *p, struct interval x, bool sign, bool seen)
 {
 	if (!isfinite(x.value))
@@ -78,7 +78,7 @@ static void row_begin(struct text_file *p, const struct accuracy_context *x, siz
 	text_file_put(p, "<tr class=\"%s%s\">", front ? "front " : "", i == ACCURACY_DEFAULT ? "default" : "");
 }
 
-/* The default against the others, in one paragraph, for readers in a hurry. */
+/* Appends the summary: how the default compares with the others. */
 static void put_answer(struct text_file *p, const struct accuracy_context *x)
 {
 	const struct accuracy_figures *f = x->judgement->figures, *d = &f[ACCURACY_DEFAULT];

@@ -17,7 +17,7 @@ static void put_plot(struct text_file *p, const struct plot *plot)
 		text_file_put(p, "</p>\n");
 		return;
 	}
-	/* Inside a page it must not have an XML declaration. */
+	/* Skips the XML declaration, which is not allowed inside a page. */
 	const char *begin = strstr(svg, "<svg");
 	if (begin)
 		text_file_bytes(p, begin, size - (size_t)(begin - svg));

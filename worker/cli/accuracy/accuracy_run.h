@@ -1,28 +1,28 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Renders all settings alternately, so that times can be compared. One thread, besides those of the leases. */
+/* Renders all settings alternately, so that times can be compared. One thread, besides those that run leases. */
 #ifndef WORKER_CLI_ACCURACY_ACCURACY_RUN_H
 #define WORKER_CLI_ACCURACY_ACCURACY_RUN_H
 
 #include "worker/cli/accuracy/accuracy_design.h"
 #include "worker/cli/render/local.h"
 
-enum { ACCURACY_COSTS = 4096 };
+enum { ACCURACY_COSTS = 4096 }; /* rounds of a setting whose cost is kept, at most */
 
 /* One setting's rendering. */
 struct accuracy_job {
 	struct plan plan;
-	struct world *world; /* shared with others, if possible */
+	struct world *world; /* one of accuracy_run.worlds, which settings share if possible */
 	struct local_run run;
 	struct local_job *job;
 	size_t cost_count;
 	double cost[ACCURACY_COSTS]; /* CPU seconds per mutation, of each round */
-	double cpu;		     /* of the rounds */
+	double cpu;		     /* CPU seconds of all rounds */
 };
 
 struct accuracy_run {
-	/* in */
+	/* Set by the caller. */
 	const struct accuracy_design *design;
-	struct plan_request request; /* what all have in common */
+	struct plan_request request; /* the values that all settings have in common */
 	const struct scene *scene;
 	const struct asset_source *assets;
 	const struct render_options *render;
@@ -33,15 +33,16 @@ struct accuracy_run {
 	const atomic_bool *stop;
 	void (*progress)(void *user, double fraction, const char *state);
 	void *user;
-	/* out */
+	/* Set by accuracy_render. */
 	struct accuracy_job *jobs; /* [design->count] */
 	size_t world_count;
 	struct world *worlds[ACCURACY_SETTINGS];
 	double wall_seconds;
-	bool interrupted;
+	bool interrupted; /* *stop was set */
 };
 
-/* Returns 0 also if it was interrupted after each setting had a round: what was rendered can be judged. */
+/* Renders all settings. An interruption is a failure (-EINTR) only if some setting has no complete round; otherwise
+ * what was rendered can be judged. Call accuracy_run_fini after a failure, too. */
 int accuracy_render(struct accuracy_run *r, struct error *e);
 void accuracy_run_fini(struct accuracy_run *r);
 

@@ -9,7 +9,7 @@
 
 double stats_t(double level, double degrees)
 {
-	/* The square of Student's t is an F with 1 degree on top. */
+	/* The square of Student's t has an F distribution with 1 and n degrees of freedom. */
 	double n = degrees < 1 ? 1 : degrees > 1e9 ? 1e9 : degrees;
 	return sqrt(f_quantile(1 - level, 1, n));
 }
@@ -35,7 +35,7 @@ struct interval stats_difference(const double *a, size_t a_count, const double *
 		*t = 0;
 	if (a_count < 2 || b_count < 1 || !(mb > 0))
 		return (struct interval){NAN, NAN, NAN};
-	/* The ratio of means, so that b's own error enters a's. */
+	/* The error of the ratio of the means includes that of b. */
 	double ratio = ma / mb;
 	vb *= ratio * ratio;
 	double variance = (va + vb) / (mb * mb);
@@ -53,7 +53,8 @@ struct interval stats_median(double *x, size_t count)
 		return (struct interval){NAN, NAN, NAN};
 	qsort(x, count, sizeof *x, double_compare);
 	double middle = 0.5 * (x[(count - 1) / 2] + x[count / 2]), n = (double)count;
-	/* Binomial with probability 1/2: the rank below which 2.5 % lie, by the normal approximation. */
+	/* The number of values below the true median is binomial with probability 1/2. The rank is its quantile at
+	 * 2.5 %, by the normal approximation. */
 	double rank = floor(0.5 * n - 0.5 - 0.98 * sqrt(n));
 	size_t k = rank > 0 ? (size_t)rank : 0;
 	return (struct interval){middle, x[k], x[count - 1 - k]};

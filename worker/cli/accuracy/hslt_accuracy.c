@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The program: the list of settings to compare (accuracy_design.c), their alternating renders (accuracy_run.c), the
- * figures (accuracy_judge.c), and the report as text, CSV, JSON and HTML. First it prints how long it will take and
- * what it will compare. A signal ends the rendering, and what is known is reported.
+ * The program hslt-accuracy. It chooses the settings to compare (accuracy_design.c) and prints how many there are and
+ * what was left out, renders them alternately (accuracy_run.c), computes the figures (accuracy_judge.c), and writes
+ * them as HTML and, if requested, CSV. A summary is printed on stderr. A signal ends the rendering, and what has been
+ * rendered is reported if every setting has a complete round.
  *
- * Invalid settings end it with 2 before anything is rendered; any other error ends it with 1, with no report unless a
- * signal came after every setting's first round.
+ * Invalid settings end the program with 2 before anything is rendered, any other failure or an interruption with 1.
  */
 #include "common/base/mem.h"
 #include "common/base/program.h"
@@ -85,7 +85,7 @@ struct session {
 	struct arguments *a;
 	char *folder, *name;
 	struct scene scene;
-	bool scene_read, usage; /* usage: the command line is wrong */
+	bool scene_read, usage; /* `scene` must be freed; the command line is wrong */
 	struct asset_folders folders;
 	struct output_files outputs;
 	struct guarded_source files;
@@ -123,7 +123,7 @@ static int load(struct session *s, struct error *e)
 	return render_check(&s->scene, &s->assets, &r->render, &s->summary, e);
 }
 
-/* Printed before hours are spent. */
+/* Checks that the reference has the size of the renders, before any time is spent on them. */
 static int check_reference(const struct session *s, struct error *e)
 {
 	const struct plan_request *p = &s->a->render.plan;
@@ -137,7 +137,7 @@ static int check_reference(const struct session *s, struct error *e)
 static int design(struct session *s, struct error *e)
 {
 	struct render_arguments *r = &s->a->render;
-	if (integrator_is_open(&r->plan)) /* most settings concern chains */
+	if (integrator_is_open(&r->plan)) /* one with chains, which most settings concern */
 		snprintf(r->plan.integrator, sizeof r->plan.integrator, "%s",
 			 render_effect_on(&s->summary, "scattering") || render_effect_on(&s->summary, "medium-light")
 				 ? "pssmlt"

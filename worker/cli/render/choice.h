@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What is found out about a scene before a plan is made for it: the integrator (worker/render/choose.h) if none was
- * given, how much light its samples hardly ever find (worker/render/unseen_light.h), and how many rays they take
- * (worker/render/rays.h) if a time or an error ends the render.
+ * Measures what must be known about a scene before a plan is made for it: the integrator (worker/render/choose.h) if
+ * none was given, how much light its samples hardly ever find (worker/render/unseen_light.h), and how many rays they
+ * take (worker/render/rays.h) if a time or an error ends the render. One thread.
  */
 #ifndef WORKER_CLI_RENDER_CHOICE_H
 #define WORKER_CLI_RENDER_CHOICE_H
@@ -15,18 +15,19 @@
 struct choice {
 	bool made; /* false: an integrator was given, and the rest is empty */
 	struct render_choice found;
-	double seconds; /* wall clock */
-	char text[512]; /* one line for the user */
+	double seconds; /* wall-clock time that the choice took */
+	char text[512]; /* the choice in one line, for the user */
 };
 
-/* a: complete except for what is chosen and counted. */
+/* Makes the choice for the scene `name` in `folder`. a: complete, except for the values that are chosen and measured.
+ */
 int choice_make(struct render_arguments *a, const char *folder, const char *name, struct choice *out, struct error *e);
-/* The same in an existing world. */
+/* Does the same in an existing world. */
 int choice_in_world(const struct world *w, struct render_arguments *a, struct choice *out, struct error *e);
 
-/* Prints one line on stderr; nothing if no choice was made. --explain prints the reasons. */
+/* Prints the choice in one line on stderr; nothing if no choice was made. (--explain prints the reasons.) */
 void choice_print(const struct choice *c, const char *integrator);
-/* null: no choice was made. NULL: out of memory */
+/* Returns a JSON object, JSON null if no choice was made, or NULL if memory is out. */
 json_t *choice_to_json(const struct choice *c);
 
 #endif

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The errors estimated by a pilot (common/estimate/forecast.h) as a table of errors and their costs, as JSON and as a
- * plot. Rows beyond what the pilot can predict say so instead of giving a number. Failures: those of the pilot, a plot
- * or a stdout that cannot be written.
+ * Prints what a pilot predicts (common/estimate/forecast.h) as a table of errors and their costs, as JSON and as a
+ * plot. A row that the pilot cannot predict says so instead of giving a number. Fails if the pilot has too few
+ * estimates, or if the plot or stdout cannot be written.
  */
 #include "worker/cli/render/estimate.h"
 
@@ -19,9 +19,10 @@
 enum { TARGETS_MOST = 5 };
 static const double usual[] = {0.1, 0.05, 0.02, 0.01};
 
+/* One error, and what the render needs for it. */
 struct row {
 	double target;
-	const struct forecast_look *reached; /* by the pilot; NULL: not reached */
+	const struct forecast_look *reached; /* the estimate of the pilot that has reached it; NULL: none */
 	struct forecast_cost cost;	     /* of the render, including its bootstrap */
 };
 
@@ -183,7 +184,8 @@ static void draw_looks(const struct estimate *s, struct drawing *d)
 	}
 }
 
-/* From the pilot's last estimate to the last target that can be reached. */
+/* Computes the band of predicted errors, from the pilot's last estimate to `most`, the work for the last target that
+ * can be reached. */
 static void draw_band(const struct estimate *s, struct drawing *d, double most)
 {
 	const struct forecast_look *l = &s->looks->looks[s->looks->count - 1];

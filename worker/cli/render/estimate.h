@@ -9,7 +9,7 @@
 #include "common/base/option.h"
 #include "common/estimate/forecast.h"
 
-/* The options of a program that predicts: rows for a struct with these fields. */
+/* The options of programs that predict: rows for a struct `type` with the members estimate, pilot and plot. */
 /* clang-format off */
 #define ESTIMATE_ROWS(type) \
 	{"estimate", 0, NULL, "Render a pilot only and print what smaller errors will cost", OPTION_FLAG(type, estimate)}, \
@@ -19,18 +19,17 @@
 /* clang-format on */
 
 struct estimate {
-	const char *scene, *where; /* "this machine, 2 threads" */
-	const struct plan *plan;   /* of the render being predicted */
-	const struct plan *pilot;
-	const struct forecast_history *looks; /* of the pilot */
-	double cpu_seconds, seconds;	      /* of the pilot, including its bootstrap */
-	double bootstrap_cpu,
-		bootstrap_seconds; /* of the pilot's bootstrap; the render's is longer by the ratio of samples */
-	double target;		   /* requested in addition to the usual ones; 0: none */
+	const char *scene, *where;	      /* name of the file; where it is rendered, as "this machine, 2 threads" */
+	const struct plan *plan;	      /* the plan of the render being predicted */
+	const struct plan *pilot;	      /* the plan of the pilot */
+	const struct forecast_history *looks; /* the pilot's estimates of its error */
+	double cpu_seconds, seconds;	      /* CPU and wall-clock time of the pilot, its bootstrap included */
+	double bootstrap_cpu, bootstrap_seconds; /* the same for its bootstrap; scaled to the samples of the render's */
+	double target;				 /* an error that is predicted in addition to the usual ones; 0: none */
 };
 
-/* Prints the table or JSON to stdout, and draws a plot if a path is given. -EAGAIN: the pilot has not seen enough
- * for a prediction. */
+/* Prints the table or JSON to stdout, and draws a plot if a path is given. Returns -EAGAIN if the pilot has too few
+ * estimates for a prediction. */
 int estimate_report(const struct estimate *s, bool json, const char *plot, struct error *e);
 
 #endif

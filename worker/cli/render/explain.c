@@ -7,7 +7,7 @@
 #include <jansson.h>
 #include <stdio.h>
 
-enum { USUAL_SPP = 64 }; /* nothing is rendered, so none need be asked for */
+enum { USUAL_SPP = 64 }; /* makes the plan complete if no samples were requested; nothing is rendered */
 
 static const char *state_of(const struct effect_line *l)
 {
@@ -16,7 +16,7 @@ static const char *state_of(const struct effect_line *l)
 	return l->on ? "on" : "off";
 }
 
-/* Edges of the longest path in the image. */
+/* Returns the number of edges of the longest path in the image. */
 static uint32_t held_depth(const struct plan_request *p)
 {
 	const struct render_integrator *integrator = render_integrator_find(p->integrator);

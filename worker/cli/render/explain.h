@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* hslt-render --explain: which effects a scene needs and why, what omitting the others saves, which integrators were
- * considered and why one was chosen. Renders nothing but the pilot of that choice. */
+/* Implements hslt-render --explain: prints which effects a scene needs and why, what omitting the others saves, which
+ * integrators were considered and why one was chosen. Renders only the short pilots of that choice. One thread. */
 #ifndef WORKER_CLI_RENDER_EXPLAIN_H
 #define WORKER_CLI_RENDER_EXPLAIN_H
 
 #include "worker/cli/base/options.h"
 
-/* Reads the scene at `path` and prints the list on stdout, optionally as one JSON object. *usage: the command line
- * is wrong. */
+/* Reads the scene at `path` and prints the explanation on stdout; if `json` is set, as one JSON object. *usage: the
+ * command line is wrong. */
 int explain(const char *path, struct render_arguments *a, bool json, bool *usage, struct error *e);
 
 #endif

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The program: options, scene, integrator (choice.h), plan, render (local.h), image. A signal ends it at once until the
- * integrator is chosen; later it writes the image of the complete rounds, and the exit code says that it was
- * interrupted.
+ * The program hslt-render. It reads the options and the scene, chooses the integrator (choice.h), makes the plan,
+ * renders it (local.h) and writes the image. Until the integrator is chosen, a signal ends the program at once; after
+ * that, the image of the complete rounds is written, and the exit code says that the render was interrupted.
  *
- * Every failure ends with one line on stderr and the exit code of its kind (docs/design.md); the image is replaced
+ * A failure ends with one line on stderr and the exit code of its kind (docs/design.md). The image is replaced
  * atomically or not at all.
  */
 #include "common/base/clock.h"
@@ -113,15 +113,15 @@ struct session {
 	struct canvas_image image;
 	struct forecast_history looks;
 	struct convergence convergence;
-	double forecast_seconds; /* from the first bootstrap sample to the target; 0: unknown */
-	char forecast[192];
-	double build_seconds;
+	double forecast_seconds; /* expected from the first bootstrap sample to the target error; 0: unknown */
+	char forecast[192];	 /* part of the progress line */
+	double build_seconds;	 /* of the world */
 	struct choice choice;
 	struct progress progress;
 	struct kept_bootstrap kept;
 	struct output_files outputs;
 	struct guarded_source files;
-	bool scene_spp; /* no bound was given: the scene's number of samples */
+	bool scene_spp; /* no bound was given, so the scene's number of samples is rendered */
 	bool usage;	/* the command line is wrong */
 };
 
@@ -166,7 +166,8 @@ static int load(struct session *s, struct error *e)
 	return 0;
 }
 
-/* Until here there is nothing to keep; from here on signals end the render in order. */
+/* Chooses the integrator. From then on a signal ends the render after complete rounds, which are kept; before, there is
+ * nothing to keep, and a signal ends the program. */
 static int choose(struct session *s, struct error *e)
 {
 	int rc = choice_in_world(s->world, &s->a->render, &s->choice, e);
@@ -206,7 +207,8 @@ static int make_plan(struct session *s, struct error *e)
 	return 0;
 }
 
-/* The elapsed share of the time until the render ends, which is after the round in which the plan's time is over. */
+/* Returns the elapsed share of the time until the render ends, which is at the end of the round in which the plan's
+ * time is over. */
 static double fraction_of_time(const struct plan *plan, const struct local_progress *p)
 {
 	double speed = p->round_seconds > 0 ? p->rounds / p->round_seconds : 0;
@@ -230,8 +232,8 @@ static void show(void *user, const struct local_progress *p)
 	progress_show(&s->progress, progress_kept(&s->progress, fraction, p->state), p->state, detail);
 }
 
-/* After an estimate of the error: when the target will be reached, and the cost of halving the error, for the
- * progress line. */
+/* Called with a new estimate of the error: updates the part of the progress line that says when the target will be
+ * reached, and what halving the error costs. */
 static void expect(struct session *s, const struct local_round *r)
 {
 	struct forecast_cost stop, half;
@@ -336,7 +338,7 @@ static int write_image(const struct session *s, struct error *e)
 	return rc;
 }
 
-/* As the command line has it. */
+/* Returns what ended the render, in the words of the command line. */
 static const char *end_text(const struct session *s)
 {
 	const struct plan_request *r = &s->a->render.plan;
@@ -373,7 +375,8 @@ static void print_summary(const struct session *s)
 		fprintf(stderr, "hslt-render: note: %s\n", text);
 }
 
-/* The last line, printed even with --quiet: the error of the image is not known. */
+/* Prints the warning that the error of the image is not known. It is the last line, and is printed even with --quiet.
+ */
 static void warn(const struct session *s)
 {
 	char text[STATED_ERROR_TEXT];

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The file is a mark, which identifies the command that it belongs to, and the data of bootstrap_save(). It is read
- * completely and checked before anything in it is used (checked_file.h). It gets its name when it is complete.
+ * The file consists of a mark and a text, which identify the command that it belongs to, and the data of
+ * bootstrap_save. The whole file is read and checked before anything in it is used (checked_file.h). It is written
+ * under another name and renamed when it is complete.
  *
- * Failures lose the bootstrap, never the render: a file that does not match or is damaged is not used, and a failure to
- * write is reported.
+ * No failure here ends the render: a file that does not match or is damaged is not used, and a failure to write is
+ * reported.
  */
 #include "worker/cli/render/kept_bootstrap.h"
 
@@ -46,7 +47,7 @@ static void add_text(struct kept_bootstrap *k, const char *text, const char *end
 {
 	size_t n = strlen(k->text);
 	if ((size_t)snprintf(k->text + n, sizeof k->text - n, "%s%s", text, end) >= sizeof k->text - n)
-		k->path[0] = 0; /* too much to compare with others */
+		k->path[0] = 0; /* the text does not fit, so nothing is kept */
 }
 
 void kept_bootstrap_begin(struct kept_bootstrap *k, const char *image, const char *fingerprint, const struct plan *p,
@@ -70,7 +71,7 @@ void kept_bootstrap_begin(struct kept_bootstrap *k, const char *image, const cha
 	}
 }
 
-/* What comes before the text. */
+/* Writes the part of the file before the text. */
 static void pack_mark(const struct kept_bootstrap *k, unsigned char bytes[MARK])
 {
 	memcpy(bytes, magic, sizeof magic);
@@ -96,7 +97,7 @@ static int read_mark(const struct kept_bootstrap *k, struct checked_file *f, str
 	return rc;
 }
 
-/* Leases that were added before a failure are kept: each was checked. */
+/* Leases that bootstrap_load has added before it fails stay in the bootstrap: each was checked. */
 void kept_bootstrap_resume(struct kept_bootstrap *k, struct bootstrap *b, char *text, size_t size)
 {
 	struct checked_file f;

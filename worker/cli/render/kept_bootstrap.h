@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What is kept of a render that is interrupted before its first round is complete: the finished leases of the
- * bootstrap, in a file beside the image, IMAGE.bootstrap. The same command continues from them, to the same bits, and
- * removes the file when its image is written. Another plan, other defines, different files or another numeric
- * fingerprint (a new build, or a machine with different rounding) make it another command: then the file is not used,
- * and replaced by the next interruption. One thread.
+ * If a render is interrupted before its first round is complete, the finished leases of the bootstrap are kept in a
+ * file beside the image, IMAGE.bootstrap. The same command continues from them, to the same bits, and removes the file
+ * when its image is written. The file is not used if the plan, the defines, the scene's files or the numeric
+ * fingerprint differ (a new build, or a machine with different rounding); the next interruption then replaces it. One
+ * thread.
  *
  * The file, checked (common/base/checked_file.h), little endian:
  *
@@ -26,26 +26,27 @@
 enum { KEPT_PATH = 4096, KEPT_TEXT = 8192 };
 
 struct kept_bootstrap {
-	/* Where the scene is read from; checksum over names and contents of all files in order, and their bytes. */
-	const struct asset_source *inner;
-	uint32_t crc;
-	uint64_t bytes;
-	char path[KEPT_PATH]; /* "": it cannot be written anywhere */
-	char text[KEPT_TEXT]; /* fingerprint, plan and defines */
-	bool resumed;
-	char said[KEPT_PATH + 256]; /* after a write, what to report: part of a sentence, or "" */
+	const struct asset_source *inner; /* the source of the scene's files */
+	uint32_t crc;			  /* of names and contents of the files, in the order of opening */
+	uint64_t bytes;			  /* sum of the sizes of the files */
+	char path[KEPT_PATH];		  /* "": nothing can be kept */
+	char text[KEPT_TEXT];		  /* fingerprint, plan and defines */
+	bool resumed;			  /* leases were added from the file */
+	char said[KEPT_PATH + 256];	  /* set by kept_bootstrap_write: the end of a sentence for the user, or "" */
 };
 
-/* A source that passes on the files of `inner` and hashes them. Both must outlive it. */
+/* Returns a source that opens the files of `inner` and adds them to the checksum. k and inner must outlive it. */
 struct asset_source kept_bootstrap_source(struct kept_bootstrap *k, const struct asset_source *inner);
 
-/* Call when the plan is known; fingerprint: of this program (worker/render/fingerprint.h). */
+/* Determines the path and the text. Call when the plan is known and the scene has been read. fingerprint: of this
+ * program (worker/render/fingerprint.h). */
 void kept_bootstrap_begin(struct kept_bootstrap *k, const char *image, const char *fingerprint, const struct plan *p,
 			  const struct render_arguments *a);
-/* Adds the leases in the file; text: what to report, or "". */
+/* Adds the leases in the file, if there is one. text: a message for the user, or "". */
 void kept_bootstrap_resume(struct kept_bootstrap *k, struct bootstrap *b, char *text, size_t size);
+/* Writes the finished leases, if there are any, and sets k->said. */
 void kept_bootstrap_write(struct kept_bootstrap *k, const struct bootstrap *b);
-/* Call when the image is written: removes the file. */
+/* Removes the file, if leases were added from it. Call when the image is written. */
 void kept_bootstrap_end(const struct kept_bootstrap *k);
 
 #endif

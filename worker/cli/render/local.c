@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * phase() gives leases to threads under one lock and merges their results in the order in which they finish, which does
- * not affect the sums. run_bootstrap() is followed by rounds; after each, common/estimate/merge.h decides whether the
- * job is done.
+ * `phase` gives leases to threads under one lock, and their results are merged in the order in which they finish, which
+ * does not affect the sums. After the bootstrap (run_bootstrap) follow rounds; after each, common/estimate/merge.h
+ * decides whether the job is done.
  *
- * Failures: of a lease (with its key), of the disk under the canvas, no memory. The canvas is freed then, since it may
- * contain part of a round.
+ * Fails if a lease fails (the error has its key), if the disk under the canvas does, or if memory is out. The canvas is
+ * then freed, because it may contain part of a round.
  */
 #include "worker/cli/render/local.h"
 
@@ -16,19 +16,20 @@
 #include <pthread.h>
 #include <time.h>
 
+/* What the threads share. The lock protects everything that changes during a phase. */
 struct thread_pool {
 	struct local_run *run;
 	struct bootstrap *bootstrap;
 	uint64_t *seeds;	     /* [groups][chains / groups] */
 	struct brightness *map;	     /* see render_map_new */
-	struct chain_state **states; /* [groups x parts][chains of a lease] after the epoch before */
-	enum lease_kind kind;
-	uint64_t epoch;
-	uint32_t next, leases; /* of the phase */
-	uint64_t finished;     /* of the whole job, for progress */
-	struct timespec begin;
+	struct chain_state **states; /* [groups x parts][chains of a lease], after the epoch before */
+	enum lease_kind kind;	     /* of the phase */
+	uint64_t epoch;		     /* of the phase */
+	uint32_t next, leases;	     /* the next lease of the phase, and their number */
+	uint64_t finished;	     /* finished leases of all phases, for progress */
+	struct timespec begin;	     /* of the bootstrap */
 	pthread_mutex_t lock;
-	int rc;
+	int rc; /* of the first lease that failed, with `error` */
 	struct error error;
 };
 
@@ -80,7 +81,7 @@ static void show(struct thread_pool *c)
 	r->progress(r->user, &p);
 }
 
-/* Under the lock: merges the batch as the farm does. */
+/* Merges the batch, as the coordinator does on a farm. Under the lock. */
 static int merge(struct thread_pool *c, struct batch *b)
 {
 	const struct plan *p = c->run->plan;
@@ -134,7 +135,8 @@ static int lease(struct thread_pool *c, uint32_t index)
 	return rc;
 }
 
-/* The next lease of the phase that is not merged yet; the total number: none is left. Under the lock. */
+/* Returns the next lease of the phase that is not merged yet, or the number of leases if none is left. Under the lock.
+ */
 static uint32_t take_lease(struct thread_pool *c)
 {
 	uint32_t parts = c->run->plan->parts;
@@ -157,7 +159,7 @@ static void *run_leases(void *arg)
 	}
 }
 
-/* All leases of one phase on all threads. */
+/* Runs all leases of one phase on all threads. */
 static int phase(struct thread_pool *c, enum lease_kind kind, uint64_t epoch)
 {
 	enum { THREADS_MAX = 1024 };
@@ -216,7 +218,7 @@ static int check_target(struct thread_pool *c, uint64_t rounds, enum merge_end *
 	return 0;
 }
 
-/* Its time is the bootstrap's. */
+/* Makes the map of brightness. Its CPU time counts as the bootstrap's. */
 static int make_map(struct thread_pool *c)
 {
 	double begin = clock_thread_seconds();
@@ -225,7 +227,7 @@ static int make_map(struct thread_pool *c)
 	return rc;
 }
 
-/* The bootstrap, and the start of the rounds. */
+/* Runs the bootstrap and prepares the rounds. */
 static int run_bootstrap(struct thread_pool *c)
 {
 	struct local_run *r = c->run;
@@ -246,7 +248,7 @@ static int run_bootstrap(struct thread_pool *c)
 	return rc;
 }
 
-/* After an error the canvas cannot be trusted and is freed. */
+/* Passes on an error, after which the canvas may contain part of a round and is freed. */
 static int fail(struct local_job *j, int rc, struct error *e)
 {
 	*e = j->thread_pool.error;

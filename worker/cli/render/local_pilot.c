@@ -8,8 +8,8 @@ static void on_round(void *user, const struct local_round *r)
 	struct local_pilot *p = user;
 	if (r->image)
 		forecast_add(&p->looks, &p->plan, r->image, r->cpu_seconds, r->seconds);
-	/* On a busy machine it runs longer than requested, until there is enough for a (wide) prediction; but not
-	 * forever, if no estimate becomes valid. */
+	/* If there are few estimates when the time is over, as on a busy machine, the pilot goes on until there are
+	 * enough for a prediction with wide intervals, but not for ever. */
 	double seconds = r->bootstrap_seconds + r->seconds;
 	bool enough = p->looks.count >= PILOT_LOOKS_LEAST || r->rounds >= PILOT_ROUNDS_MOST;
 	p->over = p->timed && enough && seconds >= (p->looks.count < PILOT_LOOKS ? 4 : 1) * p->seconds;
@@ -24,7 +24,7 @@ static void pass_on(void *user, const struct local_progress *r)
 		p->progress(p->user, r);
 }
 
-/* Runs it for its estimates and times. */
+/* Runs a probe or pilot. Its estimates are in p->looks, its times in r; the image is dropped. */
 static int run_pilot(struct local_pilot *p, const struct plan_request *request, struct local_run *r, struct error *e)
 {
 	int rc = plan_make(request, &p->plan, e);

@@ -8,11 +8,11 @@
 enum {
 	PROBE_BOOTSTRAP = 16384,
 	PROBE_EPOCH = 16,	      /* mutations per chain; starting a chain costs about one */
-	PROBE_SAMPLES_MOST = 1 << 21, /* samples of the shortest round that needs a probe */
+	PROBE_SAMPLES_MOST = 1 << 21, /* if the shortest round has more samples, there is no probe */
 };
-static const double out_of_reach = 1e-9;
-static const double bootstrap_share = 0.25; /* of a pilot, at most */
-static const double probe_seconds = 1;	    /* of one thread, for its bootstrap, if samples take many rays */
+static const double out_of_reach = 1e-9;    /* a target error that no pilot reaches */
+static const double bootstrap_share = 0.25; /* of the pilot's time, at most */
+static const double probe_seconds = 1;	    /* of one thread: limits the probe's bootstrap if samples take many rays */
 
 int pilot_plan_from_scene(struct render_arguments *a, const struct render_summary *summary, struct error *e)
 {
@@ -77,6 +77,6 @@ void pilot_request(const struct plan_request *request, const struct plan *render
 		pilot->bootstrap = (uint64_t)fmax((double)probe->bootstrap, most);
 	double left = fmax(seconds - sample * (double)pilot->bootstrap, seconds / 4);
 	double epochs = left / PILOT_ROUNDS / cost->rounds;
-	double longest = (double)render->epoch / (double)probe->epoch; /* not longer than the render's own */
+	double longest = (double)render->epoch / (double)probe->epoch; /* the pilot's epoch is at most the render's */
 	pilot->epoch = (uint64_t)fmax(1, (double)probe->epoch * fmin(epochs, longest));
 }

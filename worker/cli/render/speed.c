@@ -7,13 +7,13 @@
 enum {
 	CHAINS = 16,
 	BOOTSTRAP = 4096,
-	FIRST_EPOCH = 32, /* then eight times as long, and so on */
+	FIRST_EPOCH = 32, /* of chains; each further epoch is eight times as long */
 	LONGEST_EPOCH = 1 << 20,
-	SMALL_FILM = 1 << 13, /* pixels: a round of samples is at least one per pixel */
+	SMALL_FILM = 1 << 13, /* pixels */
 };
-static const double enough_seconds = 0.25;
+static const double enough_seconds = 0.25; /* a render at least as long is measured accurately enough */
 
-/* Samples are measured on a smaller film of the same view. */
+/* Samples are measured on a smaller film of the same view, because a round has at least one sample per pixel. */
 static void shrink_film(struct render_options *o, struct plan_request *r)
 {
 	double scale = sqrt(SMALL_FILM / ((double)r->width * r->height));
@@ -34,7 +34,7 @@ static struct plan_request pilot_of(const struct render_arguments *a)
 	return r;
 }
 
-/* Lengthens the render until it can be measured. */
+/* Repeats the render, each time with a longer epoch, until it takes long enough to be measured. */
 static int measure_speed(const struct world *w, struct plan_request *r, double *speed, struct error *e)
 {
 	static const atomic_bool never;

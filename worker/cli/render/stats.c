@@ -72,7 +72,8 @@ static json_t *part_json(const char *name, double energy, double variance, doubl
 			 forecast_real(variance), "rays", forecast_real(rays));
 }
 
-/* For a render whose samples leave some light to chains: the shares of samples and chains in light, noise and work. */
+/* Returns the shares of samples and of chains in light, noise and work, for a render in which chains spread light that
+ * is too bright for samples; otherwise an empty array. */
 static json_t *parts_json(const struct canvas_image *i)
 {
 	json_t *parts = json_array();
