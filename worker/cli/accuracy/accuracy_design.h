@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Which settings are compared: a default, and others of which one value differs. */
+/* Chooses the settings to compare: a default, a reference, and others that differ from the default in one value. One
+ * thread. */
 #ifndef WORKER_CLI_ACCURACY_ACCURACY_DESIGN_H
 #define WORKER_CLI_ACCURACY_ACCURACY_DESIGN_H
 
@@ -13,39 +14,43 @@ enum { ACCURACY_SETTINGS = 96, ACCURACY_SWEEPS = 24, ACCURACY_VALUES = 12 };
 #define ACCURACY_REFERENCE_SHARE 4.0
 
 struct accuracy_setting {
-	char parameter[32], value[48]; /* "default" and "reference" are settings without a value */
-	double share;		       /* share of the time, relative to the others' */
-	bool other_image;	       /* known to make another image, however small the difference */
+	char parameter[32], value[48]; /* what differs from the default; "default" or "reference", with no value */
+	double share;		       /* of the time, relative to the others' shares */
+	bool other_image;	       /* the setting is known to change the image, if only by little */
 	uint32_t max_depth;
-	char accuracy[PLAN_ACCURACY_MAX], mixture[PLAN_MUTATIONS_MAX];
+	char accuracy[PLAN_ACCURACY_MAX], mixture[PLAN_MUTATIONS_MAX]; /* canonical, for the plan */
 };
 
-struct accuracy_sweep { /* of one parameter, in order, with the default's value among them */
+/* The values of one parameter in order, the default's among them. */
+struct accuracy_sweep {
 	char parameter[32];
 	const char *summary;
-	size_t count, setting[ACCURACY_VALUES];
-	char value[ACCURACY_VALUES][48];
+	size_t count;
+	size_t setting[ACCURACY_VALUES]; /* [count]: index of the setting with this value */
+	char value[ACCURACY_VALUES][48]; /* [count] */
 };
 
+/* A parameter that is not varied, with the reason. */
 struct accuracy_left_out {
 	char parameter[32], why[160];
 };
 
 struct accuracy_design {
 	size_t count, sweep_count, left_out_count;
-	struct accuracy_setting settings[ACCURACY_SETTINGS]; /* the first is the default, the second the reference:
-								careful, and longer */
+	struct accuracy_setting settings[ACCURACY_SETTINGS];
 	struct accuracy_sweep sweeps[ACCURACY_SWEEPS];
 	struct accuracy_left_out left_out[ACCURACY_SWEEPS];
 };
+
+/* Indices of the first two settings. The reference has accurate values and is rendered longer. */
 enum { ACCURACY_DEFAULT, ACCURACY_REFERENCE };
 
-/* Around the request's settings, as suits the scene. only: NAME,NAME: the sweeps to make; NULL: all. -EINVAL with a
- * sentence: unknown parameter. */
+/* Makes the design for a scene. base: complete; its settings are the default. only: the parameters to vary, as
+ * "NAME,NAME"; NULL: all. Returns -EINVAL with a sentence if one of them does not exist. */
 int accuracy_design(struct accuracy_design *d, const struct plan_request *base, const struct render_summary *scene,
 		    const char *only, struct error *e);
 
-/* "tolerance 0.01", "default". */
+/* Writes the name of a setting, such as "tolerance 0.01" or "default". */
 void accuracy_name(const struct accuracy_setting *s, char *text, size_t size);
 
 #endif

@@ -1,7 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Computes figures from films. The errors of all settings are weighted by one image, the mean over the settings, so
- * that only their noise differs, not the weights. Fails only if memory is out.
+ * Computes the figures of each setting from its film, with intervals.
+ *
+ * The error is estimated from the differences between the groups of a render. The weights of pixels are made from one
+ * image, the mean over all settings, so that errors differ only by the noise of the settings. Errors are then scaled to
+ * the number of mutations and to the CPU time of the default. The bias is the difference from the reference, in the
+ * mean of the image and in blocks of it.
+ *
+ * Fails only if memory is out.
  */
 #include "worker/cli/accuracy/accuracy_judge.h"
 
@@ -17,10 +23,12 @@
 struct judge {
 	const struct accuracy_run *r;
 	struct accuracy_judgement *out;
-	double *mean;		   /* [pixels * 3], over the settings */
-	double *weight, *worst;	   /* [pixels * 3]; [2][pixels], the second sorted: for one setting at a time */
-	double *rel_mse, *degrees; /* [settings] */
-	double *blocks;		   /* [settings][groups][cells] */
+	double *mean;	 /* [pixels * 3]: the mean image of all settings */
+	double *weight;	 /* [pixels * 3], for one setting at a time */
+	double *worst;	 /* [2][pixels]: errors of the pixels of one setting, and the same sorted */
+	double *rel_mse; /* [settings] */
+	double *degrees; /* [settings]: degrees of freedom of rel_mse */
+	double *blocks;	 /* [settings][groups][cells]: means over the blocks, and over the image */
 	size_t cells, groups;
 };
 
@@ -29,7 +37,7 @@ static const struct accuracy_job *job(const struct judge *j, size_t i)
 	return &j->r->jobs[i];
 }
 
-/* The interval of x with a known relative standard deviation, on a logarithmic scale. */
+/* Returns the interval of x, given the standard deviation of its logarithm. */
 static struct interval interval_around(double x, double log_sd)
 {
 	double factor = exp(stats_t(LEVEL, 1e9) * log_sd);
@@ -45,7 +53,7 @@ static int take_mean(struct judge *j, struct error *e)
 			return -ENOMEM;
 		for (size_t k = 0; k < values; k++)
 			j->mean[k] += (double)img.rgb[k] / (double)n;
-		/* The image of the report is the one with the least noise. */
+		/* The report shows the reference, which has the least noise. */
 		for (size_t k = 0; i == ACCURACY_REFERENCE && k < values; k++)
 			j->out->rgb[(k % 3) * (values / 3) + k / 3] = img.rgb[k];
 		canvas_image_fini(&img);
@@ -69,7 +77,8 @@ static void take_counts(struct accuracy_figures *f, const struct canvas_counts *
 	f->failed_walks = walks ? (double)failed / (double)walks : NAN;
 }
 
-/* 1 over B^2 + (0.01 m)^2, B the settings' mean image; 0 for the pixels with the largest errors. */
+/* Computes the weights of the errors of one setting: 1 / (B^2 + (0.01 m)^2), B the mean image of all settings and m its
+ * mean, divided by the number of values; 0 for the pixels with the largest errors. */
 static void weigh(struct judge *j, const float *error)
 {
 	size_t pixels = (size_t)j->out->width * j->out->height, left = (size_t)ceil(ACCURACY_TRIM * (double)pixels);
@@ -92,7 +101,8 @@ static void weigh(struct judge *j, const float *error)
 		j->weight[k] = j->worst[k / 3] > most ? 0 : j->weight[k] / (double)(3 * pixels);
 }
 
-/* Degrees of freedom of the chi-square with the spread of the groups' distances (Satterthwaite 1946). */
+/* Returns the degrees of freedom of the chi-square distribution that is spread like the groups' distances
+ * (Satterthwaite 1946). */
 static double degrees_of(const double *distance, size_t groups, double mean)
 {
 	double n = (double)groups, square = 0;
@@ -130,8 +140,8 @@ static void take_cost(struct judge *j, size_t i)
 	j->out->figures[i].cost = (struct interval){1e6 * c.value, 1e6 * c.low, 1e6 * c.high};
 }
 
-/* Errors fall as one over the root of mutations: this converts all settings to the same number, and to the same
- * time. */
+/* Converts the errors of all settings to the default's number of mutations, and to its CPU time: errors are inversely
+ * proportional to the square root of either. */
 static void scale_errors(struct judge *j, struct stats_point *points)
 {
 	struct accuracy_judgement *o = j->out;
@@ -152,7 +162,7 @@ static void scale_errors(struct judge *j, struct stats_point *points)
 	}
 }
 
-/* The same block of an image from a file, which counts as exact. */
+/* Returns the mean of X + Y + Z over a block of an image from a file, which counts as exact. */
 static double block_of(const struct picture *p, uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1)
 {
 	/* X+Y+Z of Rec. 709's red, green and blue */
@@ -186,7 +196,8 @@ static void take_bias(struct judge *j, size_t i, const double *reference, size_t
 	struct accuracy_figures *f = &j->out->figures[i];
 	double a[PLAN_MAX_GROUPS], b[PLAN_MAX_GROUPS], worst = -1;
 	size_t last = (size_t)j->out->across * j->out->down;
-	/* A bias is tested in the mean and in every block of every setting, with half the level for the means. */
+	/* The bias of every setting is tested in the mean of its image and in every block. bias_seen shares the level
+	 * among all these tests: one half among the means, the other among the blocks. */
 	double settings = (double)j->r->design->count, blocks = last > 0 ? (double)last : 1;
 	for (size_t c = 0; c < j->cells; c++) {
 		double t;
@@ -245,8 +256,8 @@ static int judge_all(struct judge *j, const struct picture *reference, struct er
 		j->out->thin |= j->out->figures[i].rounds < 4;
 	j->out->thin |= j->out->figures[ACCURACY_DEFAULT].equal_time.value > 0.5;
 	take_biases(j, reference, points);
-	/* The reference is not a setting to choose from, and is rendered longer: it moves to the end and takes no
-	 * part. */
+	/* The reference is not a candidate for the front, because it is rendered longer. The last setting takes its
+	 * place. */
 	points[ACCURACY_REFERENCE] = points[n - 1];
 	stats_front(points, n - 1, LEVEL, by);
 	for (size_t i = 0; i + 1 < n; i++)

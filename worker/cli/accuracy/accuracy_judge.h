@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Computes figures from the renders: errors, times, biases, with their intervals. */
+/* Computes figures from the renders: errors, times and biases with their intervals. One thread. */
 #ifndef WORKER_CLI_ACCURACY_ACCURACY_JUDGE_H
 #define WORKER_CLI_ACCURACY_ACCURACY_JUDGE_H
 
@@ -7,38 +7,42 @@
 #include "worker/cli/accuracy/accuracy_stats.h"
 #include "worker/cli/image/picture.h"
 
-enum { ACCURACY_CELLS = 17 };
+enum { ACCURACY_CELLS = 17 }; /* room for the blocks of an image, and its mean */
 
 /* Share of the pixels, those with the largest errors, that is left out: a single one can make up most of the error. */
 #define ACCURACY_TRIM 0.005
 
-/* The figures of one setting. Errors are relative errors as in docs/design.md, rules 4; at 95 %. */
+/* The figures of one setting. Errors are relative errors as in docs/design.md, rules 4; intervals are at 95 %. */
 struct accuracy_figures {
 	uint64_t mutations, rounds;
 	double cpu_seconds;
-	struct interval cost;		       /* microseconds of CPU time per mutation */
-	double acceptance, failed_walks, rays; /* failed_walks: share of all walks, NAN: none */
-	struct interval equal_mutations, equal_time;
-	struct interval bias_mean;  /* relative to the reference */
-	struct interval bias_block; /* of the worst block, at 95 % for all blocks together */
-	unsigned block;		    /* which: across + down * blocks_across */
-	double bias_seen, bias_bound;
-	size_t beaten_by; /* itself: it is on the front; the reference takes no part */
+	struct interval cost;		 /* microseconds of CPU time per mutation */
+	double acceptance;		 /* share of accepted mutations */
+	double failed_walks;		 /* share of all walks; NAN: there were none */
+	double rays;			 /* per mutation */
+	struct interval equal_mutations; /* error after as many mutations as the default's */
+	struct interval equal_time;	 /* error after as much CPU time as the default's */
+	struct interval bias_mean;	 /* of the image's mean, relative to the reference */
+	struct interval bias_block; /* of the block that differs most significantly; 95 % for all blocks together */
+	unsigned block;		    /* which block that is: across + down * blocks_across */
+	double bias_seen;	    /* lower bound of the bias, all settings and blocks tested together; 0: none */
+	double bias_bound;	    /* upper bound of the bias of the mean or of any block */
+	size_t beaten_by; /* index of a better setting (stats_front); its own: it is on the front, or the reference */
 };
 
 struct accuracy_judgement {
-	unsigned across, down; /* blocks */
-	uint64_t at_mutations; /* at equal numbers of mutations */
-	double at_cpu_seconds; /* at equal time */
-	bool file;	       /* the reference is a file's image */
-	bool thin; /* too little was rendered to trust the figures: errors of groups that missed the rare light look
-		      small */
+	unsigned across, down; /* numbers of blocks */
+	uint64_t at_mutations; /* the number of mutations for equal_mutations */
+	double at_cpu_seconds; /* the CPU time for equal_time */
+	bool file;	       /* the reference is the image of a file */
+	bool thin; /* too little was rendered to trust the figures: groups that all missed rare light look exact */
 	struct accuracy_figures figures[ACCURACY_SETTINGS];
 	uint32_t width, height;
 	float *rgb; /* planes of the report's image: R, G, B */
 };
 
-/* reference: an image of the settings' size to measure bias against; NULL: the careful setting. */
+/* Computes all figures. reference: an image, of the size of the renders, against which the bias is measured; NULL: the
+ * setting ACCURACY_REFERENCE. Free the judgement with accuracy_judgement_fini. */
 int accuracy_judge(const struct accuracy_run *r, const struct picture *reference, struct accuracy_judgement *out,
 		   struct error *e);
 void accuracy_judgement_fini(struct accuracy_judgement *j);

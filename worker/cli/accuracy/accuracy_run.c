@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The settings are rendered alternately in short rounds, the one with the smallest part of its share next, so that
- * changes of the machine's speed affect all alike. Settings share a world if nothing that is built differs. One thread
- * measures; leases run as in hslt-render (local.h).
+ * Renders the settings alternately in short rounds, so that changes of the machine's speed affect all of them alike.
+ * The next round belongs to the setting that has used the smallest part of its share. A short pilot with the default
+ * determines the length of rounds. Settings that differ in nothing that is built share a world. Leases run as in
+ * hslt-render (local.h).
  *
- * Failures: no memory for all films (reported before anything is rendered), or the failure of a lease, with the
- * setting's name. After a signal, what has been measured is reported.
+ * Fails if there is not enough memory for all films, before anything is rendered, or if a lease fails. A signal ends
+ * the rounds; that is a failure only if some setting has no complete round yet.
  */
 #include "worker/cli/accuracy/accuracy_run.h"
 
@@ -17,9 +18,11 @@
 
 enum { PILOT_BOOTSTRAP = 16384, PILOT_EPOCH = 16 };
 
-struct pilot {				   /* of the default, used only for the sizes of rounds */
-	double bootstrap_sample, mutation; /* CPU seconds */
-	double rate;			   /* CPU seconds per second: what other programs leave of the processors */
+/* The speed of a short render of the default, from which the lengths of rounds and bootstraps are computed. */
+struct pilot {
+	double bootstrap_sample; /* CPU seconds per sample of the bootstrap */
+	double mutation;	 /* CPU seconds per mutation */
+	double rate;		 /* CPU seconds per second, which is less if other programs use the processors, too */
 };
 
 static double sum_of_shares(const struct accuracy_design *d)
@@ -30,14 +33,15 @@ static double sum_of_shares(const struct accuracy_design *d)
 	return sum;
 }
 
-/* CPU seconds for a setting of share 1, before the cost of bootstrap and worlds is known. */
+/* Returns the CPU seconds for a setting whose share is 1; 15 % are set aside for bootstraps and worlds. */
 static double expected_seconds(const struct accuracy_run *r, const struct pilot *pilot)
 {
 	return r->setting_seconds > 0 ? r->setting_seconds : 0.85 * r->seconds * pilot->rate / sum_of_shares(r->design);
 }
 
-/* Memory in file caches counts as available: on a machine that has been up for a while little else is free. If the
- * amount is not known, nothing is refused here, and an allocation that fails is reported. */
+/* Returns the bytes of available memory. File caches count as available, because they fill most of the memory of a
+ * machine that has been up for a while. If the amount is not known, it is infinite: nothing is refused here, and an
+ * allocation that fails later is reported. */
 static double available_memory(void)
 {
 	char line[128];
@@ -50,7 +54,7 @@ static double available_memory(void)
 	return 1024 * kilobytes;
 }
 
-/* All films stay in memory until the end, because the settings alternate. */
+/* Checks that there is enough memory for the films, which all stay in memory until the end. */
 static int check_memory(const struct accuracy_run *r, const struct plan *p, struct error *e)
 {
 	double tiles = ceil(p->crop_width / (double)TILE_SIZE) * ceil(p->crop_height / (double)TILE_SIZE);
@@ -66,7 +70,8 @@ static int check_memory(const struct accuracy_run *r, const struct plan *p, stru
 		r->design->count, p->crop_width, p->crop_height, wanted / 1e9, there / 1e9);
 }
 
-/* Rounds are short, so that the settings alternate often; the bootstrap takes about a tenth of the time. */
+/* Makes the plan of setting i. Rounds are short, so that the settings alternate often; the bootstrap takes about a
+ * tenth of the time. */
 static int make_plan(struct accuracy_run *r, size_t i, const struct pilot *pilot, struct error *e)
 {
 	enum { ROUNDS = 25 };
@@ -84,8 +89,8 @@ static int make_plan(struct accuracy_run *r, size_t i, const struct pilot *pilot
 	bool chains = q.kind == PLAN_CHAINS;
 	if (chains && !q.bootstrap)
 		q.bootstrap = (uint64_t)fmin(fmax(0.1 * each / pilot->bootstrap_sample, PILOT_BOOTSTRAP), 1e6);
-	/* Gives it as many chains as a render of that length has: many short chains are wrong in ways that groups do
-	 * not show. */
+	/* Plans as many chains as a render of this length usually has. With more, each would be short and close to
+	 * where it started, an error that the differences between groups do not show. */
 	q.mutations = chains && !q.chains ? (uint64_t)fmin(fmax(each / pilot->mutation, 1), 1e15) : 0;
 	int rc = plan_make(&q, p, e);
 	q.chains = p->chains;
@@ -102,7 +107,7 @@ static int make_plan(struct accuracy_run *r, size_t i, const struct pilot *pilot
 	return rc;
 }
 
-/* An existing world that suits these settings, or a new one. */
+/* Finds an existing world that can be used with the settings of this job, or makes a new one. */
 static int find_world(struct accuracy_run *r, struct accuracy_job *j, struct error *e)
 {
 	struct render_options options = *r->render;
@@ -141,7 +146,7 @@ static int start(struct accuracy_run *r, size_t i, struct error *e)
 	return rc;
 }
 
-/* A round of job i. Its cost is the CPU time of its leases. */
+/* Renders a round of job i. Its cost is the CPU time of its leases. */
 static int run_round(struct accuracy_run *r, size_t i, struct error *e)
 {
 	struct accuracy_job *j = &r->jobs[i];
@@ -160,14 +165,14 @@ static int run_round(struct accuracy_run *r, size_t i, struct error *e)
 	return 0;
 }
 
-/* What setting i has used of its share: CPU seconds or rounds. */
+/* Returns the CPU seconds or rounds that setting i has used, divided by its share. */
 static double share_used(const struct accuracy_run *r, size_t i)
 {
 	const struct accuracy_job *j = &r->jobs[i];
 	return (r->setting_rounds ? (double)canvas_rounds(j->run.canvas) : j->cpu) / r->design->settings[i].share;
 }
 
-/* The one that has used least. */
+/* Returns the setting that has used least of its share. */
 static size_t next_setting(const struct accuracy_run *r)
 {
 	size_t best = 0;
@@ -190,7 +195,7 @@ static int render_rounds(struct accuracy_run *r, double begin, struct error *e)
 		size_t i = next_setting(r);
 		double wall = clock_seconds();
 		bool enough = wanted > 0 ? share_used(r, i) >= wanted : wall >= begin + r->seconds;
-		/* At least two rounds, however short the time. */
+		/* Every setting gets at least two rounds, however short the time. */
 		if ((enough && canvas_rounds(r->jobs[i].run.canvas) >= 2) || is_stopped(r))
 			return 0;
 		show(r,
@@ -215,7 +220,7 @@ static void end_job(struct accuracy_job *j)
 static int render_pilot(struct accuracy_run *r, struct pilot *pilot, struct error *e)
 {
 	struct accuracy_job *j = &r->jobs[ACCURACY_DEFAULT];
-	*pilot = (struct pilot){1, 1, 1}; /* so slow that all sizes are the minimum */
+	*pilot = (struct pilot){1, 1, 1}; /* a speed so low that make_plan chooses the shortest rounds */
 	int rc = make_plan(r, ACCURACY_DEFAULT, pilot, e);
 	if (!rc)
 		rc = check_memory(r, &j->plan, e);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A pilot on this machine (pilot.h): a probe, then a short render whose error estimates are kept. Threads as in
- * local.h. */
+/* Runs a pilot on this machine (pilot.h): a probe, then a short render whose estimates of the error are kept. Threads
+ * as in local.h. */
 #ifndef WORKER_CLI_RENDER_LOCAL_PILOT_H
 #define WORKER_CLI_RENDER_LOCAL_PILOT_H
 
@@ -8,22 +8,24 @@
 #include "worker/cli/render/local.h"
 
 struct local_pilot {
-	/* in */
+	/* Set by the caller. */
 	const struct world *world;
-	const struct plan_request *request; /* of the render, complete */
-	double seconds;
+	const struct plan_request *request; /* the render to be predicted; complete */
+	double seconds;			    /* length of the pilot */
 	unsigned threads;
-	atomic_bool *stop; /* may become true at any time; the pilot sets it when it has seen enough */
+	atomic_bool *stop; /* may become true at any time; the pilot sets it when it has enough estimates */
 	void (*progress)(void *user, const struct local_progress *p); /* may be NULL */
 	void *user;
-	/* out */
-	struct plan render, plan; /* of the render being predicted; of the pilot */
-	struct forecast_history looks;
-	bool timed, over; /* set by the callbacks: the pilot itself has started; it has seen enough */
-	double cpu_seconds, wall_seconds, bootstrap_cpu, bootstrap_seconds;
+	/* Set by local_pilot. */
+	struct plan render, plan;		 /* the plans of the render being predicted, and of the pilot */
+	struct forecast_history looks;		 /* estimates of the pilot's error */
+	bool timed;				 /* the probe is over, and the pilot itself has started */
+	bool over;				 /* the pilot has ended itself by *stop */
+	double cpu_seconds, wall_seconds;	 /* of the pilot, its bootstrap included */
+	double bootstrap_cpu, bootstrap_seconds; /* CPU and wall-clock time of its bootstrap */
 };
 
-/* -EINTR: stopped before there was an estimate. */
+/* Runs probe and pilot. Returns -EINTR if *stop was set before the bootstrap of either was complete. */
 int local_pilot(struct local_pilot *p, struct error *e);
 
 #endif
