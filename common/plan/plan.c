@@ -339,7 +339,8 @@ static int make_chains(const struct plan_request *r, struct plan *p, uint64_t to
 				 (unsigned long long)chains, p->groups, p->parts);
 	chains = ceil_div(chains, (uint64_t)p->groups * p->parts) * p->groups * p->parts;
 	if (chains > PLAN_MAX_CHAINS)
-		return error_set(e, EINVAL, "%llu chains; at most %d", (unsigned long long)chains, PLAN_MAX_CHAINS);
+		return error_set(e, EINVAL, "%llu chains; at most %d are possible", (unsigned long long)chains,
+				 PLAN_MAX_CHAINS);
 	p->chains = (uint32_t)chains;
 	uint64_t per_lease = lease_unit(p);
 	choose_epoch(r, p, total, &p->epoch);
@@ -476,8 +477,8 @@ static int check_cut(const struct plan *p, struct error *e)
 	if (p->kind != PLAN_CHAINS && p->kind != PLAN_SAMPLES)
 		return error_set(e, EINVAL, "unknown kind of plan %d", (int)p->kind);
 	if (p->groups < 1 || p->groups > PLAN_MAX_GROUPS || p->parts < 1 || p->parts > PLAN_MAX_PARTS)
-		return error_set(e, EINVAL, "%u groups of %u parts; 1 to %d of 1 to %d", p->groups, p->parts,
-				 PLAN_MAX_GROUPS, PLAN_MAX_PARTS);
+		return error_set(e, EINVAL, "%u groups of %u parts: there can be 1 to %d groups of 1 to %d parts",
+				 p->groups, p->parts, PLAN_MAX_GROUPS, PLAN_MAX_PARTS);
 	uint64_t leases = (uint64_t)p->groups * p->parts;
 	if (p->bootstrap < 1 || p->bootstrap > PLAN_MAX_BOOTSTRAP || p->bootstrap % leases)
 		return error_set(e, EINVAL, "%llu bootstrap samples are not a multiple of %llu up to %d",
@@ -491,7 +492,7 @@ static int check_cut(const struct plan *p, struct error *e)
 		if (lease_unit > PLAN_MAX_LEASE_CHAINS)
 			return error_set(
 				e, EINVAL,
-				"%u chains in %u groups of %u parts are %llu to a lease; at most %d: take more groups or parts",
+				"%u chains in %u groups of %u parts are %llu per lease, which can have at most %d: choose more groups or parts",
 				p->chains, p->groups, p->parts, (unsigned long long)lease_unit, PLAN_MAX_LEASE_CHAINS);
 	} else {
 		if (p->chains)

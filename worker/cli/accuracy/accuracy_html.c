@@ -340,7 +340,8 @@ static void put_rest(struct text_file *p, const struct accuracy_context *x)
 	text_file_put(p, "%s<h2>The CSV's columns</h2>\n<table>\n", d->left_out_count ? "</table>\n" : "");
 	for (size_t i = 0; accuracy_columns[i].name; i++)
 		write_fact(p, accuracy_columns[i].name,
-			   *accuracy_columns[i].meaning ? accuracy_columns[i].meaning : "the other end of it");
+			   *accuracy_columns[i].meaning ? accuracy_columns[i].meaning
+							: "upper end of the same interval");
 	text_file_put(p, "</table>\n");
 }
 

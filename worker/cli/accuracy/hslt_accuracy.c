@@ -71,10 +71,11 @@ static const struct program program = {
 	.examples = "hslt-accuracy room.xml -o room.html --size 160x90\n"
 		    "hslt-accuracy room.xml -o room.html --csv room.csv --size 160x90 --budget 60 --threads 8\n"
 		    "hslt-accuracy room.xml -o depth.html --parameters max-depth,tolerance --seconds 30",
-	.details = "The report is one HTML file: error at equal time and at equal mutations, time per mutation, failed "
-		   "walks and bias of every setting, and which settings lie on the Pareto front. A small film tells as "
-		   "much as a large one and takes less memory.\n"
-		   "If interrupted once every setting has had a round, it reports what was rendered and exits with 1.",
+	.details =
+		"The report is one HTML file: error at equal time and at equal mutations, time per mutation, failed "
+		"walks and bias of every setting, and which settings lie on the Pareto front. A small film tells as "
+		"much as a large one and takes less memory.\n"
+		"If it is interrupted after every setting has had a round, it reports what was rendered and exits with 1.",
 	.exits = "0 done, 1 failed, 2 usage",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 	.shared = &render_table,

@@ -44,7 +44,7 @@ static const struct program program = {
 		    "hslt-assemble left.exr right.exr -o room.exr",
 	.details = "The crops must not overlap, and must fill a rectangle. Errors of pixels are kept; hslt:relMSE "
 		   "is the mean over pixels. Header attributes on which all crops agree are kept, counts are added.\n"
-		   "deploy/crops.sh submits a grid of crops to one coordinator or several, and calls this.",
+		   "deploy/crops.sh submits a grid of crops to one coordinator or several, and calls hslt-assemble.",
 	.exits = "0 done, 1 failed, 2 usage, 5 done, but chains of some crop disagree",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 	.word = take_word,
