@@ -31,8 +31,7 @@ const char *target_shown(const char *path); /* TARGET_STDOUT to "stdout", for me
  * of reading a link. */
 int target_find(struct target *t, const char *path, struct error *e);
 
-/* Opens a target whose `through` is set and returns a new descriptor, or -errno. Opening a pipe waits for its reader.
- */
+/* Opens a target whose `through` is set. Returns a new descriptor or -errno. Opening a pipe waits for its reader. */
 int target_open(const struct target *t, struct error *e);
 
 #endif

@@ -136,8 +136,7 @@ bool text_ratio(const char *text, double *ratio)
 	return true;
 }
 
-/* Reads a non-negative number, followed by at most one letter of `units`, which selects the factor at the same index.
- */
+/* Reads a non-negative number, and at most one letter of `units`, which selects the factor at the same index. */
 static bool read_unit(const char *text, const char *units, const double *factors, double *number, double *factor)
 {
 	char *end;

@@ -39,8 +39,7 @@ bool blob_store_trim(struct blob_store *s);
 
 /* Returns whether a blob is in the store, and its size, unless `size` is NULL. */
 bool blob_has(struct blob_store *s, const struct blob_hash *h, uint64_t *size);
-/* Holds a blob, which is then not evicted until as many calls of blob_release. Returns false if it is not in the store.
- */
+/* Holds a blob, which is then not evicted until as many calls of blob_release. Returns false if it is not stored. */
 bool blob_hold(struct blob_store *s, const struct blob_hash *h);
 void blob_release(struct blob_store *s, const struct blob_hash *h);
 bool blob_is_held(struct blob_store *s, const struct blob_hash *h); /* also true for a missing blob that is held */

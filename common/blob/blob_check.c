@@ -110,8 +110,8 @@ static int check_result(struct blob_check *c, struct error *e)
 	return blob_hash_equal(&got, &c->hash) ? 0 : -EBADMSG;
 }
 
-/* Marks a blob as missing. there: its file exists, with wrong contents, and is kept as damaged.NAME. Returns -EBADMSG.
- */
+/* Marks a blob as missing. there: its file exists with wrong contents, and is kept as
+ * damaged.NAME. Returns -EBADMSG. */
 static int mark_gone(struct blob_store *s, struct blob_entry *n, bool there, struct error *e)
 {
 	char path[BLOB_PATH_MOST], damaged[BLOB_PATH_MOST + 16], hex[BLOB_HEX_SIZE];

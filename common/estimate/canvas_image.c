@@ -157,8 +157,7 @@ static void state_no_interval(struct canvas_image *img, enum error_doubt why)
 	img->rel_mse_95[0] = img->rel_mse_95[1] = NAN;
 }
 
-/* If something about the chains is flagged but they are too short to be judged, the size of their errors is not known.
- */
+/* If the chains are flagged for some reason but are too short to be judged, the size of their errors is not known. */
 static void doubt_short_chains(struct image_builder *m)
 {
 	struct convergence a;

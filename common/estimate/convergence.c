@@ -40,8 +40,7 @@ enum { APART_GROUPS = 8 };
  * in the chains: see excess_counts(). */
 #define CLASS_KNOWN 0.1
 
-/* Share of chain epochs without an accepted mutation that is tolerated, and the shortest epoch for which it is judged.
- */
+/* Share of chain epochs without an accepted mutation that is tolerated, and the shortest epoch that is judged by it. */
 #define STUCK_MOST 0.01
 enum { STUCK_EPOCH = 1000 };
 

@@ -17,9 +17,8 @@ const char *strategy_counter_name(enum strategy_counter c);
 enum { STRATEGY_TABLE = 4096 };
 void strategy_table(const char *mixture, const struct canvas_counts *n, char *text, size_t size);
 
-/* Prints the counters of each strategy, one line per strategy, for the image's header. Empty if the plan has no
- * mixture.
- */
+/* Prints the counters of each strategy, one line per strategy, for the image's header. The text is empty if the plan
+ * has no mixture. */
 void strategy_lines(const char *mixture, const struct canvas_counts *n, char *text, size_t size);
 
 /* Prints a note on the image in one line: that it is black, that contributions were left out, that "3 of 8,192 chain

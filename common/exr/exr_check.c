@@ -79,8 +79,7 @@ int exr_check(exr_context_t x, const struct exr_stream *s, const struct exr_limi
 				 (long long)height);
 	img->width = (uint32_t)width;
 	img->height = (uint32_t)height;
-	/* The position of a data window that begins left of or above the display window is lost: it would be negative.
-	 */
+	/* If a data window begins left of or above the display window, its position is lost: it would be negative. */
 	int64_t dx = (int64_t)data.min.x - display.min.x, dy = (int64_t)data.min.y - display.min.y;
 	img->x = dx > 0 ? (uint32_t)dx : 0;
 	img->y = dy > 0 ? (uint32_t)dy : 0;

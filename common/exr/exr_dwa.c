@@ -134,9 +134,8 @@ static exr_result_t copy_tiles(exr_context_t from, exr_context_t to, const struc
 	return rc;
 }
 
-/* Writes a file with the same compressed pixels, but a data window that begins at (0, 0). *bytes is freed with
- * mem_free.
- */
+/* Writes a file with the same compressed pixels, but with a data window that begins at (0, 0). *bytes is freed with
+ * mem_free. */
 static int rewrite_file(exr_context_t from, size_t most, const struct exr_image *img, bool tiled, unsigned char **bytes,
 			size_t *size, struct error *e)
 {

@@ -88,8 +88,7 @@ static int failed(struct error *e, const char *path, const char *what)
 	return error_set(e, code, "%s: cannot %s: %s", target_shown(path), what, strerror(code));
 }
 
-/* Flushes the folder of `path`, so that a new name survives a crash. Failures are ignored: the image itself is written.
- */
+/* Flushes the folder of `path`, so that a new name survives a crash. Failures are ignored: the image is written. */
 static void sync_folder(const char *path)
 {
 	char folder[PATH_ROOM];

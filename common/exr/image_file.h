@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Image files: encoding an image with its errors and header as EXR, writing files atomically, reading them. Any thread.
- */
+/* Image files: encodes an image with its errors and header as EXR, writes files atomically, reads them. Any thread. */
 #ifndef COMMON_EXR_IMAGE_FILE_H
 #define COMMON_EXR_IMAGE_FILE_H
 
@@ -21,8 +20,7 @@ int image_file_write(const char *path, const unsigned char *bytes, size_t size, 
 int image_file_probe(const char *path, struct error *e);
 
 /* Reads a regular file, or a pipe to its end, of at most 2^32 bytes; *bytes is freed with mem_free. Returns 0 or
- * -errno.
- */
+ * -errno. */
 int image_file_read(const char *path, unsigned char **bytes, size_t *size, struct error *e);
 
 #endif

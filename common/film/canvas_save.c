@@ -126,9 +126,8 @@ int canvas_save(const struct canvas *c, struct checked_file *out, struct error *
 	return rc ? rc : save_tiles(c, out, e);
 }
 
-/* Checks the counts of merged leases against the flags of the leases: with a wrong count, a round would never be
- * closed.
- */
+/* Checks the counts of merged leases against the flags of the leases. With a wrong count, a round would never be
+ * closed. */
 static int check_merged(const struct canvas *c, struct error *e)
 {
 	uint32_t leases = c->plan.groups * c->plan.parts, merged[1 + OPEN_ROUNDS] = {0};

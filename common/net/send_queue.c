@@ -202,9 +202,8 @@ static void flush(struct send_queue *q, size_t plain)
 	tls_link_output_taken(q->link);
 }
 
-/* Encrypts the next piece of the first frame. Returns 1 if it was the last piece, 0 if more is left, -1 after a
- * failure.
- */
+/* Encrypts the next piece of the first frame. Returns 1 if that was the last piece, 0 if more is left, -1 after a
+ * failure. */
 static int encrypt_piece(struct send_queue *q)
 {
 	static _Thread_local unsigned char joined[PIECE];

@@ -164,8 +164,7 @@ struct plan_range {
 };
 /* Returns the bootstrap indices of a lease. */
 struct plan_range plan_bootstrap_range(const struct plan *p, uint32_t group, uint32_t part);
-/* Returns the chains of a part, as numbers k within the group: the k-th chain of a group is chain group + groups * k.
- */
+/* Returns the chains of a part, as numbers k within the group, whose k-th chain is chain group + groups * k. */
 struct plan_range plan_chain_range(const struct plan *p, uint32_t part);
 /* Returns the rows of a part, of the crop extended by the border, counted from the top of the extended crop. */
 struct plan_range plan_row_range(const struct plan *p, uint32_t part);

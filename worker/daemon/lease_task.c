@@ -28,8 +28,7 @@ void lease_task_free(struct lease_task *l)
 	mem_free(l);
 }
 
-/* Renders a lease on a render thread, and packs the result there, too, so that the loop's thread never encodes films.
- */
+/* Renders a lease on a render thread and packs the result there, so that the loop's thread never encodes films. */
 static void render(struct task *t)
 {
 	struct lease_task *l = (struct lease_task *)t; /* its first member */

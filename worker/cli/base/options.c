@@ -426,8 +426,8 @@ int render_plan_from_scene(struct render_arguments *a, const struct render_summa
 			"these (hide_emitters); --max-depth 2 shows what they light");
 	if (!p->min_depth)
 		p->min_depth = s->hide_emitters ? 2 : 1;
-	/* Longer paths carry no light in this scene. Not if the requested minimum is longer still, which would leave
-	 * no paths. */
+	/* Leaves out longer paths, which carry no light in this scene; but not if the requested minimum is longer
+	 * still, because no paths would be left. */
 	if (p->max_depth > summary->useful_depth && summary->useful_depth >= p->min_depth)
 		p->max_depth = summary->useful_depth;
 	if (!plan_request_is_bounded(p))

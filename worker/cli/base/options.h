@@ -39,8 +39,7 @@ unsigned option_threads_default(void); /* the number of processors */
 
 /* Functions for option_row.take, which fill a struct render_arguments; -EINVAL with a sentence is a usage error. */
 
-/* The image to write, which is OpenEXR: an error if its name has the extension of another format. "-" is /dev/stdout.
- */
+/* Takes the image to write, which is OpenEXR; the extension of another format is an error. "-" is /dev/stdout. */
 int option_image(void *target, char *arg, struct error *e);
 int option_path(void *target, char *arg, struct error *e);   /* a folder of --path, which must exist */
 int option_define(void *target, char *arg, struct error *e); /* NAME=VALUE of -D, split in place */

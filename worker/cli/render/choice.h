@@ -19,8 +19,7 @@ struct choice {
 	char text[512]; /* the choice in one line, for the user */
 };
 
-/* Makes the choice for the scene `name` in `folder`. a: complete, except for the values that are chosen and measured.
- */
+/* Makes the choice for the scene `name` in `folder`. a: complete except for the values that are chosen or measured. */
 int choice_make(struct render_arguments *a, const char *folder, const char *name, struct choice *out, struct error *e);
 /* Does the same in an existing world. */
 int choice_in_world(const struct world *w, struct render_arguments *a, struct choice *out, struct error *e);

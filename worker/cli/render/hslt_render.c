@@ -375,8 +375,7 @@ static void print_summary(const struct session *s)
 		fprintf(stderr, "hslt-render: note: %s\n", text);
 }
 
-/* Prints the warning that the error of the image is not known. It is the last line, and is printed even with --quiet.
- */
+/* Prints a warning that the error of the image is not known. It is the last line, printed even with --quiet. */
 static void warn(const struct session *s)
 {
 	char text[STATED_ERROR_TEXT];

@@ -135,8 +135,7 @@ static int lease(struct thread_pool *c, uint32_t index)
 	return rc;
 }
 
-/* Returns the next lease of the phase that is not merged yet, or the number of leases if none is left. Under the lock.
- */
+/* Returns the next lease of the phase that is not merged yet; the number of leases if none is left. Under the lock. */
 static uint32_t take_lease(struct thread_pool *c)
 {
 	uint32_t parts = c->run->plan->parts;
