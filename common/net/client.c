@@ -52,7 +52,7 @@ struct client {
 	size_t waiting_bytes;	/* their memory */
 	struct tls *tls;	/* NULL: plaintext */
 	bool opened, timed_out;
-	int distrust;		      /* as conn_distrust */
+	int distrust;		      /* what conn_distrust returned for the connection */
 	char name[128], why[256];     /* the program; why the connection was closed */
 	char warning[384], note[256]; /* for client_print_notes */
 };
@@ -213,7 +213,7 @@ static int say_hello(struct client *cl, const char *host_port, struct error *e)
 static int connect_to(struct client *cl, const struct net_addr *a, struct error *e)
 {
 	const struct conn_config config = {{HEADER_LIMIT, PAYLOAD_LIMIT}, 1 << 23, 30, 0, cl->tls, NULL, NULL};
-	if (cl->conn) /* of the address before */
+	if (cl->conn) /* the attempt with the address before */
 		conn_close(cl->conn, "no answer in time");
 	while (cl->conn)
 		uv_run(&cl->loop, UV_RUN_ONCE);

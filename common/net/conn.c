@@ -54,10 +54,10 @@ struct conn {
 	int open_handles;
 	struct buf rest; /* plaintext that waits for the next iteration of the loop, from rest_at on */
 	size_t rest_at;
-	bool goes_on;	 /* there is such a rest; the socket is not read until it is used up */
-	unsigned frames; /* frames delivered since other connections could be read */
-	bool accepted, sniffed, garbled;
-	int distrust; /* as conn_distrust */
+	bool goes_on;			 /* there is such a rest; the socket is not read until it is used up */
+	unsigned frames;		 /* frames delivered since other connections could be read */
+	bool accepted, sniffed, garbled; /* by a listener; the first bytes have been looked at; see conn_garbled */
+	int distrust;			 /* what conn_distrust returns */
 	char why[256];
 };
 

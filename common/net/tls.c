@@ -52,7 +52,7 @@ struct tls {
 	struct tls_peer self;
 	time_t authority_until;
 	time_t warned;	/* time of the last tls_warning_due that returned true; 0: not since the files were read */
-	double recheck; /* s */
+	double recheck; /* see tls_recheck_seconds */
 };
 
 struct tls_link {

@@ -32,7 +32,7 @@ enum {
 	AIM_ROUNDS = 8,		       /* rounds of a job whose number of mutations or samples is bounded */
 	LEASE_SAMPLES_MOST = 1 << 20,  /* chains: most mutations in one lease */
 	LEASE_SAMPLES_OPEN = 1 << 18,  /* the same if nothing bounds the job's mutations */
-	LEASE_SAMPLES_LEAST = 1 << 13, /* and the fewest then */
+	LEASE_SAMPLES_LEAST = 1 << 13, /* the fewest mutations in one lease, in that case */
 	LEASE_SECONDS = 20,	       /* time that a lease should take, of one thread */
 	LEASE_SAMPLES_SLOW = 1 << 15,  /* so many never took longer than LEASE_SECONDS in any scene tried */
 	SPEED_UNKNOWN = 50000,	       /* mutations or samples a second of one thread, if no pilot has measured it */
@@ -492,7 +492,7 @@ static int check_cut(const struct plan *p, struct error *e)
 		if (lease_unit > PLAN_MAX_LEASE_CHAINS)
 			return error_set(
 				e, EINVAL,
-				"%u chains in %u groups of %u parts are %llu per lease, which can have at most %d: choose more groups or parts",
+				"%u chains in %u groups of %u parts are %llu per lease, of at most %d: choose more groups or parts",
 				p->chains, p->groups, p->parts, (unsigned long long)lease_unit, PLAN_MAX_LEASE_CHAINS);
 	} else {
 		if (p->chains)

@@ -301,7 +301,7 @@ static void parts_are_asked_for(void **state)
 	assert_int_equal(make_plan(&r).chains, PLAN_MAX_CHAINS);
 	r.parts = 32;
 	assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
-	assert_non_null(strstr(e.text, "32768 per lease, which can have at most 16384: choose more groups or parts"));
+	assert_non_null(strstr(e.text, "32768 per lease, of at most 16384: choose more groups or parts"));
 	r = request(PLAN_SAMPLES, "");
 	r.parts = 33;
 	assert_int_equal(plan_make(&r, &p, &e), -EINVAL);

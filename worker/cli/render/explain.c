@@ -86,7 +86,7 @@ static int summarise(const char *folder, const char *name, struct render_argumen
 int explain(const char *path, struct render_arguments *a, bool json, bool *usage, struct error *e)
 {
 	char *folder, *name;
-	static struct render_summary m; /* large */
+	static struct render_summary m; /* too large for the stack */
 	*usage = false;
 	int rc = scene_path_split(path, a, &folder, &name, e);
 	if (rc)

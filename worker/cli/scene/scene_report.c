@@ -199,7 +199,7 @@ static const char *segments_text(uint64_t n, char *text, size_t size)
  * enough of the scene could be read. */
 static int print_check(const struct scene *s, const struct asset_source *assets, const char *scene, bool *bad)
 {
-	static struct render_summary m; /* large */
+	static struct render_summary m; /* too large for the stack */
 	uint32_t problems = s->problem_count, notes = s->note_count;
 	struct problem_list list = {0};
 	for (uint32_t i = 0; i < s->problem_count; i++)
@@ -292,7 +292,7 @@ static json_t *effects_of(const struct render_summary *m)
  * failure. */
 static json_t *describe(const struct scene *s, const struct opened *o, struct error *e)
 {
-	static struct render_summary m; /* large */
+	static struct render_summary m; /* too large for the stack */
 	const struct render_options as_it_is = {0};
 	if (render_check(s, &o->assets, &as_it_is, &m, e))
 		return NULL;

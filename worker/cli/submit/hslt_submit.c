@@ -263,7 +263,7 @@ static const char *name_of_file(const char *file, char name[NAME_MOST + 1])
 
 int main(int argc, char **argv)
 {
-	static struct arguments a; /* large */
+	static struct arguments a; /* too large for the stack */
 	struct scene_files files;
 	struct client *cl;
 	struct error e;
