@@ -455,9 +455,9 @@ static void test_refused(void **state)
 	refuses(PLY("grid.ply", FIELD("displacement", "face_heat") "<integer name='displacement_level' value='1'/>"),
 		"an attribute of a mesh cannot displace a surface");
 	refuses(PLY("large.ply", "<bsdf type='conductor'>" FIELD("eta", "vertex_q") "</bsdf>"),
-		"numbers of the attribute up to 1.5e+09: must be within [0, 1e+09]");
+		"the attribute has numbers up to 1.5e+09: they must be within [0, 1e+09]");
 	refuses(PLY("large.ply", "<bsdf type='conductor'>" FIELD("eta", "vertex_color") "</bsdf>"),
-		"numbers of the attribute up to 1.5e+09: must be within [0, 1e+09]");
+		"the attribute has numbers up to 1.5e+09: they must be within [0, 1e+09]");
 	refuses("<emitter type='projector'>" FIELD("irradiance", "face_heat") "</emitter>",
 		"attributes are only available on a mesh");
 }
