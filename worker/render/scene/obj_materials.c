@@ -16,6 +16,7 @@
 #include "common/base/liveness.h"
 #include "worker/render/xml/element_make.h"
 #include "worker/render/scene/mtl.h"
+#include "worker/render/text/number.h"
 #include "worker/render/text/text_lines.h"
 
 #include <stdio.h>
@@ -44,7 +45,8 @@ struct child {
 struct material {
 	const char *name;
 	size_t length;
-	bool has_faces;
+	bool has_faces;			/* anywhere in the file */
+	bool wanted;			/* it has faces in the mesh that the shape asks for */
 	const struct xml_element *bsdf; /* the BSDF given in the shape, or NULL */
 	const struct mtl_material *mtl; /* if there is no bsdf: the entry of the .mtl file, or NULL */
 };
@@ -56,7 +58,9 @@ struct obj_shape {
 	struct asset bytes;
 	struct child *children;
 	size_t child_count, plain, named; /* plain, named: number of BSDFs without and with a name */
-	bool load, fixed; /* load: the shape asks for the .mtl file; fixed: it states itself which faces it wants */
+	bool load, fixed; /* load: the shape asks for the .mtl file; fixed: it emits light, or states itself which faces
+			     it wants */
+	int64_t mesh;	  /* shape_index; negative: all meshes */
 	struct material *materials; /* [OBJ_MATERIALS_MAX] */
 	uint32_t *places;	    /* hash table of PLACES entries by name: 1 + index, or 0 if free */
 	size_t count;
@@ -109,6 +113,8 @@ static int read_children(const struct spread *s, struct obj_shape *o)
 			o->file = value;
 		if (is_property(c, "boolean", "loadMaterials", "load_materials") && value)
 			o->load = strcasecmp(value, "false") != 0;
+		if (is_property(c, "integer", "shapeIndex", "shape_index") && value)
+			number_scan_int(value, value + strlen(value), &o->mesh);
 		o->fixed |= is_property(c, "string", "material", "material") ||
 			    is_property(c, "boolean", "collapse", "collapse");
 	}
@@ -139,11 +145,18 @@ static int scan(const struct spread *s, struct obj_shape *o)
 	const char *bytes = (const char *)o->bytes.bytes;
 	struct text_lines lines = {.p = bytes, .end = bytes + o->bytes.size};
 	struct material *now = material_of(o, "", 0);
+	int64_t mesh = -1; /* counted as obj_read.h says */
+	bool in_mesh = false;
 	for (struct text_line l; text_lines_next(&lines, &l);) {
 		tick();
 		if (text_line_is(&l, "f")) {
-			now->has_faces = true;
+			mesh += !in_mesh;
+			in_mesh = now->has_faces = true;
+			now->wanted |= o->mesh < 0 || mesh == o->mesh;
+		} else if (text_line_is(&l, "g")) {
+			in_mesh = false;
 		} else if (text_line_is(&l, "usemtl")) {
+			in_mesh = false;
 			now = material_of(o, l.rest, l.rest_length);
 			if (!now)
 				return xml_error(o->el, s->error, E2BIG, "%s:%d: more than %d materials", o->file,
@@ -191,7 +204,7 @@ static int choose(const struct spread *s, struct obj_shape *o, size_t *found)
 		}
 		if (!m->bsdf && o->load)
 			m->mtl = mtl_find(&o->mtl, name);
-		*found += m->has_faces && (m->bsdf || m->mtl);
+		*found += m->wanted && (m->bsdf || m->mtl);
 	}
 	return 0;
 }
@@ -276,7 +289,7 @@ static int replace(const struct spread *s, const struct obj_shape *o)
 		element_put(merge, "id", id);
 	int r = 0;
 	for (size_t i = 0; i < o->count && !r; i++)
-		if (o->materials[i].has_faces)
+		if (o->materials[i].wanted)
 			r = put_part(s, o, merge, &o->materials[i]);
 	if (r)
 		return r;
@@ -316,7 +329,7 @@ static int note_all(const struct spread *s, struct obj_shape *o)
 				name);
 	}
 	for (size_t i = 0; i < o->count; i++)
-		if (o->materials[i].has_faces && !o->materials[i].bsdf && !o->materials[i].mtl) {
+		if (o->materials[i].wanted && !o->materials[i].bsdf && !o->materials[i].mtl) {
 			first = first ? first : o->materials[i].name;
 			grey++;
 		}
@@ -333,6 +346,15 @@ static int note_all(const struct spread *s, struct obj_shape *o)
 
 /* ---- the walk */
 
+/* Not if the file has no faces, or not as many meshes as the shape's index: an error when the shape is built. */
+static bool wants_any(const struct obj_shape *o)
+{
+	for (size_t i = 0; i < o->count; i++)
+		if (o->materials[i].wanted)
+			return true;
+	return false;
+}
+
 static int spread_open(const struct spread *s, struct obj_shape *o)
 {
 	size_t found = 0;
@@ -343,7 +365,7 @@ static int spread_open(const struct spread *s, struct obj_shape *o)
 		r = read_library(s, o);
 	if (!r)
 		r = choose(s, o, &found);
-	if (r || (found == 0 && o->named < 2))
+	if (r || !wants_any(o) || (found == 0 && o->named < (o->mesh < 0 ? 2 : 1)))
 		return r; /* shapes whose materials are not read are counted by the world's builder */
 	r = note_all(s, o);
 	return r ? r : replace(s, o);
@@ -358,7 +380,7 @@ static bool make_room(struct spread *s)
 
 static int spread_shape(struct spread *s, struct xml_element *el)
 {
-	struct obj_shape o = {.el = el, .load = true};
+	struct obj_shape o = {.el = el, .load = true, .mesh = -1};
 	struct error missing;
 	int r = read_children(s, &o);
 	bool asks = o.named > 0 || (o.plain == 0 && o.load && !o.fixed);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Wavefront OBJ files: all faces, or those of one material. */
+/* Wavefront OBJ files: all faces, those of one material, or one of the meshes that `g` and `usemtl` separate. */
 #include "common/base/liveness.h"
 #include "common/base/mem.h"
 #include "worker/render/shape/declare.h"
@@ -84,12 +84,25 @@ static bool make_mesh(const struct obj_file *o, struct faces *f, struct arena *a
 	return ok;
 }
 
-/* Returns the end of a run, as the beginning of the next one. */
-static struct obj_run end_of(const struct obj_file *o, size_t run)
+/* Consecutive faces of the file: their corners and triangles, each from the first to the one after the last. */
+struct range {
+	size_t corner, corner_end, triangle, triangle_end;
+};
+
+static struct range range_of_run(const struct obj_file *o, size_t run)
 {
-	const struct obj_run *runs = o->runs.items;
-	return run + 1 < o->runs.count ? runs[run + 1]
-				       : (struct obj_run){.corner = o->corners.count, .triangle = o->triangles.count};
+	const struct obj_run *r = (const struct obj_run *)o->runs.items + run;
+	bool last = run + 1 == o->runs.count;
+	return (struct range){r->corner, last ? o->corners.count : r[1].corner, r->triangle,
+			      last ? o->triangles.count : r[1].triangle};
+}
+
+static struct range range_of_mesh(const struct obj_file *o, size_t mesh)
+{
+	const struct obj_mesh *m = (const struct obj_mesh *)o->meshes.items + mesh;
+	bool last = mesh + 1 == o->meshes.count;
+	return (struct range){m->corner, last ? o->corners.count : m[1].corner, m->triangle,
+			      last ? o->triangles.count : m[1].triangle};
 }
 
 static bool is_of(const struct obj_file *o, size_t run, const char *material)
@@ -99,16 +112,15 @@ static bool is_of(const struct obj_file *o, size_t run, const char *material)
 	return r->name_length == n && (n == 0 || memcmp((const char *)o->names.items + r->name, material, n) == 0);
 }
 
-static void take_run(const struct obj_file *o, size_t run, struct faces *f)
+static void take(const struct obj_file *o, struct range r, struct faces *f)
 {
-	const struct obj_run from = ((const struct obj_run *)o->runs.items)[run], to = end_of(o, run);
 	const struct obj_corner *corners = o->corners.items;
 	const uint32_t(*triangles)[3] = o->triangles.items;
-	uint32_t shift = (uint32_t)(f->corner_count - from.corner);
-	for (size_t i = from.triangle; i < to.triangle; i++, f->triangle_count++)
+	uint32_t shift = (uint32_t)(f->corner_count - r.corner);
+	for (size_t i = r.triangle; i < r.triangle_end; i++, f->triangle_count++)
 		for (int k = 0; k < 3; k++)
 			f->triangles[f->triangle_count][k] = triangles[i][k] + shift;
-	for (size_t i = from.corner; i < to.corner; i++, f->corner_count++) {
+	for (size_t i = r.corner; i < r.corner_end; i++, f->corner_count++) {
 		f->corners[f->corner_count] = corners[i];
 		f->corners[f->corner_count].at = (uint32_t)f->corner_count;
 	}
@@ -127,8 +139,9 @@ static int build_material(const struct scene_node *n, const struct obj_file *o, 
 	for (size_t i = 0; i < o->runs.count; i++) {
 		if (!is_of(o, i, material))
 			continue;
-		corners += end_of(o, i).corner - ((const struct obj_run *)o->runs.items)[i].corner;
-		triangles += end_of(o, i).triangle - ((const struct obj_run *)o->runs.items)[i].triangle;
+		struct range r = range_of_run(o, i);
+		corners += r.corner_end - r.corner;
+		triangles += r.triangle_end - r.triangle;
 	}
 	if (triangles == 0)
 		return node_error(n, e, EINVAL, "%s: has no faces of the material `%.64s`",
@@ -138,8 +151,33 @@ static int build_material(const struct scene_node *n, const struct obj_file *o, 
 	bool ok = f.corners && f.triangles;
 	for (size_t i = 0; ok && i < o->runs.count; i++)
 		if (is_of(o, i, material))
-			take_run(o, i, &f);
+			take(o, range_of_run(o, i), &f);
 	ok = ok && make_mesh(o, &f, arena, &out->mesh, node_bool(n, "flip_tex_coords", true));
+	mem_free(f.corners);
+	mem_free(f.triangles);
+	return ok ? 0 : out_of_memory(n, e);
+}
+
+/* One mesh, copied. `material`, if not NULL, must be its own. */
+static int build_mesh(const struct scene_node *n, const struct obj_file *o, const char *material, struct arena *arena,
+		      struct shape_geometry *out, struct error *e)
+{
+	const char *name = node_string(n, "filename", "");
+	size_t index = (size_t)node_int(n, "shape_index", 0);
+	if (index >= o->meshes.count)
+		return node_error(n, e, ERANGE, "%s: shape_index=%zu, but it holds %zu mesh%s, counted from 0", name,
+				  index, o->meshes.count, o->meshes.count == 1 ? "" : "es");
+	if (material && !is_of(o, ((const struct obj_mesh *)o->meshes.items)[index].run, material))
+		return node_error(n, e, EINVAL, "%s: mesh %zu has no faces of the material `%.64s`", name, index,
+				  material);
+	struct range r = range_of_mesh(o, index);
+	struct faces f = {.corners = mem_alloc(r.corner_end - r.corner, sizeof *f.corners),
+			  .triangles = mem_alloc(r.triangle_end - r.triangle, sizeof *f.triangles)};
+	bool ok = f.corners && f.triangles;
+	if (ok) {
+		take(o, r, &f);
+		ok = make_mesh(o, &f, arena, &out->mesh, node_bool(n, "flip_tex_coords", true));
+	}
 	mem_free(f.corners);
 	mem_free(f.triangles);
 	return ok ? 0 : out_of_memory(n, e);
@@ -159,9 +197,12 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 		 struct shape_geometry *out, struct error *e)
 {
 	const char *material = node_string(n, "material", NULL);
-	struct obj_cache own = {.name = NULL}, *cache = material && assets->parsed ? assets->parsed : &own;
+	bool one = node_int(n, "shape_index", -1) >= 0;
+	struct obj_cache own = {.name = NULL}, *cache = (material || one) && assets->parsed ? assets->parsed : &own;
 	int r = obj_cache_read(cache, n, assets, e);
-	if (!r)
+	if (!r && one)
+		r = build_mesh(n, &cache->file, material, arena, out, e);
+	else if (!r)
 		r = material ? build_material(n, &cache->file, material, arena, out, e)
 			     : build_all(n, &cache->file, arena, out, e);
 	obj_cache_fini(&own);
@@ -173,4 +214,5 @@ SHAPE_OPS(obj, {"filename", UNDERSTOOD(VALUE_STRING)},
 						     first `usemtl` */
 	  {"face_normals", UNDERSTOOD(VALUE_BOOL)}, {"flip_tex_coords", UNDERSTOOD(VALUE_BOOL)}, {"collapse", IGNORED},
 	  {"load_materials", UNDERSTOOD(VALUE_BOOL)}, /* .mtl files are not read; false: without a note */
-	  MESH_SMOOTH_PARAM, {"shape_index", REFUSED}, SHAPE_PARAMS);
+	  {"shape_index", VALUE_INT, PARAM_UNDERSTOOD, -1, 1 << 24, NULL}, /* -1: all meshes */
+	  MESH_SMOOTH_PARAM, SHAPE_PARAMS);

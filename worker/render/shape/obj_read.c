@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- *
  * obj_read opens an OBJ file and reads it line by line in one pass. Numbers, corners and triangles are added to lists
- * that grow by doubling; polygons are cut into triangles (polygon.h); `usemtl` begins a run of faces with one material.
- * The cache keeps the file that was read last.
+ * that grow by doubling; polygons are cut into triangles (polygon.h); `usemtl` begins a run of faces with one material,
+ * and with `g` it separates meshes. The cache keeps the file that was read last.
  *
  * Reading fails, with the file and the line, if a number is invalid, or if an index refers to an element that the file
  * has not defined yet. It also fails if the file has neither vertices nor faces, or is larger than 4 GB. After an error
@@ -26,6 +25,7 @@ struct reader {
 	struct error *error;
 	const char *p, *end;
 	int line;
+	bool in_mesh; /* a face now belongs to the last mesh */
 };
 
 static int out_of_memory(const struct reader *o)
@@ -200,9 +200,23 @@ static int add_triangle(struct reader *o, uint32_t a, uint32_t b, uint32_t c)
 	return 0;
 }
 
+/* Of the face that follows. */
+static int begin_mesh(struct reader *o)
+{
+	struct obj_file *f = o->file;
+	struct obj_mesh *m = list_push(&f->meshes);
+	if (!m)
+		return out_of_memory(o);
+	*m = (struct obj_mesh){f->runs.count - 1, f->corners.count, f->triangles.count};
+	o->in_mesh = true;
+	return 0;
+}
+
 static int read_face(struct reader *o)
 {
 	uint32_t first = (uint32_t)o->file->corners.count, n = 0;
+	if (!o->in_mesh && begin_mesh(o))
+		return -ENOMEM;
 	for (; !at_end_of_line(o); n++) {
 		int r = read_corner(o);
 		if (!r && n >= 2)
@@ -243,6 +257,7 @@ static int begin_run(struct reader *o, const char *name, size_t length)
 static int read_material(struct reader *o)
 {
 	size_t length;
+	o->in_mesh = false;
 	const char *name = number_line_rest(o->p, o->end, &length);
 	return begin_run(o, name, length);
 }
@@ -262,6 +277,8 @@ static int read_line(struct reader *o)
 		return read_normal(o);
 	if (n == 6 && memcmp(word, "usemtl", 6) == 0)
 		return read_material(o);
+	if (n == 1 && *word == 'g')
+		o->in_mesh = false;
 	return n == 1 && *word == 'f' ? read_face(o) : 0;
 }
 
@@ -284,8 +301,8 @@ static int read_lines(struct reader *o)
 
 static void obj_free(struct obj_file *o)
 {
-	struct list *all[] = {&o->positions, &o->uvs,	    &o->normals, &o->colours,
-			      &o->corners,   &o->triangles, &o->runs,	 &o->names};
+	struct list *all[] = {&o->positions, &o->uvs,  &o->normals, &o->colours, &o->corners,
+			      &o->triangles, &o->runs, &o->names,   &o->meshes};
 	for (size_t i = 0; i < sizeof all / sizeof *all; i++)
 		list_free(all[i]);
 	*o = (struct obj_file){0};
@@ -312,6 +329,7 @@ static int obj_read(struct obj_file *o, const struct scene_node *n, const struct
 	o->triangles.size = 3 * sizeof(uint32_t);
 	o->runs.size = sizeof(struct obj_run);
 	o->names.size = 1;
+	o->meshes.size = sizeof(struct obj_mesh);
 	if (a.size > UINT32_MAX)
 		r = node_error(n, e, EFBIG, "%s: larger than 4 GB", reader.name);
 	else if (!(r = begin_run(&reader, "", 0)))

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The contents of a Wavefront OBJ file: v (with colours), vt, vn, f and usemtl. Everything else (groups, lines) is
+ * The contents of a Wavefront OBJ file: v (with colours), vt, vn, f, g and usemtl. Everything else (objects, lines) is
  * skipped. Indices are checked when they are read, so that errors can name the line. One thread.
  */
 #ifndef WORKER_RENDER_SHAPE_OBJ_READ_H
@@ -20,6 +20,13 @@ struct obj_run {
 	size_t corner, triangle;  /* the first ones of the run */
 };
 
+/* The beginning of a mesh, which ends where the next one begins: the faces between two lines with `g` or `usemtl`,
+ * which therefore have one material. `o` does not begin a mesh, as in Mitsuba 0.6. */
+struct obj_mesh {
+	size_t run;		 /* its run in `runs` */
+	size_t corner, triangle; /* the first ones of the mesh */
+};
+
 struct obj_file {
 	struct list positions, uvs, normals; /* double[3], double[2], double[3] */
 	struct list colours;		     /* double[3], linear; of all positions, or only of some */
@@ -27,9 +34,10 @@ struct obj_file {
 	struct list triangles;		     /* uint32_t[3] into corners */
 	struct list runs;		     /* struct obj_run, at least one; the first may have no name */
 	struct list names;		     /* char */
+	struct list meshes;		     /* struct obj_mesh, each with faces */
 };
 
-/* The file read last. It is kept if a shape took one material of it, because the next shape usually takes another. */
+/* The file read last. It is kept if a shape took only a part of it, because the next shape usually takes another. */
 struct obj_cache {
 	char *name; /* NULL: the cache is empty */
 	struct obj_file file;

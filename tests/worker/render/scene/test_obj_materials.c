@@ -126,6 +126,39 @@ static void test_parts_are_whole(void **state)
 	scene_fini(&s);
 }
 
+/* A shape of one of the file's meshes (two of gold leaf, glass between them) has its material alone. */
+static void test_one_mesh(void **state)
+{
+	(void)state;
+	library = "newmtl gold leaf\nKd 1 0.5 0\n";
+	static const char *const materials[] = {"gold leaf", "glass", "gold leaf"};
+	for (int i = 0; i < 3; i++) {
+		char xml[512];
+		snprintf(xml, sizeof xml,
+			 "<emitter type='constant'/>" OBJ("<integer name='shapeIndex' value='%d'/>" BSDF(
+				 "name='glass'", "0.5") BSDF("name='nothing'", "0.125")),
+			 i);
+		struct scene s = read_ok(xml);
+		const struct scene_node *merge = last_shape(&s);
+		assert_string_equal(merge->type, "merge");
+		assert_int_equal(merge->child_count, 1);
+		const struct scene_node *part = merge->children[0], *bsdf = node_child(part, PLUGIN_BSDF, 0);
+		assert_string_equal(node_string(part, "material", ""), materials[i]);
+		assert_int_equal(node_int(part, "shape_index", -1), i);
+		assert_non_null(bsdf);
+		assert_true((node_float(bsdf, "reflectance", -1) == 0.5) == (i == 1));
+		scene_fini(&s);
+	}
+	/* the only named BSDF is of another mesh: this one is grey */
+	library = "";
+	struct scene s = read_ok(
+		"<emitter type='constant'/>" OBJ("<integer name='shapeIndex' value='2'/>" BSDF("name='glass'", "0.5")));
+	assert_int_equal(last_shape(&s)->child_count, 1);
+	assert_null(node_child(last_shape(&s)->children[0], PLUGIN_BSDF, 0));
+	assert_non_null(strstr(s.notes[0], "1 of the materials of d/m.obj (first: `gold leaf`) has neither"));
+	scene_fini(&s);
+}
+
 static void left_alone(const char *version, const char *content)
 {
 	struct scene s;
@@ -146,6 +179,8 @@ static void test_left_alone(void **state)
 	left_alone("0.6.0", OBJ("<boolean name='loadMaterials' value='false'/>"));
 	left_alone("0.6.0", OBJ("<boolean name='collapse' value='true'/>"));
 	left_alone("0.6.0", OBJ("<string name='material' value='glass'/>" BSDF("", "0.25")));
+	left_alone("0.6.0", OBJ("<integer name='shapeIndex' value='3'/>")); /* refused when it is built: it has 3 */
+	left_alone("0.6.0", OBJ("<integer name='shapeIndex' value='0'/>" BSDF("", "0.25")));
 	left_alone("3.0.0", OBJ(""));
 	left_alone("3.0.0", OBJ(BSDF("name='glass'", "0.25")));
 	library = "newmtl something else\n";
@@ -290,10 +325,10 @@ static void test_memory_runs_out(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_named_bsdfs),	cmocka_unit_test(test_parts_are_whole),
-		cmocka_unit_test(test_left_alone),	cmocka_unit_test(test_libraries),
-		cmocka_unit_test(test_refused),		cmocka_unit_test(test_too_many),
-		cmocka_unit_test(test_memory_runs_out),
+		cmocka_unit_test(test_named_bsdfs), cmocka_unit_test(test_parts_are_whole),
+		cmocka_unit_test(test_one_mesh),    cmocka_unit_test(test_left_alone),
+		cmocka_unit_test(test_libraries),   cmocka_unit_test(test_refused),
+		cmocka_unit_test(test_too_many),    cmocka_unit_test(test_memory_runs_out),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

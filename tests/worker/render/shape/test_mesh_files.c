@@ -335,6 +335,52 @@ static void test_bad_serialized(void **state)
 	refuses("serialized", "", g.bytes, g.size, "m: the compressed mesh is damaged");
 }
 
+/* The corners of mesh i have x = i or 9. */
+static const char obj_meshes[] = "g empty\nusemtl a\nv 0 0 0\nv 1 0 0\nv 2 0 0\nv 3 0 0\nv 9 1 0\nv 9 0 1\nv 9 1 1\n"
+				 "f 1 5 6\nf 1 5 7 6\n"						/* 0 */
+				 "g\ng again\no begins none\nf 2 5 6\no begins none\nf 2 6 5\n" /* 1 */
+				 "usemtl a\nf 3 5 6\nusemtl b\ng\nusemtl c\n"			/* 2 */
+				 "f 4 5 6\nf 4 5 6\nf 4 5 6\nf 4 5 6\nusemtl a\ng last\n";	/* 3 */
+
+static void assert_obj_mesh(const char *content, double x, uint32_t triangles)
+{
+	struct built_shape b = build("obj", content, obj_meshes, sizeof obj_meshes - 1);
+	if (b.result)
+		fail_msg("%s: %s", content, b.error.text);
+	const struct mesh *m = &b.g.mesh;
+	assert_int_equal(m->triangle_count, triangles);
+	for (uint32_t t = 0; t < triangles; t++)
+		for (int k = 0; k < 3; k++) {
+			double found = m->position[m->index[t][k]][0];
+			assert_true(x < 0 || found == x || found == 9);
+		}
+	assert_true(x < 0 || m->vertex_count <= 4);
+	built_shape_release(&b);
+}
+
+static void test_obj_meshes(void **state)
+{
+	(void)state;
+	static const uint32_t triangles[] = {3, 2, 1, 4};
+	for (int i = 0; i < 4; i++) {
+		char content[64];
+		snprintf(content, sizeof content, "<integer name='shape_index' value='%d'/>", i);
+		assert_obj_mesh(content, i, triangles[i]);
+	}
+	assert_obj_mesh("", -1, 10);
+	assert_obj_mesh("<integer name='shape_index' value='-1'/>", -1, 10);
+	assert_obj_mesh("<string name='material' value='a'/>", -1, 6);
+	assert_obj_mesh("<integer name='shape_index' value='2'/><string name='material' value='a'/>", 2, 1);
+	refuses("obj", "<integer name='shape_index' value='4'/>", obj_meshes, sizeof obj_meshes - 1,
+		"m: shape_index=4, but it holds 4 meshes, counted from 0");
+	refuses("obj", "<integer name='shape_index' value='3'/><string name='material' value='a'/>", obj_meshes,
+		sizeof obj_meshes - 1, "m: mesh 3 has no faces of the material `a`");
+	static const char one[] = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+	refuses("obj", "<integer name='shape_index' value='1'/>", one, sizeof one - 1,
+		"m: shape_index=1, but it holds 1 mesh, counted from 0");
+	refuses("obj", "<integer name='shape_index' value='0'/>", one, 24, "m: shape_index=0, but it holds 0 meshes");
+}
+
 /* Returns whether a file gives a mesh, whose indices must be in range, rather than an error. */
 static bool gives_a_mesh(const char *type, const struct mesh_file *f)
 {
@@ -453,6 +499,7 @@ int main(void)
 		cmocka_unit_test(test_concave_faces),
 		cmocka_unit_test(test_serialized),
 		cmocka_unit_test(test_serialized_attributes),
+		cmocka_unit_test(test_obj_meshes),
 		cmocka_unit_test(test_bad_ply),
 		cmocka_unit_test(test_normals_that_are_none),
 		cmocka_unit_test(test_bad_serialized),
