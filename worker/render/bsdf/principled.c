@@ -8,8 +8,11 @@
  *
  * where F interpolates by m between Fresnel's factor of the boundary and Schlick's of colour c (metal). Below the
  * surface only the boundary scatters light, with the factor (1 - m) t. A tint is c over its luminance;
- * `specular_color`, if given (an extension for glTF), replaces it with a share of 1. As in the papers, lobes are added,
- * not layered: at grazing angles, above all with sheen, the surface may reflect up to 1.5 times the light that arrives.
+ * `specular_color`, if given (an extension for glTF), replaces it with a share of 1, and `specular_strength` (an
+ * extension, KHR_materials_specular of glTF) multiplies the boundary's part of F. With these two, light from below
+ * meets the same F, at the cosine of the outer direction, and the refracted part is (1 - m) t sqrt(c) (1 - F); total
+ * reflection stays total. As in the papers, lobes are added, not layered: at grazing angles, above all with sheen, the
+ * surface may reflect up to 1.5 times the light that arrives.
  *
  * With `lambertian` (an extension for glTF, Appendix B.3.5 of its specification) the diffuse lobe is Lambertian,
  * without the light that the boundary reflects at the half vector: c / pi (1 - F).
@@ -126,7 +129,7 @@ spectrum principled_boundary(const struct principled_point *s, double cosine)
 	spectrum f;
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
 		double tinted = min_of(s->specular.v[i] * root * root, 1);
-		f.v[i] = plain + tint * (tinted + (1 - tinted) * rest);
+		f.v[i] = s->share[SPECULAR_STRENGTH] * (plain + tint * (tinted + (1 - tinted) * rest));
 	}
 	return f;
 }
@@ -198,6 +201,11 @@ static void lobe_chances(const struct principled_point *s, vec3 wo, double chanc
 	double reflected = fresnel_dielectric(min_of(fabs(wo.z), 1), below ? 1 / p->eta : p->eta).reflected, sum = 0;
 	/* Never 0: where the plane reflects totally, some facets still transmit. */
 	chance[LOBE_TRANSMIT] = glass * max_of(1 - reflected, 0.05);
+	/* The strength does not scale total reflection, which some facets may have where the plane does not. */
+	if (p->scaled)
+		reflected = below ? max_of(reflected < 1 ? reflected * s->share[SPECULAR_STRENGTH] : 1,
+					   min_of(reflected, 0.05))
+				  : reflected * s->share[SPECULAR_STRENGTH];
 	chance[LOBE_SPECULAR] = below ? glass * reflected : clear * reflected + s->metallic * max_of(p->base_max, 0.04);
 	chance[LOBE_DIFFUSE] =
 		below ? 0
@@ -240,14 +248,18 @@ static void add_refracted(const struct principled_point *s, vec3 wo, vec3 wi, do
 		return;
 	double spread = co * -ci * (eta / length) * (eta / length);
 	double seen = microfacet_d(&s->facets, h) * microfacet_g1_over_cos(&s->facets, wo) * spread;
-	double passes = (1 - s->metallic) * s->share[TRANSMISSION] *
-			fresnel_between(min_of(co, 1), min_of(-ci, 1), eta).transmitted;
+	double passes = (1 - s->metallic) * s->share[TRANSMISSION];
+	spectrum boundary = spectrum_of(0);
+	if (s->p->scaled)
+		boundary = principled_boundary(s, min_of(eta > 1 ? co : -ci, 1));
+	else
+		passes *= fresnel_between(min_of(co, 1), min_of(-ci, 1), eta).transmitted;
 	double f = seen * passes * microfacet_g1_over_cos(&s->facets, (vec3){wi.x, wi.y, fabs(wi.z)});
 	f *= 1 - coat_reflects(s, eta > 1 ? wo.z : -wi.z);
 	if (transport == TRANSPORT_RADIANCE)
 		f /= eta * eta;
 	for (int i = 0; i < SPECTRUM_LANES; i++)
-		out->f.v[i] += f * sqrt(s->base.v[i]);
+		out->f.v[i] += f * sqrt(s->base.v[i]) * (1 - boundary.v[i]);
 	out->pdf += chance * seen;
 }
 
@@ -273,13 +285,19 @@ static double reflected_pdf(const struct principled_point *s, vec3 wo, vec3 wi, 
 	return pdf;
 }
 
+/* Of light from below, at the cosine to the facet. */
+static spectrum reflected_inside(const struct principled_point *s, double cosine)
+{
+	struct fresnel f = fresnel_dielectric(cosine, 1 / s->p->eta);
+	return s->p->scaled && f.transmitted > 0 ? principled_boundary(s, f.cos_t) : spectrum_of(f.reflected);
+}
+
 static spectrum reflected_value(const struct principled_point *s, vec3 wo, vec3 wi, vec3 h, double cos_d, double seen,
 				bool below)
 {
 	double both = seen * microfacet_g1_over_cos(&s->facets, wi);
 	if (below)
-		return spectrum_of(both * (1 - s->metallic) * s->share[TRANSMISSION] *
-				   fresnel_dielectric(cos_d, 1 / s->p->eta).reflected);
+		return spectrum_scale(both * (1 - s->metallic) * s->share[TRANSMISSION], reflected_inside(s, cos_d));
 	spectrum boundary = principled_boundary(s, cos_d);
 	spectrum f = spectrum_add(spectrum_scale(both, principled_fresnel(s, boundary, cos_d)),
 				  principled_diffuse(s, boundary, wo, wi, cos_d));
@@ -409,15 +427,21 @@ double principled_least(const struct texture *t, const struct bsdf_build *build)
 int principled_shares(struct principled *p, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 		      struct error *e)
 {
-	static const char *const names[SHARES] = {
-		[TRANSMISSION] = "spec_trans",	       [SPEC_TINT] = "spec_tint",     [SHEEN] = "sheen",
-		[SHEEN_TINT] = "sheen_tint",	       [FLATNESS] = "flatness",	      [CLEARCOAT] = "clearcoat",
-		[CLEARCOAT_GLOSS] = "clearcoat_gloss", [ANISOTROPIC] = "anisotropic", [COAT] = "coat",
-		[COAT_ROUGHNESS] = "coat_roughness"};
+	static const char *const names[SHARES] = {[TRANSMISSION] = "spec_trans",
+						  [SPEC_TINT] = "spec_tint",
+						  [SHEEN] = "sheen",
+						  [SHEEN_TINT] = "sheen_tint",
+						  [FLATNESS] = "flatness",
+						  [CLEARCOAT] = "clearcoat",
+						  [CLEARCOAT_GLOSS] = "clearcoat_gloss",
+						  [ANISOTROPIC] = "anisotropic",
+						  [COAT] = "coat",
+						  [COAT_ROUGHNESS] = "coat_roughness",
+						  [SPECULAR_STRENGTH] = "specular_strength"};
 	for (int i = 0; i < SHARES; i++) {
 		p->share[i] = (struct texture){.ops = NULL};
 		if (!node_ref(n, names[i])) {
-			p->most[i] = node_float(n, names[i], 0);
+			p->most[i] = node_float(n, names[i], i == SPECULAR_STRENGTH ? 1 : 0);
 			continue;
 		}
 		int code = bsdf_number(b, &p->share[i], n, names[i], 0, build, e);
@@ -461,6 +485,7 @@ static int principled_create(struct bsdf *b, const struct scene_node *n, const s
 	if (code)
 		return code;
 	p->lambertian = node_bool(n, "lambertian", false);
+	p->scaled = p->has_specular || node_find(n, "specular_strength");
 	p->base_max = texture_max(&p->base);
 	principled_know(p, build);
 	struct microfacet least = principled_facets(p->most[ANISOTROPIC], principled_least(&p->roughness, build));
@@ -490,6 +515,7 @@ const struct bsdf_ops bsdf_ops_principled = {
 		       PRINCIPLED_SHARE("spec_tint"), PRINCIPLED_SHARE("sheen"), PRINCIPLED_SHARE("sheen_tint"),
 		       PRINCIPLED_SHARE("flatness"), PRINCIPLED_SHARE("clearcoat"), PRINCIPLED_SHARE("clearcoat_gloss"),
 		       PRINCIPLED_SHARE("anisotropic"), PRINCIPLED_SHARE("coat"), PRINCIPLED_SHARE("coat_roughness"),
+		       PRINCIPLED_SHARE("specular_strength"),
 		       {.name = "specular_color", .types = VALUE_TEXTURE, .min = 0, .max = 1},
 		       {.name = "lambertian", .types = VALUE_BOOL},
 		       {.name = "thin", .status = PARAM_REFUSED}, /* use `principledthin` instead */

@@ -18,6 +18,7 @@ enum {
 	ANISOTROPIC,
 	COAT,
 	COAT_ROUGHNESS,
+	SPECULAR_STRENGTH, /* 1 where it is not given; the others 0 */
 	SHARES
 };
 
@@ -36,6 +37,7 @@ struct principled {
 	double eta, base_max;
 	bool varies; /* some parameter other than base and specular varies over the surface or with the wavelength */
 	bool has_specular;
+	bool scaled;		       /* the boundary reflects and transmits other shares than Fresnel's */
 	bool lambertian;	       /* the diffuse lobe is Lambertian */
 	struct principled_point known; /* without colours; if `varies`, its numbers do not hold everywhere */
 };
@@ -53,7 +55,7 @@ spectrum principled_fresnel(const struct principled_point *s, spectrum boundary,
  * principled_boundary at cos_d. Both directions are above the surface. */
 spectrum principled_diffuse(const struct principled_point *s, spectrum boundary, vec3 wo, vec3 wi, double cos_d);
 
-/* Reads the shares that n has; the others are 0. Returns 0 or a negative error code. */
+/* Reads the shares that n has; the others are 0, or as said above. Returns 0 or a negative error code. */
 int principled_shares(struct principled *p, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 		      struct error *e);
 

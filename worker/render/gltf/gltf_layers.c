@@ -5,10 +5,10 @@
  * `clearcoat` reaches only a quarter of the format's. Anisotropic roughness is exact as long as the two roughnesses
  * differ by less than a factor of ten.
  *
- * Details that `principled` does not have are left out with a note: normals of a coat, textures of a sheen or of the
- * specular strength. Unknown extensions are also left out, as the format demands unless the file requires them.
- * Dispersion of anything but clear glass is left out as well; if the file requires it, it becomes a property that the
- * table does not have: refused with its name, or left out with --lenient.
+ * Details that `principled` does not have are left out with a note: normals of a coat, textures of a sheen. Unknown
+ * extensions are also left out, as the format demands unless the file requires them. Dispersion of anything but clear
+ * glass is left out as well; if the file requires it, it becomes a property that the table does not have: refused with
+ * its name, or left out with --lenient.
  */
 #include "worker/render/gltf/gltf_layers.h"
 #include "worker/render/gltf/gltf_texture.h"
@@ -40,39 +40,36 @@ static bool is_listed(const struct gltf *g, const char *list, const char *extens
 	return false;
 }
 
-/* Sets the index of refraction. In the format the reflectance at normal incidence is min(r^2 c, 1) f, where r^2 is
- * that of the index, c a colour and f a factor. Here the largest component of c, with f, is included in the index, and
- * c relative to it becomes `specular_color`. For materials that transmit light the index stays as it is. */
-static void put_index(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
+/* Sets the boundary's reflectance. In the format it is f (F0 + (1 - F0) (1 - cos)^5) with F0 = min(r^2 c, 1), where r^2
+ * is the reflectance of the index at normal incidence, f a strength and c a colour. Here f is `specular_strength`, the
+ * largest component of c's factor is included in the index, and c relative to it becomes `specular_color`. For
+ * materials that transmit light the index stays as it is, and the components of the colour are at most 1. */
+static void put_reflection(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
 {
 	const json_t *ior = gltf_extension(g, at, at->json, "KHR_materials_ior"),
 		     *specular = gltf_extension(g, at, at->json, "KHR_materials_specular"),
 		     *transmission = gltf_extension(g, at, at->json, "KHR_materials_transmission");
-	double eta = ior ? gltf_number(g, at, ior, "ior", 1.5) : 1.5, factor = 1, rgb[3] = {1, 1, 1};
+	double eta = ior ? gltf_number(g, at, ior, "ior", 1.5) : 1.5, strength = 1, rgb[3] = {1, 1, 1};
 	if (specular) {
-		factor = gltf_number(g, at, specular, "specularFactor", 1);
+		strength = fmin(fmax(gltf_number(g, at, specular, "specularFactor", 1), 0), 1);
 		gltf_numbers(g, at, specular, "specularColorFactor", rgb, 3);
-		note_members(g, specular, (const char *const[]){"specularTexture", NULL},
-			     "the specular strength of non-metals is the same everywhere: specularTexture is left out");
 	}
+	const json_t *texture = specular ? gltf_object(g, at, specular, "specularTexture") : NULL,
+		     *colour = specular ? gltf_object(g, at, specular, "specularColorTexture") : NULL;
 	double most = fmax(fmax(rgb[0], fmax(rgb[1], rgb[2])), 0);
-	const json_t *texture = specular ? gltf_object(g, at, specular, "specularColorTexture") : NULL;
-	bool coloured = most > 0 && (texture || rgb[0] != rgb[1] || rgb[1] != rgb[2]);
-	if (transmission && gltf_number(g, at, transmission, "transmissionFactor", 0) > 0 &&
-	    (factor * most != 1 || coloured)) {
-		gltf_note(g, "KHR_materials_specular is ignored for materials that transmit light");
-		factor = most = 1;
-		coloured = false;
-	}
-	/* In the format an index of 0 means total reflection. */
-	double root = eta > 0 ? fabs((eta - 1) / (eta + 1)) : 1,
-	       scaled = fmin(root * sqrt(most), 1) * sqrt(fmin(fmax(factor, 0), 1));
-	gltf_put_number(g, el, at, "eta", fmin((1 + scaled) / fmax(1 - scaled, 0.1), 10));
-	if (!coloured)
-		return;
+	bool enters = transmission && gltf_number(g, at, transmission, "transmissionFactor", 0) > 0;
+	if (enters && most > 1)
+		gltf_note(g, "specular colours above 1 of materials that transmit light count as 1");
 	for (int k = 0; k < 3; k++)
-		rgb[k] = fmax(rgb[k], 0) / most;
-	gltf_put_colour(g, el, at, "specular_color", rgb, texture);
+		rgb[k] = enters ? fmin(fmax(rgb[k], 0), 1) : fmax(rgb[k], 0) / (most > 0 ? most : 1);
+	bool coloured = (enters || most > 0) && (colour || rgb[0] != 1 || rgb[1] != 1 || rgb[2] != 1);
+	/* In the format an index of 0 means total reflection. */
+	double root = eta > 0 ? fabs((eta - 1) / (eta + 1)) : 1, scaled = fmin(root * sqrt(enters ? 1 : most), 1);
+	gltf_put_number(g, el, at, "eta", fmin((1 + scaled) / fmax(1 - scaled, 0.1), 10));
+	if (strength < 1 || texture)
+		gltf_put_share(g, el, at, "specular_strength", strength, strength > 0 ? texture : NULL, "a");
+	if (coloured)
+		gltf_put_colour(g, el, at, "specular_color", rgb, colour);
 }
 
 static void put_coat(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
@@ -192,7 +189,7 @@ void gltf_put_layers(struct gltf *g, struct xml_element *el, const struct gltf_a
 	put_sheen(g, el, at);
 	note_iridescence(g, at);
 	put_unlit(g, el, at);
-	put_index(g, el, at);
+	put_reflection(g, el, at);
 	put_coat(g, el, at);
 	put_transmission(g, el, at);
 	gltf_note_foreign(g, at);

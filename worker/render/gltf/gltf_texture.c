@@ -65,6 +65,7 @@ struct gltf_sets gltf_texture_sets(struct gltf *g, const struct gltf_at *at)
 	const json_t *gloss = gltf_extension(g, at, at->json, "KHR_materials_pbrSpecularGlossiness");
 	const json_t *through = gltf_extension(g, at, at->json, "KHR_materials_diffuse_transmission");
 	const json_t *coat = gltf_extension(g, at, at->json, "KHR_materials_clearcoat");
+	const json_t *specular = gltf_extension(g, at, at->json, "KHR_materials_specular");
 	const json_t *infos[] = {
 		json_object_get(at->json, "normalTexture"),
 		metal ? NULL : json_object_get(gloss, "diffuseTexture"),
@@ -76,7 +77,8 @@ struct gltf_sets gltf_texture_sets(struct gltf *g, const struct gltf_at *at)
 		json_object_get(through, "diffuseTransmissionColorTexture"),
 		json_object_get(coat, "clearcoatTexture"),
 		json_object_get(coat, "clearcoatRoughnessTexture"),
-		json_object_get(gltf_extension(g, at, at->json, "KHR_materials_specular"), "specularColorTexture")};
+		json_object_get(specular, "specularTexture"),
+		json_object_get(specular, "specularColorTexture")};
 	struct gltf_sets sets = {{0, 0}, 0};
 	for (size_t i = 0; i < sizeof infos / sizeof *infos && sets.count < 2; i++) {
 		uint64_t own = infos[i] ? set_of(g, at, infos[i]) : 0;

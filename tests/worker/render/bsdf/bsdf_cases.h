@@ -86,6 +86,10 @@ static const char *const bsdf_cases[] = {
 	"principled base_color=rgb(0.8,0.3,0.1) roughness=0.4 spec_trans=0.3 | @metallic checkerboard color0=0.2 color1=0.9",
 	"principled base_color=rgb(0.9,0.8,0.7) roughness=0.4 spec_trans=1 eta=1.6",
 	"principled base_color=rgb(0.2,0.8,0.7) roughness=0.5 spec_trans=0.6 metallic=0.2 clearcoat=0.5 anisotropic=0.4",
+	"principled base_color=rgb(0.8,0.3,0.1) roughness=0.4 lambertian=true specular_strength=0.3 coat=0.4",
+	"principled base_color=rgb(0.9,0.8,0.7) roughness=0.4 spec_trans=1 eta=1.6 specular_strength=0",
+	"principled base_color=0.9 roughness=0.5 spec_trans=0.7 specular_color=rgb(0.9,0.2,0.6) | @specular_strength "
+	"checkerboard color0=0.1 color1=0.8",
 	"principledthin",
 	"principledthin base_color=rgb(0.8,0.3,0.1) roughness=0.4 spec_trans=0.6 diff_trans=1.2 anisotropic=0.3",
 	"principledthin base_color=0.9 roughness=0.5 spec_trans=1 eta=1.8",

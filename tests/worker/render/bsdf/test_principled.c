@@ -223,6 +223,90 @@ static void test_specular_color(void **state)
 		     "principled base_color=0.7 roughness=0.4 specular_color=0.3", 0, 1);
 }
 
+static double value(const char *text, vec3 wo, vec3 wi);
+
+/* Returns F of KHR_materials_specular for an index of 1.6, a strength of 0.4 and a colour of 0.5. */
+static double scaled_schlick(double cosine)
+{
+	double f0 = 0.5 * (0.6 / 2.6) * (0.6 / 2.6);
+	return 0.4 * (f0 + (1 - f0) * pow(1 - cosine, 5));
+}
+
+static double unscaled(double cosine)
+{
+	double t = sqrt(1 - (1 - cosine * cosine) / (1.6 * 1.6));
+	double s = (cosine - 1.6 * t) / (cosine + 1.6 * t), p = (t - 1.6 * cosine) / (t + 1.6 * cosine);
+	return 0.5 * (s * s + p * p);
+}
+
+/* Compares reflection and refraction by glass, on either side, with those of `roughdielectric`: reflection is
+ * multiplied by F over Fresnel's factor, refraction by 1 - F over 1 minus that factor, both at the outer cosine to the
+ * half vector. Reflection is total where that cosine does not exist. */
+static void test_specular_strength_of_glass(void **state)
+{
+	(void)state;
+	static const char scaled[] =
+		"principled base_color=1 roughness=0.5 spec_trans=1 eta=1.6 specular_strength=0.4 specular_color=0.5",
+			  glass[] = "roughdielectric alpha=0.25 distribution=ggx int_ior=1.6 ext_ior=1";
+	int total = 0, passed = 0, inside = 0;
+	for (int i = 0; i < 400; i++) {
+		vec3 wo = direction(0.05 + 0.9 * (i % 20) / 20, 0.4),
+		     wi = direction(0.05 + 0.9 * (i / 20) / 20, 0.2 + 2.7 * i);
+		bool below = i % 2, refracts = i % 3 == 0;
+		wo.z = below ? -wo.z : wo.z;
+		wi.z = below != refracts ? -wi.z : wi.z;
+		double bare = value(glass, wo, wi), got = value(scaled, wo, wi), cosine;
+		if (refracts) {
+			vec3 out = below ? wi : wo, in = below ? wo : wi,
+			     h = vec3_normalize(vec3_madd(vec3_scale(1.6, in), 1, out));
+			cosine = fabs(vec3_dot(out, h));
+		} else {
+			double c2 = (1 + vec3_dot(wo, wi)) / 2, s2 = (1 - c2) * (below ? 1.6 * 1.6 : 1);
+			cosine = s2 < 1 ? sqrt(1 - s2) : -1;
+		}
+		double f = cosine < 0 ? 1 : scaled_schlick(cosine), of_glass = cosine < 0 ? 1 : unscaled(cosine);
+		double want = bare * (refracts ? (1 - f) / (1 - of_glass) : f / of_glass);
+		if (!(fabs(got - want) <= 1e-9 * want))
+			fail_msg("from %g to %g: %.17g is not %.17g", wo.z, wi.z, got, want);
+		total += cosine < 0 && bare > 0;
+		passed += refracts && bare > 0;
+		inside += below && !refracts && cosine >= 0 && bare > 0;
+	}
+	assert_true(total > 10 && passed > 10 && inside > 10);
+}
+
+/* Facets that reflect totally are sampled even if the boundary reflects no light otherwise. */
+static void test_total_reflection_is_sampled(void **state)
+{
+	(void)state;
+	struct arena a = {0};
+	struct bsdf b;
+	int seen = 0;
+	bsdf_make(&a, "principled base_color=1 roughness=0.9 spec_trans=1 eta=1.6 specular_strength=0", &b);
+	for (int i = 0; i < 400; i++) {
+		vec3 wo = direction(-0.81 - 0.009 * (i % 20), 0.4), wi = direction(-0.05 - 0.04 * (i / 20), 3.5);
+		double f = b.ops->eval(&b, &point, wo, wi).v[0], pdf = b.ops->pdf_solid(&b, &point, wo, wi);
+		assert_true(f == 0 || pdf > 0.01 * f);
+		seen += f > 0;
+	}
+	assert_true(seen > 20);
+	arena_fini(&a);
+}
+
+/* Above a black base only the boundary reflects: the strength multiplies its values. */
+static void test_specular_strength(void **state)
+{
+	(void)state;
+	expect_equal("principled base_color=0 roughness=0.4 eta=1.7 specular_strength=0.3",
+		     "principled base_color=0 roughness=0.4 eta=1.7", 0, 0.3);
+	expect_equal("principled base_color=0.7 roughness=0.4 lambertian=true specular_strength=0",
+		     "diffuse reflectance=0.7", 0, 1);
+	expect_equal("principled base_color=0.7 metallic=1 specular_strength=0", "principled base_color=0.7 metallic=1",
+		     0, 1);
+	expect_equal("principled spec_trans=0.5 roughness=0.4 | @specular_strength checkerboard color0=0.25 color1=1",
+		     "principled spec_trans=0.5 roughness=0.4 specular_strength=0.25", 1, 1);
+}
+
 /* A texture with one value is equivalent to the number, and a varying one to the number at each point. */
 static void test_metallic_texture(void **state)
 {
@@ -231,9 +315,9 @@ static void test_metallic_texture(void **state)
 		"principled base_color=rgb(0.8,0.3,0.1) roughness=0.4 | @metallic checkerboard color0=0.7 color1=0.7",
 		"principled base_color=rgb(0.8,0.3,0.1) roughness=0.4 metallic=0.7", 0, 1);
 	/* each of the shares, and the roughness of the facets used with it */
-	static const char *const shares[] = {"spec_trans", "spec_tint",	    "sheen",	       "sheen_tint",
-					     "flatness",   "clearcoat",	    "clearcoat_gloss", "anisotropic",
-					     "coat",	   "coat_roughness"};
+	static const char *const shares[] = {
+		"spec_trans",	   "spec_tint",	  "sheen", "sheen_tint",     "flatness",	 "clearcoat",
+		"clearcoat_gloss", "anisotropic", "coat",  "coat_roughness", "specular_strength"};
 	for (size_t i = 0; i < sizeof shares / sizeof *shares; i++) {
 		static const char base[] = "base_color=rgb(0.8,0.3,0.1) roughness=0.4";
 		const char *with = strcmp(shares[i], "sheen_tint") == 0	       ? "sheen=0.5"
@@ -424,6 +508,9 @@ int main(void)
 		cmocka_unit_test(test_clearcoat),
 		cmocka_unit_test(test_all_together),
 		cmocka_unit_test(test_specular_color),
+		cmocka_unit_test(test_specular_strength),
+		cmocka_unit_test(test_total_reflection_is_sampled),
+		cmocka_unit_test(test_specular_strength_of_glass),
 		cmocka_unit_test(test_coat),
 		cmocka_unit_test(test_coat_on_glass),
 		cmocka_unit_test(test_specular_is_an_index),

@@ -225,23 +225,28 @@ static void test_materials(void **state)
 	scene_fini(&s);
 }
 
-/* What reflects at normal incidence is min(r^2 c, 1) f; a colour is its largest component times `specular_color`; glass
- * keeps its index. */
+/* What reflects at normal incidence is min(r^2 c, 1) f: f is the strength, and a colour its largest component, which
+ * the index has, times `specular_color`. Glass keeps its index. */
+#define R2 ((0.75 / 2.75) * (0.75 / 2.75))
 static void test_reflection(void **state)
 {
 	(void)state;
+	/* of the cases below */
+	static const double of_others[3] = {0, 1, 0.5}, of_glass[][3] = {[3] = {0, 0, 0}, [4] = {0, 1, 1}};
 	static const struct {
 		const char *members;
-		double ior, want;
-		const char *colour; /* "rgb", or the type of a texture; NULL: none */
+		double ior, want, strength;    /* want: the square of the index's r; strength: -1: a texture */
+		const char *colour, *of_glass; /* "rgb", or the type of a texture; NULL: none */
 	} files[] = {
-		{"\"specularFactor\": 0.5", 1.75, 0.5 * (0.75 / 2.75) * (0.75 / 2.75), NULL},
-		{"\"specularColorFactor\": [2, 2, 2]", 1.75, 2 * (0.75 / 2.75) * (0.75 / 2.75), NULL},
-		{"\"specularColorFactor\": [100, 100, 100], \"specularFactor\": 0.25", 1.75, 0.25, NULL},
-		{"\"specularColorFactor\": [0, 0, 0]", 1.5, 0, NULL},
-		{"\"specularColorFactor\": [0, 2, 1], \"specularFactor\": 0.5", 1.5, 2 * 0.5 * 0.04, "rgb"},
-		{"\"specularColorTexture\": {\"index\": 0}", 1.5, 0.04, "bitmap"},
-		{"\"specularTexture\": {\"index\": 0}", 1.5, 0.04, NULL},
+		{"\"specularFactor\": 0.5", 1.75, R2, 0.5, NULL, NULL},
+		{"\"specularColorFactor\": [2, 2, 2]", 1.75, 2 * R2, 1, NULL, NULL},
+		{"\"specularColorFactor\": [100, 100, 100], \"specularFactor\": 0.25", 1.75, 1 / 1.21 * 0.81, 0.25,
+		 NULL, NULL},
+		{"\"specularColorFactor\": [0, 0, 0]", 1.5, 0, 1, NULL, "rgb"},
+		{"\"specularColorFactor\": [0, 2, 1], \"specularFactor\": 0.5", 1.5, 2 * 0.04, 0.5, "rgb", "rgb"},
+		{"\"specularColorTexture\": {\"index\": 0}", 1.5, 0.04, 1, "bitmap", "bitmap"},
+		{"\"specularTexture\": {\"index\": 0}", 1.5, 0.04, -1, NULL, NULL},
+		{"\"specularTexture\": {\"index\": 0}, \"specularFactor\": 0", 1.5, 0.04, 0, NULL, NULL},
 	};
 	for (size_t i = 0; i < sizeof files / sizeof files[0]; i++)
 		for (int glass = 0; glass < 2; glass++) {
@@ -254,17 +259,22 @@ static void test_reflection(void **state)
 			const struct scene_node *bsdf =
 				scene_named(&s, glass ? "bsdf of materials[2]" : "bsdf of materials[3]");
 			const struct property *colour = node_find(bsdf, "specular_color");
-			const char *want = glass ? NULL : files[i].colour;
+			const char *want = glass ? files[i].of_glass : files[i].colour;
 			double eta = node_float(bsdf, "eta", 0), root = (eta - 1) / (eta + 1);
-			assert_near(root * root, glass ? (0.75 / 2.75) * (0.75 / 2.75) : files[i].want);
+			assert_near(root * root, glass ? R2 : files[i].want);
 			assert_true((colour != NULL) == (want != NULL));
 			if (want && strcmp(want, "rgb") == 0)
-				assert_true(colour->value.as.rgb[0] == 0 && colour->value.as.rgb[1] == 1 &&
-					    colour->value.as.rgb[2] == 0.5);
+				for (int k = 0; k < 3; k++)
+					assert_true(colour->value.as.rgb[k] == (glass ? of_glass[i][k] : of_others[k]));
 			else if (want)
 				assert_string_equal(node_ref(bsdf, "specular_color")->type, want);
-			assert_true(scene_has_note(&s, "specularTexture is left out") == (i == 6));
-			assert_true(scene_has_note(&s, "KHR_materials_specular is ignored for") == (glass && i < 6));
+			if (files[i].strength < 0)
+				assert_string_equal(node_string(node_ref(bsdf, "specular_strength"), "channel", ""),
+						    "a");
+			else
+				assert_near(node_float(bsdf, "specular_strength", 1), files[i].strength);
+			assert_true(scene_has_note(&s, "specular colours above 1") ==
+				    (glass && (i == 1 || i == 2 || i == 4)));
 			scene_fini(&s);
 		}
 }
@@ -360,7 +370,8 @@ static void test_no_material(void **state)
 		s = gltf_files_packed(&f, GLTF_EXTERNAL);
 		const struct scene_node *bsdf = scene_named(&s, "bsdf of materials[4]");
 		assert_true(node_float(bsdf, "metallic", -1) == (blender ? 0 : 1));
-		assert_near(node_float(bsdf, "eta", 0), blender ? 1 : 1.5);
+		assert_near(node_float(bsdf, "eta", 0), 1.5);
+		assert_true(node_float(bsdf, "specular_strength", 1) == (blender ? 0 : 1));
 		scene_fini(&s);
 	}
 }
