@@ -287,7 +287,7 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 	if (!r)
 		r = nesting_take(&d->nesting, d->node->cls, el, target, once, m->error);
 	if (r)
-		return r;
+		return r == -E2BIG && m->resumed ? REPORT_TOLD : r;
 	if (p && (r = over_one_texture(&m->notes, d->node->cls, p, m->lenient, m->arena, target, &child)))
 		return r;
 	if (p)
@@ -511,8 +511,15 @@ int maker_node(struct maker *m, struct xml_element *el, const struct scene_node 
 		return xml_error(el, m->error, ELOOP, "refers to itself");
 	if (el->told)
 		return REPORT_TOLD;
-	if (m->depth >= XML_DEPTH_MAX)
-		return xml_error(el, m->error, ELOOP, "objects refer to each other more than %d deep", XML_DEPTH_MAX);
+	if (m->depth == 0)
+		m->resumed = el->deep;
+	if (m->depth >= XML_DEPTH_MAX) {
+		bool said = el->deep || m->resumed;
+		el->deep = true;
+		return said ? REPORT_TOLD
+			    : xml_error(el, m->error, ELOOP, "objects refer to each other more than %d deep",
+					XML_DEPTH_MAX);
+	}
 	el->told = true; /* reset on success */
 	enum plugin_class cls;
 	plugin_class_find(el->name, &cls);

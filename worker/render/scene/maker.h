@@ -30,6 +30,7 @@ struct maker {
 	struct asset_list assets;
 	uint64_t objects; /* objects made so far, with all references followed; limited by nesting.h */
 	int depth;
+	bool resumed; /* what is read now was too deep before: a second sentence would tell nothing new */
 	uint32_t flawed_count;
 	const struct scene_node **flawed; /* like scene.flawed */
 	uint32_t flat_shapes;		  /* number of shapes left out because their transforms have no inverse */

@@ -9,6 +9,7 @@
 
 #include "common/base/error.h"
 #include "worker/render/plugin/param.h"
+#include "worker/render/scene/report.h"
 #include "worker/render/xml/xml.h"
 
 #define NESTING_HEIGHT_MAX 8192
@@ -17,12 +18,13 @@
 
 /* Adds `taken`, which has been made, to the contents of `owner`, an object of class `cls`; `el` is the element
  * inside the owner that names it. once: `taken` is built once for all its owners, and adds only depth. Returns -E2BIG
- * with a sentence if a limit is exceeded; `owner` is then unchanged. */
+ * with a sentence if a limit is exceeded. `owner` is then marked as beyond the limits, and taking it returns
+ * REPORT_TOLD, without another sentence. */
 int nesting_take(struct xml_nesting *owner, enum plugin_class cls, const struct xml_element *el,
 		 const struct xml_element *taken, bool once, struct error *e);
 
 /* Adds an object with its contents to the scene's number of objects, once per element. Returns -E2BIG with a
- * sentence if there are too many. */
+ * sentence the first time that there are too many, then REPORT_TOLD, also for an object beyond the limits. */
 int nesting_count(uint64_t *objects, struct xml_element *el, struct error *e);
 
 #endif

@@ -18,6 +18,7 @@ struct xml_attribute {
 /* What an object contains when all references are followed, itself included (nesting.h). */
 struct xml_nesting {
 	uint32_t height;
+	bool beyond; /* the limits are exceeded, and the other members no longer count */
 	uint64_t objects;
 };
 
@@ -37,6 +38,7 @@ struct xml_element {
 	bool busy, told; /* for the interpreter: busy: being made into a node; told: cannot be made into one, which has
 			    been reported */
 	bool counted;	 /* for the interpreter: included in the scene's count of objects */
+	bool deep;	 /* for the interpreter: a reference to it is too deep, which has been reported */
 };
 
 /* The value of a property that stands for a member of a glTF file without a counterpart here. */

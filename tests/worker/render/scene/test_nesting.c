@@ -140,6 +140,45 @@ static void test_chains(void **state)
 	}
 }
 
+/* However long the chain is, and although each object in it is also read by itself. */
+static void expect_one(const char *sentence)
+{
+	const struct memory_file files[] = {{"s.xml", xml, used}, {0}};
+	struct asset_source assets = memory_assets(files);
+	struct scene s;
+	struct error e;
+	if (scene_read_all(&s, &assets, "s.xml", render_plugins(), NULL, 0, false, &e))
+		fail_msg("%s", e.text);
+	if (s.problem_count != 1 || !strstr(s.problems[0], sentence))
+		fail_msg("%u problems, not one: %s\n%s\n not: %s", s.problem_count, s.problems[0],
+			 s.problem_count > 1 ? s.problems[1] : "", sentence);
+	scene_fini(&s);
+}
+
+static void test_limits_are_told_once(void **state)
+{
+	(void)state;
+	nest_elements("shape", "merge", "merge", 20000, 1, "");
+	put("</scene>");
+	expect_one("s.xml:8194: <ref>: objects are nested more than 8192 deep");
+	nest_elements("bsdf", "blendbsdf", "diffuse", 200, 2, "");
+	put("</scene>");
+	expect_one("s.xml:18: <ref>: makes a bsdf of more than 65536 objects");
+	nest_elements("shape", "merge", "merge", 25, 2, "");
+	for (int i = 0; i < 100; i++)
+		put("<shape type='merge'><ref id='m25'/></shape>\n");
+	put("</scene>");
+	expect_one("the scene has more than 67108864 objects");
+	/* each refers to the next, the last within the limit twice to that beyond: the first leads to all others */
+	used = 0;
+	put("<scene version='3.0.0'>\n");
+	for (int i = 0; i < 1000; i++)
+		put("<shape type='merge' id='m%d'><ref id='m%d'/>%s</shape>\n", i, i + 1,
+		    i == 63 ? "<ref id='m64'/>" : "");
+	put("<shape type='merge' id='m1000'/></scene>");
+	expect_one("s.xml:66: <shape type=\"merge\">: objects refer to each other more than 64 deep");
+}
+
 /* The deepest that is accepted can be built and forgotten: what follows references recurses. */
 static void test_the_deepest_is_built(void **state)
 {
@@ -282,6 +321,7 @@ int main(void)
 		cmocka_unit_test(test_instances),
 		cmocka_unit_test(test_shared_materials),
 		cmocka_unit_test(test_chains),
+		cmocka_unit_test(test_limits_are_told_once),
 		cmocka_unit_test(test_the_deepest_is_built),
 		cmocka_unit_test(test_includes),
 		cmocka_unit_test(test_includes_in_a_row),
