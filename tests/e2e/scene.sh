@@ -32,7 +32,7 @@ done
 [ "$(grep -c 'type="irawan"' "$DIR/out")" = 1 ] || fail "one unknown material is complained of more than once: $(cat "$DIR/out")"
 grep -q "^$DIR/bad.xml: 6 problems" "$DIR/out" || fail "it does not sum up: $(tail -n 1 "$DIR/out")"
 code 1 "$BIN/hslt-render" "$DIR/bad.xml" -o "$DIR/bad.exr"
-grep -q "bad.xml:3.*and 5 more: hslt-scene check lists them" "$DIR/err.log" || fail "a render says: $(cat "$DIR/err.log")"
+grep -q "bad.xml:3.*and at least 5 more: hslt-scene check lists all" "$DIR/err.log" || fail "a render says: $(cat "$DIR/err.log")"
 
 # What only building finds is listed in the same run, in the order of lines, but nothing that only follows from what the reader has found.
 cat >"$DIR/deep.xml" <<'XML'
@@ -95,11 +95,11 @@ XML
 code 1 "$BIN/hslt-scene" check "$DIR/order.xml"
 [ "$(sed -n 's/^\/.*\/order.xml:\([0-9]*\): .*/\1/p' "$DIR/out" | tr '\n' ' ')" = "2 3 4 5 " ] || fail "not in the order of lines: $(cat "$DIR/out")"
 code 1 "$BIN/hslt-render" "$DIR/order.xml" -o "$DIR/bad.exr"
-grep -q "order.xml:3.*and 3 more: hslt-scene check lists them" "$DIR/err.log" || fail "of files that are not there a render says: $(cat "$DIR/err.log")"
+grep -q "order.xml:3.*and at least 3 more: hslt-scene check lists all" "$DIR/err.log" || fail "of files that are not there a render says: $(cat "$DIR/err.log")"
 sed '/radios/d' "$DIR/order.xml" >"$DIR/missing.xml"
 for program in "hslt-render" "hslt-submit --coordinator 127.0.0.1:9"; do
 	"$BIN"/$program "$DIR/missing.xml" -o "$DIR/bad.exr" --spp 1 >"$DIR/out" 2>"$DIR/err.log" && fail "$program: without the meshes"
-	grep -q "missing.xml:2.*none.obj.*and 1 more: hslt-scene check lists them" "$DIR/err.log" || fail "$program says: $(cat "$DIR/err.log")"
+	grep -q "missing.xml:2.*none.obj.*and at least 1 more: hslt-scene check lists all" "$DIR/err.log" || fail "$program says: $(cat "$DIR/err.log")"
 done
 
 # A message begins with a file that can be opened from here; the notes in images do not.

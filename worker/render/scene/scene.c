@@ -281,7 +281,7 @@ static void say_more(uint32_t more, int code, struct error *e)
 	if (!e || more == 0)
 		return;
 	first = *e;
-	error_set(e, -code, "%.900s (and %u more: hslt-scene check lists them)", first.text, more);
+	error_set(e, -code, "%.900s (and at least %u more: hslt-scene check lists all)", first.text, more);
 }
 
 int scene_missing(const struct scene *s, const struct asset_source *assets, int code, struct error *e)

@@ -536,7 +536,7 @@ static void test_missing_files_count(void **state)
 	struct error e;
 	assert_int_equal(read_files(memory, &e), -EINVAL);
 	assert_non_null(strstr(e.text, "s.xml:2: <shape type=\"cone\">"));
-	assert_non_null(strstr(e.text, "(and 2 more: hslt-scene check lists them)"));
+	assert_non_null(strstr(e.text, "(and at least 2 more: hslt-scene check lists all)"));
 }
 
 int main(void)

@@ -488,7 +488,7 @@ static void test_every_problem_is_told(void **state)
 	scene_fini(&s);
 	assert_int_equal(scene_read(&s, &assets, "s.xml", scene_tables(), NULL, 0, &e), -EINVAL);
 	assert_non_null(strstr(e.text, want[0]));
-	assert_non_null(strstr(e.text, "(and 2 more: hslt-scene check lists them)"));
+	assert_non_null(strstr(e.text, "(and at least 2 more: hslt-scene check lists all)"));
 }
 
 /* 0.6 has two names for a diffuse surface's colour; 3.x has one. */
