@@ -69,6 +69,19 @@ code=0
 interrupted "$DIR/again" 'bootstrap .* [0-9]*[2-9][.][0-9] %' "$@" || code=$?
 [ $code -eq 1 ] && [ -s "$DIR/start.exr.bootstrap" ] || fail "Ctrl-C after continuing: $code, $(cat -v "$DIR/again" | tail -c 400)"
 
+# Before a lease of it is finished there is nothing to keep, which is said with what would help, and that does.
+for when in "1:scene built" "64:bootstrap .* ([1-9][0-9]*[.]|0[.][1-9])[0-9]* %"; do
+	code=0 parts=${when%%:*}
+	interrupted "$DIR/early" "${when#*:}" "$BIN/hslt-render" "$BOX" --size 32x24 --integrator pssmlt --bootstrap 4M --mutations 1000 \
+		--parts $parts --threads 1 -o "$DIR/early.exr" || code=$?
+	case $parts in
+	1) words="interrupted.*nothing is kept: of the 16 leases of the bootstrap none was finished.*--parts" ;;
+	64) words="interrupted.* of 1024 leases of the bootstrap are kept in $DIR/early.exr.bootstrap" ;;
+	esac
+	[ $code -eq 1 ] && [ ! -e "$DIR/early.exr" ] && tr -d '\r\n' <"$DIR/early" | grep -q "$words" ||
+		fail "Ctrl-C at the beginning of the bootstrap, --parts $parts: $code, $(cat -v "$DIR/early" | tail -c 500)"
+done
+
 start_coordinator
 "$BIN/hslt-submit" "$BOX" --size 32x24 --integrator path --spp 4 -o later.exr --wait 2>"$DIR/wait.log" >"$DIR/id" &
 WAITS=$!

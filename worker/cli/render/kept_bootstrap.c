@@ -153,8 +153,16 @@ void kept_bootstrap_write(struct kept_bootstrap *k, const struct bootstrap *b)
 	char path[KEPT_PATH];
 	struct error e;
 	uint32_t done = bootstrap_done(b);
-	k->said[0] = 0;
-	if (!k->path[0] || done == 0)
+	if (done == 0)
+		snprintf(
+			k->said, sizeof k->said,
+			"; nothing is kept: of the %u leases of the bootstrap none was finished, which smaller ones are "
+			"sooner (more --parts, or a smaller --bootstrap)",
+			bootstrap_missing(b));
+	else if (!k->path[0])
+		snprintf(k->said, sizeof k->said,
+			 "; nothing is kept: the bootstrap can be only beside an image in a file (-o)");
+	if (done == 0 || !k->path[0])
 		return;
 	snprintf(path, sizeof path, "%.*s.new", KEPT_PATH - 8, k->path);
 	if (write_file(k, path, b, &e))

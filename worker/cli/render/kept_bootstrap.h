@@ -32,7 +32,7 @@ struct kept_bootstrap {
 	char path[KEPT_PATH];		  /* "": nothing can be kept */
 	char text[KEPT_TEXT];		  /* fingerprint, plan and defines */
 	bool resumed;			  /* leases were added from the file */
-	char said[KEPT_PATH + 256];	  /* set by kept_bootstrap_write: the end of a sentence for the user, or "" */
+	char said[KEPT_PATH + 256];	  /* set by kept_bootstrap_write: the end of a sentence for the user */
 };
 
 /* Returns a source that opens the files of `inner` and adds them to the checksum. k and inner must outlive it. */

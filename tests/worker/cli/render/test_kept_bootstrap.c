@@ -344,7 +344,7 @@ static void test_bytes_of_none(void **state)
 	}
 }
 
-/* Where there is no file beside the image, nothing is kept, and nothing is promised. */
+/* Where there is no file beside the image, nothing is kept, which is said; as it is before anything is finished. */
 static void test_no_place(void **state)
 {
 	(void)state;
@@ -352,7 +352,13 @@ static void test_no_place(void **state)
 	struct trial t = trial_of(w, 1, "scene", STOP_AFTER);
 	snprintf(t.image, sizeof t.image, "/dev/stdout");
 	assert_null(render(w, &t));
-	assert_string_equal(t.kept.said, "");
+	assert_non_null(strstr(t.kept.said, "; nothing is kept: the bootstrap can be only beside an image in a file"));
+	struct trial early = trial_of(w, 1, "scene", 0);
+	atomic_store(&early.stop, true);
+	assert_null(render(w, &early));
+	assert_non_null(
+		strstr(early.kept.said, "; nothing is kept: of the 16 leases of the bootstrap none was finished"));
+	assert_false(is_there("image.exr.bootstrap"));
 	struct trial gone = trial_of(w, 1, "scene", STOP_AFTER);
 	snprintf(gone.image, sizeof gone.image, "%s/nowhere/image.exr", folder);
 	assert_null(render(w, &gone));
