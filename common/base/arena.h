@@ -9,16 +9,29 @@
 #include <stddef.h>
 
 struct arena_block;
+struct arena_shares;
 struct arena {
 	struct arena_block *blocks;
-	size_t used;  /* bytes handed out */
-	size_t limit; /* bytes that may be handed out at most; 0: unlimited */
+	size_t used;		     /* bytes handed out */
+	size_t limit;		     /* bytes that may be handed out at most; 0: unlimited */
+	struct arena_shares *shares; /* NULL: nothing is shared */
 };
 
 /* Returns room for `count` items of `size` bytes; NULL if memory is out or the limit is reached. */
 void *arena_alloc(struct arena *a, size_t count, size_t size);
 /* Returns a copy of s; NULL as for arena_alloc. */
 char *arena_strdup(struct arena *a, const char *s);
+
+/* Bytes that the arena holds once, however often arena_share is called with them. They must not be changed. */
+struct arena_share {
+	const void *bytes;
+	size_t size;
+	void *user; /* for the caller's use; NULL at first */
+};
+/* Returns a copy of the bytes, or an earlier copy of equal ones; among very many copies that differ in few bytes only
+ * some are found. NULL as for arena_alloc. */
+struct arena_share *arena_share(struct arena *a, const void *bytes, size_t size);
+
 /* Frees all blocks; the arena is then empty and has no limit. */
 void arena_fini(struct arena *a);
 

@@ -124,17 +124,29 @@ static int read_pairs(const struct xml_element *el, const char *text, const char
 	return check_table(el, out, e);
 }
 
+/* A file is read once, however often the scene names it. */
 static int read_file(const struct xml_element *el, const char *name, const struct asset_source *assets,
 		     struct arena *arena, struct value *out, struct error *e)
 {
 	struct asset a;
 	struct error inner;
+	struct arena_share *known = arena_share(arena, name, strlen(name) + 1);
+	struct value *kept = known ? known->user : NULL;
+	if (kept) {
+		*out = *kept;
+		return 0;
+	}
 	int r = assets->open(assets->user, name, &a, &inner);
 	if (r)
 		return xml_error(el, e, -r, "%s", inner.text);
 	const char *text = (const char *)a.bytes;
 	r = read_pairs(el, a.size ? text : "", a.size ? text + a.size : "", ' ', arena, out, e);
 	assets->close(assets->user, &a);
+	kept = known && !r ? arena_alloc(arena, 1, sizeof *kept) : NULL;
+	if (kept) {
+		*kept = *out;
+		known->user = kept;
+	}
 	return r;
 }
 

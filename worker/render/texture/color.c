@@ -242,12 +242,12 @@ static int color_from_table(const struct value *v, enum color_role role, struct 
 		if (i && !(nm > v->as.spectrum.nm[i - 1]))
 			return error_set(e, EINVAL, "the wavelengths of a spectrum must increase");
 	}
-	double *copy = arena_alloc(arena, (size_t)n * 2, sizeof *copy);
-	if (!copy)
+	/* Once for all the materials that refer to it or repeat it. */
+	const struct arena_share *nm = arena_share(arena, v->as.spectrum.nm, n * sizeof(double)),
+				 *value = arena_share(arena, v->as.spectrum.value, n * sizeof(double));
+	if (!nm || !value)
 		return error_set(e, ENOMEM, "out of memory for a spectrum of %u values", n);
-	memcpy(copy, v->as.spectrum.nm, n * sizeof *copy);
-	memcpy(copy + n, v->as.spectrum.value, n * sizeof *copy);
-	*out = color_of_table(n, copy, copy + n, role != COLOR_UNBOUNDED, role != COLOR_ILLUMINANT);
+	*out = color_of_table(n, nm->bytes, value->bytes, role != COLOR_UNBOUNDED, role != COLOR_ILLUMINANT);
 	for (int k = 0; k < 3 && role == COLOR_REFLECTANCE; k++)
 		out->rgb[k] = fmin(out->rgb[k], 1);
 	return 0;

@@ -53,6 +53,10 @@ static void test_files(void **state)
 	assert_int_equal(scene.asset_count, 1);
 	assert_string_equal(scene.assets[0], "a.spd");
 	scene_fini(&scene);
+	/* Once for all that name it. */
+	v = eta_of("3.0.0", "<spectrum name='eta' filename='a.spd'/><spectrum name='k' filename='a.spd'/>");
+	assert_ptr_equal(v->as.spectrum.value, node_find(scene.objects[0], "k")->value.as.spectrum.value);
+	scene_fini(&scene);
 	/* Found in the second folder, and known by that name from then on. */
 	v = eta_of("0.6.0", "<spectrum name='eta' filename='b.spd'/>");
 	assert_true(value_at(v, 500) == 0.25);

@@ -349,6 +349,34 @@ static double by_search(const double *nm, const double *x, uint32_t n, double at
 	return x[n - 1];
 }
 
+/* Equal spectra have one table, however many materials have them. */
+static void test_equal_tables_are_one(void **state)
+{
+	(void)state;
+	enum { POINTS = 60000, COLOURS = 1000 };
+	static double nm[POINTS], value[2][POINTS];
+	struct arena a = {0};
+	struct error e;
+	struct color first, c;
+	for (int i = 0; i < POINTS; i++) {
+		nm[i] = 360 + 0.008 * i;
+		value[0][i] = value[1][i] = i % 7 / 7.0;
+	}
+	struct value v = {.type = VALUE_SPECTRUM, .as.spectrum = {.count = POINTS, .nm = nm, .value = value[0]}};
+	assert_int_equal(color_from_value(&v, COLOR_REFLECTANCE, &a, &first, &e), 0);
+	for (int i = 0; i < COLOURS; i++) {
+		v.as.spectrum.value = value[i % 2];
+		assert_int_equal(color_from_value(&v, COLOR_REFLECTANCE, &a, &c, &e), 0);
+		assert_true(c.nm == first.nm && c.value == first.value);
+	}
+	assert_true(a.used < 3 * sizeof nm);
+	value[1][POINTS / 3] = 0.75;
+	v.as.spectrum.value = value[1];
+	assert_int_equal(color_from_value(&v, COLOR_REFLECTANCE, &a, &c, &e), 0);
+	assert_true(c.nm == first.nm && c.value != first.value && c.value[POINTS / 3] == 0.75);
+	arena_fini(&a);
+}
+
 /* Equidistant tables, one with intervals of all sizes, and one with samples that nearly coincide. */
 static void test_two_tables_at_once(void **state)
 {
@@ -419,6 +447,7 @@ int main(void)
 		cmocka_unit_test(test_few_wavelengths),
 		cmocka_unit_test(test_tables),
 		cmocka_unit_test(test_two_tables_at_once),
+		cmocka_unit_test(test_equal_tables_are_one),
 		cmocka_unit_test(test_bad_values_are_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

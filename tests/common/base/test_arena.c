@@ -1,0 +1,81 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Arenas: bytes that are asked for again are the same ones, if all of them are equal; and the limit holds for them. */
+#include "common/base/arena.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { SIZE = 4096 };
+
+static void test_equal_bytes_are_shared(void **state)
+{
+	(void)state;
+	struct arena a = {0};
+	static unsigned char bytes[SIZE], other[SIZE];
+	const struct arena_share *first = arena_share(&a, bytes, SIZE), *none = arena_share(&a, bytes, 0);
+	assert_true(first && none && first != none && none->size == 0);
+	size_t used = a.used;
+	for (int i = 0; i < 1000; i++)
+		assert_ptr_equal(arena_share(&a, other, SIZE), first);
+	assert_int_equal(a.used, used);
+	/* Bytes between those that are hashed count as well; so does the size. */
+	for (size_t i = 0; i < 5; i++) {
+		other[150 + i] = 1;
+		const struct arena_share *s = arena_share(&a, other, SIZE);
+		assert_true(s && s != first && memcmp(s->bytes, other, SIZE) == 0);
+		assert_ptr_equal(arena_share(&a, other, SIZE), s);
+	}
+	assert_ptr_not_equal(arena_share(&a, bytes, SIZE - 1), first);
+	assert_ptr_equal(arena_share(&a, bytes, SIZE), first);
+	bytes[0] = 1; /* it is a copy */
+	assert_int_equal(((const unsigned char *)first->bytes)[0], 0);
+	arena_fini(&a);
+}
+
+static void test_many(void **state)
+{
+	(void)state;
+	struct arena a = {0};
+	enum { MANY = 5000 };
+	static struct arena_share *all[MANY];
+	for (int round = 0; round < 2; round++)
+		for (uint32_t i = 0; i < MANY; i++) {
+			struct arena_share *s = arena_share(&a, &i, sizeof i);
+			assert_non_null(s);
+			assert_true(round == 0 ? s->user == NULL : s == all[i] && s->user == &all[i]);
+			all[i] = s;
+			s->user = &all[i];
+		}
+	arena_fini(&a);
+}
+
+static void test_limit(void **state)
+{
+	(void)state;
+	struct arena a = {.limit = 64 << 10};
+	static unsigned char bytes[SIZE];
+	uint32_t made = 0;
+	for (uint32_t i = 0; i < 100; i++) {
+		memcpy(bytes, &i, sizeof i);
+		made += arena_share(&a, bytes, SIZE) != NULL;
+	}
+	assert_in_range(made, 10, 16);
+	memset(bytes, 0, sizeof bytes);
+	assert_non_null(arena_share(&a, bytes, SIZE));
+	assert_true(a.used <= a.limit);
+	arena_fini(&a);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_equal_bytes_are_shared),
+		cmocka_unit_test(test_many),
+		cmocka_unit_test(test_limit),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
