@@ -7,8 +7,10 @@
 
 const char *picture_name_format(const char *name)
 {
-	static const char *const formats[] = {".exr",  ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr",
-					      ".webp", ".gif", ".bmp", ".ppm",	".pfm", ".tga"};
+	static const char *const formats[] = {".exr",  ".png",	".jpg",	 ".jpeg", ".tif",  ".tiff", ".hdr",
+					      ".webp", ".gif",	".bmp",	 ".ppm",  ".pfm",  ".tga",  ".svg",
+					      ".pdf",  ".avif", ".heic", ".jxl",  ".jp2",  ".pgm",  ".pbm",
+					      ".pnm",  ".psd",	".dds",	 ".ktx",  ".ktx2", ".eps"};
 	size_t n = strlen(name);
 	for (size_t i = 0; i < sizeof formats / sizeof *formats; i++) {
 		size_t k = strlen(formats[i]);

@@ -70,7 +70,7 @@ static const struct {
 
 /* Identifies a file: by device and inode if it exists, otherwise by its path without links. */
 struct place {
-	bool exists, regular;
+	bool exists, regular, stream; /* stream: bytes of two outputs would be mixed in it: a pipe, or a descriptor */
 	dev_t device;
 	ino_t inode;
 	char path[PATH_MAX + TARGET_PATH];
@@ -100,6 +100,7 @@ static int find(struct place *p, const char *path, struct error *e)
 	}
 	p->exists = true;
 	p->regular = S_ISREG(st.st_mode);
+	p->stream = S_ISFIFO(st.st_mode) || S_ISSOCK(st.st_mode) || t.descriptor >= 0;
 	p->device = st.st_dev;
 	p->inode = st.st_ino;
 	return 0;
@@ -111,7 +112,8 @@ static bool is_same(const struct place *a, const struct place *b)
 		return false;
 	if (!a->exists)
 		return strcmp(a->path, b->path) == 0;
-	return a->regular && b->regular && a->device == b->device && a->inode == b->inode;
+	bool mixes = (a->regular && b->regular) || (a->stream && b->stream);
+	return mixes && a->device == b->device && a->inode == b->inode;
 }
 
 /* Two outputs on one pipe would be mixed up, although pipes are not regular files and pass is_same. */

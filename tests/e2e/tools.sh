@@ -50,6 +50,7 @@ grep -q '^left out  *2 of 256' out || fail "--trim says: $(cat out)"
 code 0 "$BIN/hslt-tonemap" a.exr a.png --exposure -1
 code 2 "$BIN/hslt-tonemap" a.exr a.png --exposure bright
 code 2 "$BIN/hslt-tonemap" a.exr a.JPG && [ ! -e a.JPG ] || fail "a PNG has the name of another format"
+code 2 "$BIN/hslt-tonemap" a.exr a.svg && [ ! -e a.svg ] || fail "a PNG has the name of an SVG"
 grep -q 'writes PNG only' err.log || fail "a.JPG: $(cat err.log)"
 # - is stdin or stdout, everywhere
 code 0 "$BIN/hslt-tonemap" a.exr dash.png
@@ -73,6 +74,12 @@ code 0 "$BIN/hslt-render" box.xml -o dash.exr -i path --spp 1 --size 8x8 --quiet
 	fail "--stats -: $(cat out)"
 code 1 "$BIN/hslt-render" box.xml -o - -i path --spp 1 --size 8x8 --quiet --stats -
 grep -q 'are the same file, stdout' err.log || fail "-o - --stats -: $(cat err.log)"
+for one in /dev/fd/1 /proc/self/fd/1; do
+	code 1 "$BIN/hslt-render" box.xml -o - -i path --spp 1 --size 8x8 --quiet --stats $one
+	grep -q "are the same file" err.log || fail "-o - --stats $one: $(cat err.log)"
+done
+"$BIN/hslt-render" box.xml -o - -i path --spp 1 --size 8x8 --quiet --stats /dev/fd/1 2>err.log | cat >piped.out
+[ ! -s piped.out ] && grep -q "are the same file" err.log || fail "-o - --stats /dev/fd/1 into a pipe: $(cat err.log)"
 code 0 "$BIN/hslt-accuracy" box.xml -o - --parameters tolerance --rounds 2 --size 8x8 --epoch 1 --quiet && grep -qi '^<!doctype html' out && [ ! -e - ] ||
 	fail "hslt-accuracy -o -: $(head -n 3 out)"
 code 2 "$BIN/hslt-compare" a.exr again.exr --heatmap -

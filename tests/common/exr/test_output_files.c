@@ -95,6 +95,25 @@ static void test_two_outputs(void **state)
 			NULL, "-o and --stats are the same file");
 	accepts(&(struct output_files){{{"-o", "new.exr", OUTPUT_EXR}, {"--stats", "a/new.json", OUTPUT_JSON}}}, NULL);
 	accepts(&(struct output_files){{{"-o", "/dev/null", OUTPUT_EXR}, {"--stats", "/dev/null", OUTPUT_JSON}}}, NULL);
+	/* One pipe by the numbers of two descriptors, and another one. */
+	int ends[2], others[2];
+	char first[32], again[32], other[32];
+	assert_true(pipe(ends) == 0 && pipe(others) == 0);
+	int copy = dup(ends[1]);
+	snprintf(first, sizeof first, "/dev/fd/%d", ends[1]);
+	snprintf(again, sizeof again, "/dev/fd/%d", copy);
+	snprintf(other, sizeof other, "/dev/fd/%d", others[1]);
+	refuses(&(struct output_files){{{"-o", first, OUTPUT_EXR}, {"--stats", first, OUTPUT_JSON}}}, NULL,
+		"-o and --stats are the same file");
+	refuses(&(struct output_files){{{"-o", first, OUTPUT_EXR}, {"--stats", again, OUTPUT_JSON}}}, NULL,
+		"-o and --stats are the same file");
+	accepts(&(struct output_files){{{"-o", first, OUTPUT_EXR}, {"--stats", other, OUTPUT_JSON}}}, NULL);
+	accepts(&(struct output_files){{{"-o", first, OUTPUT_EXR}, {"--stats", "/dev/null", OUTPUT_JSON}}}, NULL);
+	for (int i = 0; i < 2; i++) {
+		close(ends[i]);
+		close(others[i]);
+	}
+	close(copy);
 	assert_int_equal(access("new.exr", F_OK), -1); /* nothing is left behind */
 }
 
@@ -115,18 +134,20 @@ static void test_formats(void **state)
 	enum { ROWS = sizeof rows / sizeof *rows };
 	for (size_t i = 0; i < ROWS; i++)
 		for (size_t j = 0; j < ROWS; j++) {
-			struct output_files o = {{{"-o", "file.svg", rows[j].format}}};
-			put("file.svg", rows[i].begin);
+			const char *name = rows[j].format == OUTPUT_SVG ? "file.svg" : "file";
+			struct output_files o = {{{"-o", name, rows[j].format}}};
+			put(name, rows[i].begin);
 			if (i == j)
 				accepts(&o, NULL);
 			else
 				refuses(&o, NULL, rows[j].noun);
 		}
 	for (size_t j = 0; j < ROWS; j++) {
-		struct output_files o = {{{"-o", "file.svg", rows[j].format}}};
-		put("file.svg", "<scene version=\"0.6.0\"/>");
+		const char *name = rows[j].format == OUTPUT_SVG ? "file.svg" : "file";
+		struct output_files o = {{{"-o", name, rows[j].format}}};
+		put(name, "<scene version=\"0.6.0\"/>");
 		refuses(&o, NULL, rows[j].noun);
-		put("file.svg", "");
+		put(name, "");
 		accepts(&o, NULL);
 	}
 	assert_int_equal(output_format_of_plot("cost.svg"), OUTPUT_SVG);
@@ -155,6 +176,7 @@ static void test_names(void **state)
 	(void)state;
 	refuses(&(struct output_files){{{"-o", "x.png", OUTPUT_EXR}}}, NULL, "an OpenEXR file is written");
 	refuses(&(struct output_files){{{"-o", "x.JPG", OUTPUT_EXR}}}, NULL, "hslt-tonemap");
+	refuses(&(struct output_files){{{"OUT", "x.svg", OUTPUT_PNG}}}, NULL, "a PNG file is written");
 	refuses(&(struct output_files){{{"--heatmap", "x.exr", OUTPUT_PNG}}}, NULL, "a PNG file is written");
 	accepts(&(struct output_files){{{"-o", "x.EXR", OUTPUT_EXR}, {"--heatmap", "x.PNG", OUTPUT_PNG}}}, NULL);
 	accepts(&(struct output_files){{{"-o", "x.2", OUTPUT_EXR}, {"--plot", "x.svg", OUTPUT_SVG}}}, NULL);
