@@ -3,7 +3,8 @@
  * Values at the vertices of a mesh, interpolated linearly, or one value per triangle: `mesh_attribute` of 3.x, and
  * `vertexcolors` of 0.5/0.6, which is the attribute vertex_color. Colours are interpolated in linear RGB and then
  * upsampled; a single channel is grey. Reflectances are clamped to [0,1], like those of images; quantities that may
- * exceed 1, such as a metal's `eta` and `k` or an exponent, are not clamped.
+ * exceed 1, such as a metal's `eta` and `k` or an exponent, are not clamped. Where the texture stands for a number, a
+ * colour is the mean of its components.
  *
  * The derivatives of an attribute with respect to (u,v) are not known, so it cannot displace surfaces or bend normals.
  */
@@ -19,6 +20,7 @@ struct mesh_attribute {
 	double scale, max;
 	enum color_role role;
 	enum color_shape shape;
+	bool mean; /* of the components */
 };
 
 static int refuse_role(const struct scene_node *n, enum color_role role, struct error *e)
@@ -29,6 +31,7 @@ static int refuse_role(const struct scene_node *n, enum color_role role, struct 
 
 static void find_bounds(struct mesh_attribute *m, const struct attribute_values *v)
 {
+	bool grey = v->grey || m->mean;
 	double ends[2] = {m->scale * (double)v->least, m->scale * (double)v->most};
 	double most = fmax(fmax(ends[0], ends[1]), 0);
 	if (m->role == COLOR_ILLUMINANT) {
@@ -36,13 +39,13 @@ static void find_bounds(struct mesh_attribute *m, const struct attribute_values 
 		m->max = most * color_max_d65();
 		return;
 	}
-	m->shape = v->grey ? COLOR_SHAPE_CONSTANT : COLOR_SHAPE_OTHER;
+	m->shape = grey ? COLOR_SHAPE_CONSTANT : COLOR_SHAPE_OTHER;
 	if (m->role == COLOR_UNBOUNDED) {
-		m->max = v->grey ? most : COLOR_UNBOUNDED_OVER * most;
+		m->max = grey ? most : COLOR_UNBOUNDED_OVER * most;
 		return;
 	}
 	/* An upsampled colour may exceed its RGB components. */
-	m->max = v->grey ? fmin(most, 1) : 1;
+	m->max = grey ? fmin(most, 1) : 1;
 }
 
 static int make_attribute(struct texture *t, const struct scene_node *n, const char *name, enum color_role role,
@@ -65,9 +68,10 @@ static int make_attribute(struct texture *t, const struct scene_node *n, const c
 				     .index = a->per_face ? NULL : table->index,
 				     .channels = v->channels,
 				     .scale = node_float(n, "scale", 1),
-				     .role = role};
+				     .role = role,
+				     .mean = build->number && v->channels > 1};
 	find_bounds(m, v);
-	double most = v->grey ? m->max : m->max / COLOR_UNBOUNDED_OVER;
+	double most = v->grey || m->mean ? m->max : m->max / COLOR_UNBOUNDED_OVER;
 	if (role == COLOR_UNBOUNDED && !(most <= PARAM_METAL_MAX))
 		return node_error(n, e, ERANGE, "the attribute has numbers up to %g: they must be within [0, %g]", most,
 				  PARAM_METAL_MAX);
@@ -110,6 +114,8 @@ static spectrum mesh_attribute_eval(const struct texture *t, const struct textur
 	look_up(m, at, rgb);
 	for (int k = 0; k < 3; k++)
 		rgb[k] = fmin(fmax(rgb[k], 0), most);
+	if (m->mean)
+		return spectrum_of((rgb[0] + rgb[1] + rgb[2]) / 3);
 	return m->role == COLOR_ILLUMINANT  ? color_eval_rgb_illuminant(rgb, w)
 	       : m->role == COLOR_UNBOUNDED ? color_eval_rgb_unbounded(rgb, w)
 					    : color_eval_rgb_reflectance(rgb, w);

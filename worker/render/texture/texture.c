@@ -50,6 +50,18 @@ static int height_from_value(struct texture *t, const struct scene_node *n, cons
 	return 0;
 }
 
+/* A colour where a number is expected, as Mitsuba 3 takes it: the mean of r, g and b, or over a table's wavelengths. */
+static double number_of(const struct value *v)
+{
+	const double *nm = v->as.spectrum.nm, *x = v->as.spectrum.value;
+	double sum = 0;
+	if (v->type == VALUE_RGB)
+		return (v->as.rgb[0] + v->as.rgb[1] + v->as.rgb[2]) / 3;
+	for (uint32_t i = 1; i < v->as.spectrum.count; i++)
+		sum += (nm[i] - nm[i - 1]) * 0.5 * (x[i - 1] + x[i]);
+	return sum / (nm[v->as.spectrum.count - 1] - nm[0]);
+}
+
 int texture_from_node(struct texture *t, const struct scene_node *n, const char *name, double fallback,
 		      enum color_role role, const struct texture_build *build, struct error *e)
 {
@@ -63,7 +75,11 @@ int texture_from_node(struct texture *t, const struct scene_node *n, const char 
 		return height_from_value(t, n, name, v, e);
 	struct error reason;
 	int code = color_from_value(v, role, build->arena, &t->color, &reason);
-	return code ? node_error(n, e, -code, "%s: %s", name, reason.text) : 0;
+	if (code)
+		return node_error(n, e, -code, "%s: %s", name, reason.text);
+	if (build->number && t->color.shape != COLOR_SHAPE_CONSTANT)
+		t->color = color_constant(number_of(v));
+	return 0;
 }
 
 double texture_aspect(const struct texture *t)

@@ -41,8 +41,8 @@ struct texture_build {
 	struct attribute_table *attributes; /* of the mesh (attribute_table.h); NULL: no mesh */
 	const struct volume_build *volumes; /* NULL: the texture is not on a surface in the world */
 	/* The texture stands for a number such as a roughness or a weight, not for a spectrum. For coloured images,
-	 * Mitsuba 3 then takes the luminance and 0.6 the mean; Mitsuba 3 also exchanges the colours of a
-	 * checkerboard. */
+	 * Mitsuba 3 then takes the luminance and 0.6 the mean, for colours both take the mean; Mitsuba 3 also exchanges
+	 * the colours of a checkerboard. */
 	bool number;
 };
 

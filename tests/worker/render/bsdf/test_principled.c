@@ -337,6 +337,21 @@ static void test_metallic_texture(void **state)
 		"principled base_color=rgb(0.8,0.3,0.1) spec_trans=0.5 metallic=0.25", 1, 1);
 }
 
+/* A colour in the place of a number is the mean of its components, whatever the wavelengths. */
+static void test_colours_as_numbers(void **state)
+{
+	(void)state;
+	expect_equal("principled base_color=0.7 roughness=rgb(0.2,0.3,0.7) metallic=rgb(0.6,0.5,0.4)",
+		     "principled base_color=0.7 roughness=0.4 metallic=0.5", 0, 1);
+	expect_equal("principled base_color=0.7 roughness=rgb(0.3,0.3,0.3)", "principled base_color=0.7 roughness=0.3",
+		     0, 1);
+	expect_equal("phong exponent=rgb(6,5,1)", "phong exponent=4", 0, 1);
+	expect_equal("principledthin spec_trans=1 roughness=0.3 eta=rgb(1.2,1.4,1.9)",
+		     "principledthin spec_trans=1 roughness=0.3 eta=1.5", 1, 1);
+	expect_equal("principled base_color=0.7 | @roughness checkerboard color0=rgb(0.2,0.3,0.7) color1=0.9",
+		     "principled base_color=0.7 roughness=0.4", 0, 1);
+}
+
 static double value(const char *text, vec3 wo, vec3 wi)
 {
 	struct arena a = {0};
@@ -515,6 +530,7 @@ int main(void)
 		cmocka_unit_test(test_coat_on_glass),
 		cmocka_unit_test(test_specular_is_an_index),
 		cmocka_unit_test(test_metallic_texture),
+		cmocka_unit_test(test_colours_as_numbers),
 		cmocka_unit_test(test_a_thin_sheet),
 		cmocka_unit_test(test_a_sheet_of_textures),
 	};

@@ -288,17 +288,39 @@ static void test_roughness(void **state)
 			fail_msg("%u: alpha %g", i, b->alpha);
 	}
 	world_free(w);
-	/* Of colours the mean over some wavelengths, least at one node. */
+	/* Of colours the mean of their components, least at one node. */
 	w = world_of(SKY PLY("linear.ply", "<bsdf type='roughconductor'>" FIELD("alpha", "vertex_color") "</bsdf>"));
-	const struct wavelengths probe = {.nm = {450, 500, 550, 600}};
 	double least = INFINITY;
 	for (int k = 0; k < SIDE * SIDE; k++) {
 		double x = (k % SIDE + 0.5) / SIDE, y = 1 - (k / SIDE + 0.5) / SIDE;
 		const double rgb[3] = {x, y, 0.5 + (x - y) / 2};
-		least = fmin(least, spectrum_mean(color_eval_rgb_reflectance(rgb, &probe)));
+		least = fmin(least, (rgb[0] + rgb[1] + rgb[2]) / 3);
 	}
 	if (fabs(w->bsdfs[0].alpha - least) > 1e-5)
 		fail_msg("alpha %g, not %g", w->bsdfs[0].alpha, least);
+	world_free(w);
+}
+
+/* Colours in the place of a number are the means of their components, the same for all wavelengths. */
+static void test_colours_as_numbers(void **state)
+{
+	(void)state;
+	/* in the first triangle, at the barycentrics below */
+	double x = 2 * 0.8 / SIDE - 1, y = 1 - 2 * 0.7 / SIDE;
+	double mean = ((x + 1) / 2 + (y + 1) / 2 + (2 + x - y) / 4) / 3;
+	char text[4096];
+	snprintf(text, sizeof text,
+		 SKY PLY("linear.ply", "<bsdf type='principled'>%s</bsdf>")
+			 PLY("linear.ply", "<bsdf type='principled'><float name='roughness' value='%.17g'/></bsdf>"),
+		 FIELD("roughness", "vertex_color"), mean);
+	struct world *w = world_of(text);
+	const struct bsdf *got = &w->bsdfs[w->parts[0].bsdf], *want = &w->bsdfs[w->parts[1].bsdf];
+	assert_true(got->textured && !want->textured && got->shape == want->shape);
+	struct surface_point at;
+	surface_on_triangle(&w->shapes[0], (struct prim_ref){0, 0, 0}, 0.2, 0.3, &at);
+	struct bsdf_point p = world_bsdf_point(&at, &colour, TRANSPORT_RADIANCE);
+	const vec3 wo = vec3_normalize((vec3){0.3, 0.1, 0.8}), wi = vec3_normalize((vec3){-0.2, 0.1, 0.7});
+	assert_close(got->ops->eval(got, &p, wo, wi), want->ops->eval(want, &p, wo, wi), 1e-6);
 	world_free(w);
 }
 
@@ -472,10 +494,12 @@ static int teardown(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_linear),	    cmocka_unit_test(test_instances),	 cmocka_unit_test(test_picture),
-		cmocka_unit_test(test_coordinates), cmocka_unit_test(test_faces),	 cmocka_unit_test(test_light),
-		cmocka_unit_test(test_roughness),   cmocka_unit_test(test_vertexcolors), cmocka_unit_test(test_shared),
-		cmocka_unit_test(test_refused),	    cmocka_unit_test(test_beyond_one),
+		cmocka_unit_test(test_linear),	   cmocka_unit_test(test_instances),
+		cmocka_unit_test(test_picture),	   cmocka_unit_test(test_coordinates),
+		cmocka_unit_test(test_faces),	   cmocka_unit_test(test_light),
+		cmocka_unit_test(test_roughness),  cmocka_unit_test(test_vertexcolors),
+		cmocka_unit_test(test_shared),	   cmocka_unit_test(test_refused),
+		cmocka_unit_test(test_beyond_one), cmocka_unit_test(test_colours_as_numbers),
 	};
 	return cmocka_run_group_tests(tests, NULL, teardown);
 }
