@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/base/mem.h"
 #include "common/base/program.h"
+#include "common/base/progress.h"
 #include "common/net/authority.h"
 
 #include <stdio.h>
@@ -48,6 +49,10 @@ static int check(void *target, struct error *e)
 		return error_set(e, EINVAL, "%s takes no name", a->verb);
 	if (!bare && !a->what)
 		return error_set(e, EINVAL, "%s needs a name", a->verb);
+	/* Certificates count whole seconds. */
+	if (a->seconds > 0 && a->seconds < 1)
+		return error_set(e, EINVAL, "--days: %g s is less than a second: it would have expired when it is made",
+				 a->seconds);
 	if (!tls_name_ok(a->name))
 		return error_set(e, EINVAL, "--name takes up to %d letters, digits and ._@-", TLS_NAME_MAX);
 	return 0;
@@ -82,11 +87,23 @@ static double days_of(const struct arguments *a, double standard)
 	return a->seconds > 0 ? a->seconds / 86400 : standard;
 }
 
+/* "30m" may mean months. */
+static void note_short(const struct arguments *a)
+{
+	char text[32];
+	if (!(a->seconds > 0 && a->seconds < 86400))
+		return;
+	progress_duration(a->seconds, text, sizeof text);
+	fprintf(stderr, "hslt-ca: note: it is valid for %s only\n", text);
+}
+
 static int issue(const struct arguments *a, enum tls_role role, const char *name, struct error *e)
 {
 	int rc = authority_issue(a->ca, name, role, days_of(a, other_days), a->renew, e);
-	if (!rc)
+	if (!rc) {
 		printf("%s/%s\n", a->ca, name);
+		note_short(a);
+	}
 	return rc;
 }
 
@@ -94,6 +111,8 @@ static int init(const struct arguments *a, struct error *e)
 {
 	struct arguments rest = *a;
 	int rc = authority_init(a->ca, a->name, days_of(a, own_days), e);
+	if (!rc)
+		note_short(a);
 	rest.seconds = 0;
 	return rc ? rc : issue(&rest, TLS_COORDINATOR, "coordinator", e);
 }

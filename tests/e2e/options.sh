@@ -111,6 +111,12 @@ code 0 "$BIN/hslt-tonemap" "$DIR/units.exr" "$DIR/units.png" && [ "$(od -An -tx1
 code 2 "$BIN/hslt-render" "$BOX" -o "$DIR/a.exr" --size 1.0001kx2
 code 0 "$BIN/hslt-compare" "$DIR/units.exr" "$DIR/units.exr" --size .02kx.011k --trim 0.1%
 HSLT_CA=$DIR/units.ca code 0 "$BIN/hslt-ca" init --days 36h
+for days in 0.4s 0.00001; do
+	HSLT_CA=$DIR/units.ca code 2 "$BIN/hslt-ca" client brief --days $days
+	grep -q "less than a second" "$DIR/err.log" && [ ! -e "$DIR/units.ca/brief" ] || fail "--days $days: $(cat "$DIR/err.log")"
+done
+HSLT_CA=$DIR/units.ca code 0 "$BIN/hslt-ca" client brief --days 30m
+grep -q "valid for 30 min only" "$DIR/err.log" || fail "--days 30m: $(cat "$DIR/err.log")"
 # These end before they do anything, at the last option.
 code 2 "$BIN/hslt-coordinator" --spool "$DIR/none" --blobs 20G --journal 64MB --film-memory 2g --keep-films 500M --keep-days 36h \
 	--keep-gb 1.5T --worker-bandwidth 500k --quota-jobs 1k --quota-assets 10G --quota-film 2G --quota-mutations 1.5G --heartbeat 1m \

@@ -52,7 +52,7 @@ ca client bob
 ca operator chief
 ca worker lost
 ca client gone
-ca client late --days 0.00001
+ca client late --days 1s
 ca init --ca "$DIR/other"
 ca client eve --ca "$DIR/other"
 ca worker eve-node --ca "$DIR/other"
