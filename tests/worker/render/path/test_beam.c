@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * `collimated`, a beam without width, in images that are known: the whole light of the one pixel that sees where it
- * ends, directly and by a mirror; a plate that is lit from there; a line of light in a medium. The integrators that
- * have light sub-paths agree with them; the one that has none refuses.
+ * `collimated`, a beam without width, in images known in closed form: all of its light reaches the one pixel that
+ * sees the lit point, directly or by way of a mirror; a plate lit from that point; and a line of light in a medium.
+ * The integrators with light sub-paths must agree with the closed forms; `path`, which has none, must refuse the
+ * scene.
  *
- * Level: five standard errors of 32 groups (t), 2e-5 a comparison, 19 of them. Power: errors are below 0.5 %.
+ * Level: five standard errors of 32 groups (t), which is 2e-5 for each of 19 comparisons. Power: standard errors are
+ * below 0.5 %.
  */
 #include "tests/support/agree.h"
 #include "tests/support/length.h"
@@ -30,7 +32,8 @@ enum { SIDE = 16, GROUPS = 32 };
 #define PLATE(transform, inner) \
 	"<shape type='rectangle'><transform name='to_world'>" transform "</transform>" inner "</shape>"
 
-/* Over all pixels the mean of X + Y + Z that radiance 1 in all of them has is sum3(grey_xyz). */
+/* Fails unless the mean of X + Y + Z over all pixels is that of an image in which every pixel has the radiance
+ * `expected`. */
 static void check(const char *name, const struct world *w, double expected, const char *const *integrators,
 		  uint64_t spp)
 {
@@ -62,7 +65,8 @@ static double film_mean(const struct world *w, double intensity, vec3 place)
 	       (SIDE * SIDE);
 }
 
-/* Power 3 becomes the intensity 3 rho / pi times a cosine, of which a pixel sees what its solid angle is worth. */
+/* A beam of power 3 makes a spot of intensity 3 rho / pi times a cosine on the plate. The one pixel that sees the
+ * spot gets this intensity over the squared distance and over the pixel's solid angle. */
 static void test_spot(void **state)
 {
 	(void)state;
@@ -76,7 +80,7 @@ static void test_spot(void **state)
 	world_free(w);
 }
 
-/* A perfect mirror at x = 1 sends it on. */
+/* A perfect mirror at x = 1 sends the beam on. */
 static void test_mirror(void **state)
 {
 	(void)state;
@@ -91,7 +95,7 @@ static void test_mirror(void **state)
 	world_free(w);
 }
 
-/* A wall behind the camera is hit at (0, 0, 2), which lights the plate at z = 0. */
+/* The beam hits a wall behind the camera at (0, 0, 2), and this spot lights the plate at z = 0. */
 static void test_lit_from_there(void **state)
 {
 	(void)state;
@@ -116,9 +120,9 @@ static void test_lit_from_there(void **state)
 	world_free(w);
 }
 
-/* The beam scatters in a cube of fog: with sigma_t = 0.4, sigma_s = 0.3 the film gets of each piece dt of it
- * 3 sigma_s / (4 pi) exp(-sigma_t (t + d)) / d^2 dt, d from the near plane, which is the camera here. Its end is not
- * seen. */
+/* The beam scatters in a cube of fog with sigma_t = 0.4 and sigma_s = 0.3. From each piece dt of the beam the film
+ * gets 3 sigma_s / (4 pi) exp(-sigma_t (t + d)) / d^2 dt, where d is the distance from the near plane, at which the
+ * camera lies here. The camera does not see the end of the beam. */
 static void test_fog(void **state)
 {
 	(void)state;
@@ -166,7 +170,7 @@ static void test_refused(void **state)
 	world_refused("<emitter type='collimated'><float name='power' value='-1'/></emitter>", "power");
 	world_refused("<emitter type='collimated'><transform name='to_world'><scale z='0'/></transform></emitter>",
 		      "to_world gives the beam no direction");
-	/* `path` would leave its light out. */
+	/* `path` would leave the light of the beam out. */
 	struct world *w = world_of_text(
 		SIDE, SIDE, SENSOR("0,0,3", "0,0,0") BEAM("-1,2,4", "0,0,0") PLATE("<scale value='2'/>", ""));
 	struct render_summary summary;

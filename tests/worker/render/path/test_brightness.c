@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The map of brightness: what is known shows, what a firefly made is spread. */
+/* The brightness map: halves of the film show their own brightness, and a firefly is spread over its neighbourhood
+ * instead of showing. Checked against the brightness of the samples, which are stratified over the film. */
 #include "worker/render/path/brightness.h"
 
 #include <setjmp.h>
@@ -11,7 +12,8 @@
 enum { SIDE = 64, SAMPLES = 1 << 13 };
 static const struct film_window window = {-2, 5, SIDE, SIDE};
 
-/* Samples stratified over the window; each contributes what `of` says of its place, over the density 1 / pixels. */
+/* Adds samples stratified over the window; each contributes the value of `of` at its position, divided by the density
+ * 1 / pixels. */
 static void add_samples(struct brightness *b, unsigned a_cell, double (*of)(double x, double y))
 {
 	struct error e;
@@ -29,7 +31,7 @@ static void fill(struct brightness *b, double (*of)(double x, double y))
 	brightness_settle(b, SAMPLES);
 }
 
-/* 64 x 64 cells with two samples each, so a pixel is a cell. */
+/* 64 x 64 cells with two samples each, so that each cell covers one pixel. */
 static void fill_near(struct brightness *b, double (*of)(double x, double y))
 {
 	add_samples(b, 1, of);
@@ -72,7 +74,7 @@ static void a_firefly_does_not_show(void **state)
 	fill(&b, firefly);
 	double there = relative(&b, 40.25, 20.5);
 	assert_true(there == relative(&b, 3, 3) &&
-		    there == relative(&b, 60, 60)); /* the whole film: no quarter of it is known */
+		    there == relative(&b, 60, 60)); /* the mean of the whole film: no quarter is known well enough */
 	assert_true(there > 0 && there < 0.01);
 	brightness_fini(&b);
 }
@@ -103,7 +105,7 @@ static void darkness_has_the_least_that_the_error_knows(void **state)
 	(void)state;
 	struct brightness b;
 	fill(&b, dark_half);
-	double least = 1 / relative(&b, 60, 30); /* a hundredth of the mean, 0.5 */
+	double least = 1 / relative(&b, 60, 30); /* a hundredth of the mean, which is 0.5 */
 	assert_true(least > 0.00499 && least < 0.00501);
 	brightness_fini(&b);
 }
@@ -117,7 +119,7 @@ static void a_sample_counts_once_in_a_cell(void **state)
 	assert_int_equal(brightness_init(&b, &window, SAMPLES, 1, &e), 0);
 	brightness_add(&b, &here, 2);
 	brightness_add(&b, &there, 1);
-	b.target.splat(&b.target, &here, 1.0 / (SIDE * SIDE)); /* 3 more */
+	b.target.splat(&b.target, &here, 1.0 / (SIDE * SIDE)); /* adds 3 to the brightness */
 	brightness_end_sample(&b);
 	brightness_add(&b, &here, 1);
 	brightness_end_sample(&b);
@@ -134,14 +136,15 @@ static void dark_places_beside_bright_ones_are_dark(void **state)
 	for (double y = 0.5; y < SIDE; y += 7)
 		for (double x = 0.5; x < SIDE; x++) {
 			if (x > SIDE / 2 - 3 && x < SIDE / 2 + 3)
-				continue; /* neighbourhoods of 5 x 5 cells reach across */
+				continue; /* neighbourhoods of 5 x 5 cells reach across the border of the halves */
 			double product = relative(&b, x, y) * halves(x, y);
 			assert_true(product > 0.98 && product < 1.02);
 		}
 	brightness_fini(&b);
 }
 
-/* The neighbourhood of the firefly grows to 25 x 25 cells; elsewhere it is too small to reach it. */
+/* The neighbourhood of the firefly grows to 25 x 25 cells; neighbourhoods elsewhere are too small to contain the
+ * firefly. */
 static void a_firefly_is_spread_over_its_neighbourhood(void **state)
 {
 	(void)state;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Images that are known without rendering: furnaces, directly lit planes, two plates, lamps smaller than a pixel. Media
- * are in test_closed_form_media.c. Statistics as in tests/support/agree.h (level 1e-4 over the suite, power printed and
- * bounded).
+ * Images known in closed form, which need no rendering: furnaces, directly lit planes, two plates, and lamps smaller
+ * than a pixel. test_closed_form_media.c tests media. Statistics as in tests/support/agree.h (level 1e-4 over the
+ * suite, power printed and bounded).
  */
 #include "tests/support/agree.h"
 #include "tests/support/known_radiance.h"
@@ -22,7 +22,8 @@ static double sum3(const double v[3])
 
 #define DEPTH(k) "<integrator type='path'><integer name='max_depth' value='" k "'/></integrator>"
 
-/* Inside a sphere that shines with L = 1 and reflects rho = 0.5: 1 + 1/2 + 1/4 + ... up to the depth. */
+/* Inside a sphere that emits L = 1 and reflects rho = 0.5, the radiance is 1 + 1/2 + 1/4 + ..., with one term per
+ * edge up to max_depth. */
 static void test_furnace(void **state)
 {
 	(void)state;
@@ -37,7 +38,8 @@ static void test_furnace(void **state)
 		1 + 0.5 + 0.25 + 0.125 + 0.0625, (struct known_effort){64, 256, 0});
 }
 
-/* The same, seen all around from a point off its centre, with a filter that reaches around the film's edges. */
+/* Like test_furnace(), but seen in all directions from a point off the centre, with a filter that wraps around the
+ * film's edges. */
 static void test_furnace_all_around(void **state)
 {
 	(void)state;
@@ -50,10 +52,11 @@ static void test_furnace_all_around(void **state)
 				   "<shape type='sphere'><boolean name='flip_normals' value='true'/><bsdf type='diffuse'>"
 				   "<float name='reflectance' value='.5'/></bsdf><emitter type='area'/></shape>"),
 		1 + 0.5 + 0.25 + 0.125 + 0.0625,
-		(struct known_effort){512, 1024, test_full() ? 49152 : 0}); /* pssmlt: a minute */
+		(struct known_effort){512, 1024, test_full() ? 49152 : 0}); /* pssmlt takes a minute */
 }
 
-/* Through a telecentric lens, whose points lie a million radii away: states of chains hold them exactly enough. */
+/* Seen through a telecentric lens, whose points lie a million radii away: the states of chains must represent them
+ * accurately enough. */
 static void test_furnace_far_lens(void **state)
 {
 	(void)state;
@@ -76,7 +79,7 @@ static void test_furnace_far_lens(void **state)
 #define SKY "<emitter type='constant'><float name='radiance' value='.7'/></emitter>"
 #define BALL(bsdf) "<shape type='sphere'>" bsdf "</shape>"
 
-/* In constant light lossless things cannot be seen. */
+/* In constant light, objects that absorb nothing are invisible. */
 static void test_invisible(void **state)
 {
 	(void)state;
@@ -98,8 +101,8 @@ static void test_invisible(void **state)
 							     "<bsdf type='dielectric'><float name='int_ior' value='1'/>"
 							     "<float name='ext_ior' value='1.5046'/></bsdf></shape>"),
 		0.7, (struct known_effort){320, 0, 0});
-	/* Rough, but so little that what a model of single scattering loses (0.065 % +- 0.007 % of this image at alpha
-	 * 0.01, and with its square) is far below what is found. */
+	/* The surface is rough, but only slightly: a model of single scattering loses 0.065 % +- 0.007 % of this
+	 * image at alpha = 0.01, in proportion to alpha^2, which is far below the bias that the test can find. */
 	known_constant("invisible rough glass",
 		       world_of_text(16, 16,
 				     DEPTH("64") SENSOR("0,0,4", "0,0,0") SKY BALL(
@@ -111,7 +114,7 @@ static void test_invisible(void **state)
 					     "<bsdf type='roughconductor'><string name='material' value='none'/>"
 					     "<float name='alpha' value='.001'/></bsdf>")),
 		       0.7, (struct known_effort){128, 64, 0});
-	/* White diffuse: every path ends in the sky. */
+	/* A white diffuse ball: every path ends in the sky. */
 	known_constant("invisible white ball",
 		       world_of_text(16, 16,
 				     DEPTH("8") SENSOR("0,0,4", "0,0,0") SKY BALL(
@@ -119,22 +122,23 @@ static void test_invisible(void **state)
 		       0.7, (struct known_effort){1536, 1024, 0});
 }
 
-/* A lamp at height h over the floor: a square of side a that looks down, by the midpoint rule, or a sphere of radius r,
- * all of it above the horizon: pi r^2 / d^2 times the cosine. Irradiance at (x, z) from its foot, radiance 1. glass:
- * the thickness of a pane of index 1.5 between a tiny sphere and the floor, which reflects nothing back. */
+/* A lamp at height h over the floor: either a square of side a that faces down, integrated by the midpoint rule, or a
+ * sphere of radius r entirely above the horizon, whose irradiance is pi r^2 / d^2 times the cosine. The functions
+ * below give the irradiance at (x, z) from the lamp's foot for radiance 1. glass: thickness of a pane of index 1.5
+ * between a tiny sphere and a floor that reflects nothing back. */
 struct lamp {
 	double a, r, h, glass;
 };
 
-/* Unpolarised light that comes at this angle through one face of the pane. */
+/* Returns the share of unpolarised light that one face of the pane transmits at this angle of incidence. */
 static double transmitted_share(double cosine, double inner)
 {
 	double s = (cosine - 1.5 * inner) / (cosine + 1.5 * inner), p = (1.5 * cosine - inner) / (1.5 * cosine + inner);
 	return 1 - 0.5 * (s * s + p * p);
 }
 
-/* Light that leaves at the angle t from the vertical arrives at a distance rho(t) from the lamp's foot; the intensity
- * pi r^2 sin t dt falls on rho drho. */
+/* Light that leaves the lamp at the angle t from the vertical arrives at the distance rho(t) from the lamp's foot;
+ * the flux pi r^2 sin t dt is spread over rho drho. */
 static double irradiance_behind_glass(const struct lamp *l, double rho)
 {
 	double low = 0, high = M_PI / 2, air = l->h - l->glass;
@@ -165,8 +169,9 @@ static double irradiance(const struct lamp *l, double x, double z)
 	return sum * a * a / (N * N);
 }
 
-/* Mean over the block of a film of n x n pixels, seen straight from above: block b of AGREE_BLOCKS squared. The camera
- * of 40 degrees at height `up` sees the floor's square of side 2 up tan 20. Film x is +x, film y is +z. */
+/* Compares the mean over each block of a film of n x n pixels that sees the floor straight from above; there are
+ * AGREE_BLOCKS squared blocks. The 40-degree camera at height `up` sees a square of the floor of side 2 up tan 20.
+ * Film x runs along +x, film y along +z. */
 static void expect_floor(const char *test, const struct agree_image *image, double up, const struct lamp *lamp,
 			 double x, double z, double scale)
 {
@@ -182,7 +187,7 @@ static void expect_floor(const char *test, const struct agree_image *image, doub
 		}
 		whole += c < AGREE_CELLS ? sum / AGREE_CELLS : 0;
 		double expected = c < AGREE_CELLS ? sum : whole;
-		/* All cells against 1. */
+		/* Each cell is divided by its expected value, so that all cells are compared with 1. */
 		for (uint32_t g = 0; g < image->groups; g++)
 			part.mean[g][c] = image->mean[g][c] / expected;
 	}
@@ -190,7 +195,7 @@ static void expect_floor(const char *test, const struct agree_image *image, doub
 	agree_expect(test, &part, 1);
 }
 
-/* A camera above the floor, looking down, a lamp over (3, 1) that it does not see. */
+/* A camera above the floor looks down; the lamp hangs over (3, 1), out of its view. */
 static void check_lit_floor(const char *name, struct lamp lamp, const char *xml, struct known_effort e)
 {
 	static struct agree_image image;
@@ -247,7 +252,7 @@ static void test_lit_floor(void **state)
 			(struct known_effort){64, 512, 0});
 }
 
-/* A beam straight down, wider than what the camera sees of the floor: M rho / pi. */
+/* A beam straight down, wider than the part of the floor in view: the radiance is M rho / pi. */
 static void test_beam(void **state)
 {
 	(void)state;
@@ -255,9 +260,10 @@ static void test_beam(void **state)
 	known_constant("floor under a beam", w, 1.5 * 0.5 / M_PI, (struct known_effort){128, 832, 0});
 }
 
-/* The sun straight down through thin glass and a filter, which is between the camera and the floor, too. Glass reflects
- * r = 2 R / (1 + R), R = ((n - 1) / (n + 1))^2, and the filter lets half through each time: (1 - r) / 4 of M rho / pi.
- * No sub-path from either side alone gets to the floor without passing something, and neither end can be hit. */
+/* The sun shines straight down through thin glass and a filter, which also lie between the camera and the floor. The
+ * glass reflects r = 2 R / (1 + R) with R = ((n - 1) / (n + 1))^2, and the filter transmits one half at each passage:
+ * the camera sees (1 - r) / 4 of M rho / pi. A sub-path from either side can reach the floor only through the glass
+ * and the filter, and neither the sun nor the camera can be hit. */
 static void test_seen_through(void **state)
 {
 	(void)state;
@@ -280,9 +286,9 @@ static void test_seen_through(void **state)
 		       (struct known_effort){128, 832, 0});
 }
 
-/* Two plates of reflectance rho, the lower shines with 1. Between infinite plates every ray from one meets the other.
- * Radiance of the lower: 1 + rho^2 + rho^4 ..., of the upper rho + rho^3 ... The plates are 4000 gaps wide, which
- * leaves out some 1e-6 of the light that the camera in the middle sees. */
+/* Two plates of reflectance rho, of which the lower emits radiance 1. Between infinite plates every ray from one
+ * meets the other, so the radiance of the lower plate is 1 + rho^2 + rho^4 + ..., that of the upper one rho + rho^3 +
+ * .... The plates are 4000 gaps wide, which loses about 1e-6 of the light seen by the camera in the middle. */
 static void test_plates(void **state)
 {
 	(void)state;
@@ -299,8 +305,8 @@ static void test_plates(void **state)
 		       rho + pow(rho, 3) + pow(rho, 5), (struct known_effort){1024, 0, 0});
 }
 
-/* A lamp on the axis, some 400 times smaller than a pixel: `share` of the film shows its radiance 1. A sample of the
- * film meets it once in 100,000 times, so points of the lamp have to be joined to the lens. */
+/* A lamp on the axis, about 400 times smaller than a pixel: it covers the part `share` of the film with its radiance
+ * 1. A sample of the film meets the lamp once in 100,000 times, so points on the lamp must be connected to the lens. */
 static void check_small_lamp(const char *name, const char *lamp, double share)
 {
 	static struct agree_image image;
@@ -315,7 +321,7 @@ static void check_small_lamp(const char *name, const char *lamp, double share)
 		for (uint32_t g = 0; g < image.groups; g++)
 			for (int c = 0; c <= AGREE_CELLS; c++)
 				image.mean[g][c] = image.mean[g][AGREE_CELLS] / (share * sum3(w->grey_xyz));
-		known_round(&image, 1, 1e-4); /* what samples of the film would add, if one met the lamp */
+		known_round(&image, 1, 1e-4); /* the amount that one sample of the film would add if it met the lamp */
 		agree_expect(test, &image, 1);
 	}
 	world_free(w);
@@ -324,7 +330,7 @@ static void check_small_lamp(const char *name, const char *lamp, double share)
 static void test_small_lamp(void **state)
 {
 	(void)state;
-	double slope = tan(20 * M_PI / 180); /* of the film's edge */
+	double slope = tan(20 * M_PI / 180); /* slope of the ray through the film's edge */
 	check_small_lamp("square in a pixel",
 			 "<shape type='rectangle'><transform name='to_world'><scale value='0.005'/></transform>"
 			 "<emitter type='area'/></shape>",

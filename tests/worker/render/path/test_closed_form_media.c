@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Images of media that are known without rendering: what absorbs by Beer's law, a sky seen through and in media that
- * absorb nothing, layers in which light is scattered once, a beam in a layer, and a half-space (Chandrasekhar 1960).
- * Statistics as in tests/support/agree.h (level 1e-4 over the suite, power printed and bounded).
+ * Images of media known in closed form: absorption by Beer's law, a sky seen through and in media that absorb
+ * nothing, layers that scatter light once, a beam in a layer, and a half-space (Chandrasekhar 1960). Statistics as in
+ * tests/support/agree.h (level 1e-4 over the suite, power printed and bounded).
  */
 #include "tests/support/known_radiance.h"
 #include "tests/support/length.h"
@@ -19,8 +19,8 @@
 #define SKY "<emitter type='constant'><float name='radiance' value='.7'/></emitter>"
 #define BALL(bsdf) "<shape type='sphere'>" bsdf "</shape>"
 
-/* Through 1.4 of a medium of 1.1, behind 0.6 of one of 0.5: seen at a right angle, and without refraction. What is in
- * the second states no medium. */
+/* The ray runs perpendicular to the faces, without refraction, through a length of 1.4 in a medium of sigma_t 1.1 and
+ * 0.6 in one of 0.5. The innermost slab states no medium. */
 static void test_absorbing(void **state)
 {
 	(void)state;
@@ -48,7 +48,8 @@ static void test_absorbing(void **state)
 		0.7 * exp(-1.1 * 1.4 - 0.5 * 0.6), (struct known_effort){512, 512, 0});
 }
 
-/* A camera in a medium, 3 before a face behind which there is none; the medium before its near plane is not there. */
+/* A camera in a medium, whose near plane lies 3 before a face beyond which there is no medium; the medium in front of
+ * the near plane does not count. */
 static void test_camera_in_medium(void **state)
 {
 	(void)state;
@@ -71,7 +72,7 @@ static void test_camera_in_medium(void **state)
 	"'/><float name='far_clip' value='1000'/><transform name='to_world'><lookat "                               \
 	"origin='0.2,0.1,90' target='0.2,0.1,0' up='0,1,0'/></transform><film type='hdrfilm'><rfilter type='box'/>" \
 	"</film>" medium "</sensor>"
-/* Between z = 0 and twice `half` below, and so wide that its sides are out of reach. */
+/* A layer between z = 0 and z = -2 half, so wide that its sides are out of reach. */
 #define LAYER_OF(type, half, sigma_t, albedo, phase)                                                     \
 	"<shape type='cube'><transform name='to_world'><translate z='-1'/><scale x='40' y='40' z='" half \
 	"'/></transform><bsdf type='null'/><medium type='" type "' name='interior' id='layer'>" sigma_t  \
@@ -85,7 +86,7 @@ static void test_camera_in_medium(void **state)
 #define FLAKES \
 	"<phase type='sggx'><volume type='constvolume' name='S'><string name='value' value='.5,.2,.9,.1,.3,-.1'/></volume></phase>"
 
-/* Where nothing is absorbed, everything looks like the sky. */
+/* In media that absorb nothing, everything looks like the sky. */
 static void test_white_media(void **state)
 {
 	(void)state;
@@ -106,7 +107,8 @@ static void test_white_media(void **state)
 			0.7, i ? (struct known_effort){320, 0, 0} : (struct known_effort){3072, 0, 0});
 }
 
-/* Paths of one edge pass faces that are no vertices: the sky through a layer, without what the layer scatters. */
+/* Faces of `null` are no vertices, so paths of one edge pass through them: the image shows the sky through the layer,
+ * without the light that the layer scatters. */
 static void test_seen_through_layer(void **state)
 {
 	(void)state;
@@ -115,8 +117,8 @@ static void test_seen_through_layer(void **state)
 		       0.7 * exp(-1), (struct known_effort){1024, 1024, 0});
 }
 
-/* E_2(x) / 2: what reaches a depth of x through a plane, of light from all directions of one half. By the midpoint rule
- * over the cosine. */
+/* Returns E_2(x) / 2, the share of light that reaches the depth x below a plane lit from all directions of one
+ * hemisphere, by the midpoint rule over the cosine. */
 static double half_exponential_integral(double x)
 {
 	enum { STEPS = 2000 };
@@ -126,9 +128,9 @@ static double half_exponential_integral(double x)
 	return sum / (2 * STEPS);
 }
 
-/* Light of the sky that a layer of optical depth 2 scatters once, seen from above, or from a near plane in it at depth
- * `begin`: the integral of exp(begin - x) times the albedo times what reaches x from both sides. The layer's faces are
- * no vertices: two edges. */
+/* Light of the sky that a layer of optical depth 2 scatters once, seen from above, or from a near plane in the layer
+ * at the depth `begin`: the integral over the depth x of exp(begin - x) times the albedo times the light that reaches
+ * x from both sides. The faces of the layer are no vertices, so the paths have two edges. */
 static void check_scattered_once(const char *name, double begin, const char *sensor, struct known_effort e)
 {
 	enum { STEPS = 1000 };
@@ -149,8 +151,8 @@ static void test_scattered_once(void **state)
 			     FROM_ABOVE("90.5", "<ref name='medium' id='layer'/>"), (struct known_effort){8192, 0, 0});
 }
 
-/* Chandrasekhar 1960, sec. 36 and 58: under a sky of radiance 1 a half-space that scatters isotropically reflects
- * 1 - H(mu) sqrt(1 - albedo). H by iterating its equation, in the form whose integral is positive. */
+/* Chandrasekhar 1960, sec. 36 and 58: under a sky of radiance 1, a half-space that scatters isotropically reflects 1
+ * - H(mu) sqrt(1 - albedo). H is found by iterating its equation, in the form whose integral is positive. */
 static double chandrasekhar_h(double albedo, double mu)
 {
 	enum { STEPS = 400, ROUNDS = 60 };
@@ -181,7 +183,7 @@ static void test_half_space(void **state)
 		       0.7 * (1 - chandrasekhar_h(albedo, 1) * sqrt(1 - albedo)), (struct known_effort){3072, 0, 0});
 }
 
-/* From 0 to -2 along z, the mean is 1: as deep as LAYER. */
+/* The mean is 1 from z = 0 to -2, so that the optical depth is that of LAYER. */
 static double strata(double x, double y, double z, uint32_t channel)
 {
 	(void)x;
@@ -190,7 +192,8 @@ static double strata(double x, double y, double z, uint32_t channel)
 	return z == 0 ? 0.3 : z < 0.4 ? 2.9 : z < 0.7 ? 0 : 0.8;
 }
 
-/* From (-0.8, 0, 0.6) to z: by the areas seen and D of the half vector, with the inverse of the matrix FLAKES. */
+/* Phase function from the direction (-0.8, 0, 0.6) to z, from the projected areas and the distribution D of the half
+ * vector, with the inverse of the matrix FLAKES. */
 static double flakes_once(double albedo)
 {
 	const double x = -0.8 / sqrt(3.2), z = 1.6 / sqrt(3.2), det = .5 * .17 - .1 * .12 - .3 * .07;
@@ -198,7 +201,7 @@ static double flakes_once(double albedo)
 	return albedo / (4 * M_PI * sqrt(det) * form * form) * (1 - exp(-2 * along)) / along;
 }
 
-/* A beam at an angle, scattered once: only the optical depth counts, not where it comes from. */
+/* An oblique beam whose light is scattered once: only the optical depth matters, not the position of the beam. */
 static void test_beam_in_layer(void **state)
 {
 	(void)state;
@@ -212,7 +215,8 @@ static void test_beam_in_layer(void **state)
 	"name='to_world'><translate x='-.5' y='-.5' z='-1'/><scale x='80' y='80' z='2'/></transform></volume>"
 	static const char layered[] =
 		BEAM_IN(LAYER_OF("heterogeneous", "1", STRATA, "0.6", "<phase type='rayleigh'/>"));
-	/* Light goes on by -0.6; there the table has 1.2 / (6 * 2 pi). */
+	/* The cosine between the incident and the scattered direction is -0.6, for which the table has 1.2 / (6 * 2
+	 * pi). */
 	static const char mixed[] = BEAM_IN(
 		LAYER("1", "0.6",
 		      "<phase type='mixturephase'><string name='weights' value='.2,.5'/><phase type='rayleigh'/><phase "

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Densities of sub-paths and of the techniques that could have made a path, recomputed independently
- * (tests/support/density.h) on worlds of all kinds: rough and specular surfaces, environments, surfaces that are
- * passed, fog, clouds, flakes, thin lenses, point lights and bent normals.
+ * Densities of sub-paths, and of all techniques that could have sampled a path, recomputed independently by
+ * tests/support/density.h. The worlds have rough and specular surfaces, environments, surfaces that let light
+ * straight through, fog, clouds, flakes, thin lenses, point lights and bent normals.
  */
 #include "tests/support/density.h"
 #include "tests/support/memory_assets.h"
@@ -148,8 +148,7 @@ static void test_infinity(void **state)
 	PANE("-1", ".2", ".6", "-60", "<bsdf type='mask'><float name='opacity' value='.3'/><bsdf type='diffuse'/></bsdf>")
 /* clang-format on */
 
-/* Light that goes straight through surfaces is joined through them, too: from lamps, points, the sky and to the lens.
- */
+/* Connections pass through surfaces that let light straight through: to lamps, point lights, the sky and the lens. */
 static void test_passed(void **state)
 {
 	(void)state;
@@ -174,7 +173,7 @@ static void test_passed(void **state)
 	assert_true(t.passed > t.routes / 5 && t.infinite > t.routes / 10);
 }
 
-/* Lights that no path hits by chance, beside some that can be hit. */
+/* Lights that no path can hit, beside some that can be hit. */
 static void test_delta_lights(void **state)
 {
 	(void)state;
@@ -209,7 +208,7 @@ static void test_delta_lights(void **state)
 		assert_true(w->emitter_pdf[i] > 0.01);
 	struct density_tally t = density_check("delta lights", w, 30000);
 	assert_true(t.with_delta > t.routes / 100);
-	/* Nothing but such lights. */
+	/* Only lights that no path can hit. */
 	/* clang-format off */
 	t = density_check("delta lights in a box", world_of_text(32, 24, SENSOR("0,0,2.9", "0,0,0") BOX DELTA_LIGHTS "%s",
 		BALL("0", "0", "0.5", "<bsdf type='dielectric'><float name='int_ior' value='1.5'/></bsdf>")
@@ -218,7 +217,7 @@ static void test_delta_lights(void **state)
 	assert_true(t.with_delta > t.routes / 20);
 }
 
-/* Everything in fog that scatters forwards, behind a near plane, lit by a lamp and a point light. */
+/* The whole scene lies in fog that scatters forwards, behind a near plane, lit by a lamp and a point light. */
 static void check_fog(const char *name, const char *medium, const struct vol *grid, size_t walks)
 {
 	char xml[4096];
@@ -267,7 +266,7 @@ static void test_fog(void **state)
 	/* clang-format on */
 }
 
-/* Flakes that lie nearly flat, in which fog is three times as dense along one direction as along another. */
+/* Fog of flakes that lie nearly flat, three times as dense along one direction as along another. */
 static void test_flakes(void **state)
 {
 	(void)state;
@@ -289,7 +288,7 @@ static double puffs(double x, double y, double z, uint32_t channel)
 	return 0.5 + 0.5 * sin(3 * x + channel) * cos(2 * y - channel) * sin(1 + 5 * z);
 }
 
-/* More forwards here than there, with a table that is 0 straight on. */
+/* The blend of the two phase functions varies with position; one is a table that is 0 straight ahead. */
 static void test_blended_fog(void **state)
 {
 	(void)state;
@@ -316,7 +315,7 @@ static void test_blended_fog(void **state)
 	/* clang-format on */
 }
 
-/* Denser here than there, of one colour and of three, in a box that does not fill the room. */
+/* The density varies with position, in one channel or three, in a box that does not fill the room. */
 static void test_puffs(void **state)
 {
 	(void)state;
@@ -345,7 +344,7 @@ static void test_puffs(void **state)
 	}
 }
 
-/* A wide lens, focused before the balls: x_k differs from path to path. */
+/* A wide lens, focused in front of the balls, so that the lens vertex x_k differs from path to path. */
 static void test_lens(void **state)
 {
 	(void)state;
@@ -366,7 +365,7 @@ static void test_lens(void **state)
 	density_check("lens", w, 3000);
 }
 
-/* Normals of vertices up to 40 degrees off the triangles'. */
+/* Vertex normals tilted by up to 40 degrees from the triangle normals. */
 static void test_bent_normals(void **state)
 {
 	(void)state;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Paths through glass that disperses: bidirectional against plain path tracing, smooth and rough; and glass whose index
- * hardly varies, where paths carry one wavelength, against the plain glass, where they carry four. Levels and power:
- * agree.h.
+ * Paths through dispersive glass: bidirectional against plain path tracing, for smooth and rough glass; and glass
+ * whose index hardly varies, where paths carry one wavelength, against plain glass, where they carry four. Level and
+ * power: tests/support/agree.h.
  */
 #include "tests/support/agree.h"
 #include "tests/support/stats.h"
@@ -17,7 +17,7 @@
 
 #include <cmocka.h>
 
-/* A ball on a floor under a sky: little noise but that of drawing one wavelength. */
+/* A ball on a floor under a sky: almost all of the noise comes from drawing one wavelength. */
 static struct world *sky_over(const char *bsdf)
 {
 	/* clang-format off */
@@ -123,7 +123,7 @@ static void test_no_coefficient_is_the_plain_scene(void **state)
 	assert_memory_equal(zero.mean, plain.mean, sizeof plain.mean);
 }
 
-/* Whether the path that path_connect joins scatters at a surface that disperses. */
+/* Returns whether the path joined by path_connect() scatters at a dispersive surface. */
 static bool meets_glass(const struct path_context *c, unsigned s, unsigned t)
 {
 	for (unsigned i = 1; i < s; i++)
@@ -135,7 +135,7 @@ static bool meets_glass(const struct path_context *c, unsigned s, unsigned t)
 	return false;
 }
 
-/* Every technique leaves one lane of such a path, and four of all others. */
+/* Every technique leaves a path that meets dispersive glass one wavelength, and all other paths four. */
 static void test_every_technique_collapses(void **state)
 {
 	(void)state;
@@ -165,7 +165,7 @@ static void test_every_technique_collapses(void **state)
 	}
 	for (unsigned s = 0; s <= 3; s++) {
 		print_message("s = %u: %zu paths with one wavelength, %zu with four\n", s, one[s], four[s]);
-		/* Behind the first vertex of light there is only the ball. */
+		/* the vertex after the first one of a light sub-path can only lie on the ball */
 		assert_true(one[s] > 50 && (s == 3) == (four[s] == 0));
 	}
 	world_free(w);

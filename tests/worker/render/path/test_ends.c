@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The ends of paths: a camera with an aperture, emitters that cannot be hit. Integrators against each other and against
- * closed forms. Statistics as in tests/support/agree.h: level 1e-4 over the suite; biases of 2 % on a quarter of the
- * picture and 0.5 % of the mean are found with 95 %, what exactly is printed.
+ * The ends of paths: a camera with an aperture, and emitters that cannot be hit. Integrators are compared with each
+ * other and with closed forms. Statistics as in tests/support/agree.h: level 1e-4 over the suite; biases of 2 % of a
+ * quarter of the image and 0.5 % of its mean are found with 95 % probability, and the exact power is printed.
  */
 #include "worker/render/render.h"
 #include "tests/support/agree.h"
@@ -21,12 +21,12 @@
 
 #include <cmocka.h>
 
-/* Samples a pixel that the power asks for; 0: not run. */
+/* Samples per pixel that the power requires; 0: the integrator is not run. */
 struct effort {
-	uint64_t path, bdpt, pssmlt; /* pssmlt, which takes minutes: with FULL=1 */
+	uint64_t path, bdpt, pssmlt; /* pssmlt takes minutes and runs with FULL=1 only */
 };
 
-/* The first that runs is what the others are to agree with. Takes the world. */
+/* The first integrator that runs is the reference for the others. Takes ownership of the world. */
 static void check_convergence(const char *name, struct world *w, struct effort e)
 {
 	static struct agree_image image[2];
@@ -50,7 +50,7 @@ static void check_convergence(const char *name, struct world *w, struct effort e
 #define DIFFUSE(x) "<bsdf type='diffuse'><float name='reflectance' value='" x "'/></bsdf>"
 #define AT(inner) "<transform name='to_world'>" inner "</transform>"
 
-/* Everything out of focus by up to a third of the picture's width; a border of two pixels. */
+/* Everything is out of focus by up to a third of the image's width; the filter reaches two pixels beyond the border. */
 static void test_defocus(void **state)
 {
 	(void)state;
@@ -67,8 +67,8 @@ static double overlap(struct span a, struct span b)
 	return fmax(fmin(a.high, b.high) - fmax(a.low, b.low), 0);
 }
 
-/* A shining rectangle across the axis at depth z, seen through a lens. For one point a of the aperture the picture is
- * the pinhole's, moved by a (1/z - 1/focus) in slope; the mean over the aperture by quadrature. */
+/* An emitting rectangle across the axis at depth z, seen through a lens. For each point a of the aperture, the image
+ * is that of a pinhole, moved by a (1/z - 1/focus) in slope; the mean over the aperture is found by quadrature. */
 static void test_blurred_rectangle(void **state)
 {
 	(void)state;
@@ -81,7 +81,7 @@ static void test_blurred_rectangle(void **state)
 	agree_render(w, __func__, "path", &side, &image);
 	double expected[AGREE_CELLS + 1] = {0};
 	for (int c = 0; c < AGREE_CELLS; c++) {
-		/* Film y runs down. */
+		/* Film y runs downwards. */
 		struct span bx = {half * (c % 2 - 1), half * (c % 2)}, by = {half * (0 - c / 2), half * (1 - c / 2)};
 		for (int i = 0; i < RADII * TURNS; i++) {
 			double r = radius * sqrt((i / TURNS + 0.5) / RADII), phi = 2 * M_PI * (i % TURNS + 0.5) / TURNS;
@@ -97,16 +97,15 @@ static void test_blurred_rectangle(void **state)
 		for (int c = 0; c <= AGREE_CELLS; c++)
 			image.mean[g][c] /= expected[c] * sum;
 	agree_expect("blurred rectangle", &image, 1);
-	/* A pinhole's picture is another one by far. */
+	/* A pinhole gives a very different image, so the comparison can tell the two cameras apart. */
 	double sharp = overlap(x, (struct span){-half, 0}) * overlap(y, (struct span){0, half}) / (half * half);
 	assert_true(fabs(expected[0] / sharp - 1) > 0.1);
 	world_free(w);
 }
 
-/* A floor at y = 0 seen straight from above, and what lights it. mirror: a mirror stands on it at x = -1.5. */
+/* A floor at y = 0, seen straight from above, and its lights. mirror: a mirror stands on the floor at x = -1.5. */
 struct lamps {
-	vec3 point, spot, aim,
-		direction; /* the spot's 40 degrees, 25 of them full; direction in which the parallel light travels */
+	vec3 point, spot, aim, direction; /* direction: of the parallel light; the spot ends at 40 degrees */
 	double intensity, spot_intensity, irradiance, sky;
 	bool mirror;
 };
@@ -117,7 +116,7 @@ static double from_point(vec3 lamp, double intensity, vec3 at)
 	return intensity * d.y / pow(vec3_dot(d, d), 1.5);
 }
 
-/* Over pi: what a white floor would send up. */
+/* Returns the irradiance at (x, z). Divided by pi, it is the radiance of a white floor. */
 static double irradiance(const struct lamps *l, double x, double z)
 {
 	vec3 at = {x, 0, z}, image = {-3 - l->point.x, l->point.y, l->point.z};
@@ -134,7 +133,9 @@ static double irradiance(const struct lamps *l, double x, double z)
 
 static void check_floor(const char *name, const struct lamps *l, struct effort e)
 {
-	enum { N = 480 }; /* the midpoint rule errs by 1e-6; with 48 by 7e-5, which samples of low discrepancy see */
+	enum {
+		N = 480
+	}; /* the midpoint rule errs by 1e-6; with 48 points by 7e-5, which low-discrepancy samples would reveal */
 	static struct agree_image image;
 	const struct agree_side sides[] = {{"path", e.path, 32, 0, 0},
 					   {"bdpt", e.bdpt, 32, 0, 0},
@@ -207,7 +208,7 @@ static void test_lit_floor(void **state)
 	check_floor("point", &l, (struct effort){1024, 1024, 0});
 	l = (struct lamps){.spot = {-0.5, 2, 0}, .aim = {0.2, 0, 0.3}, .direction = {0, -1, 0}, .spot_intensity = 3};
 	check_floor("spot", &l, (struct effort){1024, 2048, 0});
-	/* Two of them, and the sky that escaping rays meet. */
+	/* Two lights, and the sky, which escaping rays meet. */
 	l = (struct lamps){.point = {0.6, 2, -0.4},
 			   .intensity = 1,
 			   .direction = {0.5, -1, 0.2},
@@ -217,7 +218,7 @@ static void test_lit_floor(void **state)
 	check_floor("point, parallel light and sky", &l, (struct effort){5120, 4096, 0});
 }
 
-/* Light by way of a mirror is a caustic: only paths from the light find it. */
+/* Light by way of a mirror is a caustic, which only paths from the light find. */
 static void test_lit_by_a_mirror(void **state)
 {
 	(void)state;
@@ -232,7 +233,7 @@ static void test_lit_by_a_mirror(void **state)
 	check_floor("mirrored parallel light", &l, (struct effort){0, 5120, 0});
 }
 
-/* Rough glass and metal in light that no path hits: caustics that the path tracer finds, too. */
+/* Rough glass and metal in light that no path hits: these caustics are found by the path tracer as well. */
 static void test_rough_in_delta_light(void **state)
 {
 	(void)state;
@@ -240,9 +241,10 @@ static void test_rough_in_delta_light(void **state)
 	check_convergence("rough bodies in delta light", w, (struct effort){8192, 8192, 0});
 }
 
-/* In a room of perfect mirrors a path ends by roulette alone: after as many scattering events as the scene says no path
- * has ended before, and one in twenty ends there: 200 of 4,000, standard deviation 13.8. 130 to 270 are allowed, which
- * is wrong once in two million; one in 30 or in 14 is found with 95 %. */
+/* In a room of perfect mirrors only Russian roulette ends a path. No path may end before the number of scattering
+ * events that the scene sets for it; at this event one path in twenty ends: 200 of 4,000 with standard deviation
+ * 13.8. The accepted range of 130 to 270 rejects a correct program once in two million; a rate of one in 30 or one in
+ * 14 is found with 95 % probability. */
 static void test_roulette(void **state)
 {
 	(void)state;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Scenes at the edge of what numbers can hold, and scenes without light, by every integrator: nothing that is not
- * finite comes out (agree_render asserts it), and what is black stays black.
+ * Scenes at the limits of the number format, and scenes without light, by every integrator: every value is finite
+ * (agree_render() asserts it), and black scenes stay black.
  */
 #include "worker/render/render.h"
 #include "tests/support/agree.h"
@@ -22,7 +22,7 @@
 
 enum { INTEGRATORS_MOST = 8 };
 
-/* Runs every integrator for a little; the means of what comes out. */
+/* Runs every integrator briefly and stores the mean of each image in `mean`. */
 static void run_all(const char *name, struct world *w, double mean[INTEGRATORS_MOST])
 {
 	static struct agree_image image;
@@ -60,7 +60,7 @@ static void test_hard(void **state)
 			"<emitter type='area'><float name='radiance' value='1e9'/></emitter></shape>"),
 		mean);
 	assert_true(mean[0] > 0 && mean[1] > 0);
-	/* A light of 1e-6 of the scene's size. */
+	/* A light 1e-6 times as large as the scene. */
 	run_all("tiny light",
 		world_of_text(
 			16, 16,
@@ -69,7 +69,7 @@ static void test_hard(void **state)
 			"<emitter type='area'><float name='radiance' value='1e12'/></emitter></shape>"),
 		mean);
 	assert_true(mean[0] > 0 && mean[1] > 0);
-	/* Grazing: the camera lies almost in the floor. */
+	/* Grazing view: the camera lies almost in the floor's plane. */
 	run_all("grazing",
 		world_of_text(
 			16, 16,
@@ -78,7 +78,7 @@ static void test_hard(void **state)
 			"<bsdf type='roughdielectric'><float name='alpha' value='.01'/></bsdf></shape>"),
 		mean);
 	assert_true(mean[0] > 0);
-	/* Lights so different that the fainter is never chosen. */
+	/* Two lights so different that the fainter one is never chosen. */
 	run_all("faint light",
 		world_of_text(
 			16, 16,
@@ -88,7 +88,7 @@ static void test_hard(void **state)
 			"<shape type='sphere'><point name='center' x='3' y='3' z='0'/><float name='radius' value='.5'/>"
 			"<emitter type='area'><float name='radiance' value='1e30'/></emitter></shape>"),
 		mean);
-	/* A sliver of a mirror, a sliver of a lamp. */
+	/* A sliver of a mirror and a sliver of a lamp. */
 	run_all("slivers",
 		world_of_text(
 			16, 16,
@@ -101,7 +101,7 @@ static void test_hard(void **state)
 	assert_true(mean[0] > 0);
 }
 
-/* No light at all: leases give black, the bootstrap no seeds, chains without a seed stay black. */
+/* No light at all: leases return black, the bootstrap finds no seeds, and chains without a seed stay black. */
 static void expect_black(const char *text)
 {
 	struct world *w = world_of_text(16, 16, "%s%s", SENSOR("0,2,4", "0,0,0"), text);

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * bdpt leaves faint connections to chance, all of one sample to one random number. Over all values of that number the
- * sample's mean is what it is with every connection made: an identity of each single sample, tested without statistics.
+ * bdpt plays Russian roulette with faint connections, with one random number for all connections of a sample. The
+ * mean of the sample over all values of this number equals its value with every connection made: an identity that
+ * holds for each single sample, so that the test needs no statistics.
  */
 #include "worker/render/path/connect.h"
 #include "worker/render/path/integrate_bdpt.h"
@@ -16,7 +17,7 @@
 
 enum { SAMPLES = 150, PLACES = 512 };
 
-/* A sample's numbers but for the one that decides about faint connections. */
+/* A sample's random numbers, with a fixed value for the number that decides about faint connections. */
 struct placed {
 	struct sampler base;
 	struct sampler_random random;
@@ -41,7 +42,8 @@ static struct placed placed_at(uint64_t index, double place)
 	return p;
 }
 
-/* What the pair of sub-paths brings to its own film point, X + Y + Z, by every connection; the shadow rays of that. */
+/* Returns the contribution (X + Y + Z) of a pair of sub-paths to its own film point with every connection made, and
+ * counts the shadow rays traced for it. */
 static double by_every_connection(struct path_context *c, uint64_t index)
 {
 	double film[2], xyz[3];
@@ -58,7 +60,7 @@ static double by_every_connection(struct path_context *c, uint64_t index)
 	return xyz[0] + xyz[1] + xyz[2];
 }
 
-/* The same as bdpt finds it. */
+/* Like by_every_connection(), but as bdpt computes it, with the roulette's number set to `place`. */
 static double by_chance(struct path_context *c, uint64_t index, double place)
 {
 	static struct path_sample out;
@@ -110,8 +112,8 @@ static void test_mean(void **state)
 		for (int k = 0; k < PLACES; k++)
 			sum += by_chance(&c, i, (k + 0.5) / PLACES);
 		rays += counters[COUNT_RAYS_SHADOW];
-		/* Each connection's share of the places is off by one place at most; one counts 12 tenths of the sum,
-		 * and there are some tens. */
+		/* Each connection's probability is off by at most one of PLACES values; one connection counts at most
+		 * 12 tenths of the sum, and there are some tens of connections. */
 		if (fabs(sum / PLACES - expected) > 0.02 * expected) {
 			print_message("sample %d: %g, by every connection %g\n", (int)i, sum / PLACES, expected);
 			differ++;
@@ -127,7 +129,8 @@ static void test_mean(void **state)
 	world_free(w);
 }
 
-/* Chains and the bootstrap take samples as functions of their numbers: all connections are made. */
+/* Chains and the bootstrap need samples that are functions of their random numbers: without roulette, all connections
+ * are made. */
 static void test_without_roulette(void **state)
 {
 	(void)state;

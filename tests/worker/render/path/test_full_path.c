@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Whole paths against the sub-paths that they are made of: contribution and densities, multiplied out one way by the
- * connections of bdpt and the other way vertex by vertex, and every cached quantity.
+ * Full paths against the sub-paths that they are joined from: contribution and densities are multiplied out once by
+ * the connections of bdpt and once vertex by vertex, and every cached quantity is recomputed.
  */
 #include "tests/support/worlds.h"
 #include "worker/render/halfvec/refract.h"
@@ -32,7 +32,7 @@
 
 enum { EDGES = 8 };
 
-/* X + Y + Z, and their shares. */
+/* Returns X + Y + Z of `l` and stores the shares of X, Y and Z. */
 static double intensity_of(struct path_context *c, spectrum l, double share[3])
 {
 	struct path_sample s = {.count = 0, .intensity = 0};
@@ -42,7 +42,7 @@ static double intensity_of(struct path_context *c, spectrum l, double share[3])
 	return s.intensity;
 }
 
-/* The balance heuristic over all techniques makes of f / p_s the value f / sum p. */
+/* The balance heuristic over all techniques turns the estimate f / p_s into f / sum p. */
 static double f_over_p(struct path_context *c, struct full_path *x)
 {
 	double log_pdf[FULL_PATH_MAX_VERTICES], log_f = full_path_log_f(c, x), sum = 0;
@@ -64,7 +64,7 @@ static void compare(struct path_context *c, unsigned s, unsigned edges, struct t
 	double want = intensity_of(c, path_connect(c, s, edges + 1 - s, PATH_MAX_EDGES, film), share);
 	bool there = full_path_from_subpaths(c, s, c->passed_count, edges + c->passed_count, &x);
 	if (!there || want == 0) {
-		/* A film point that is drawn on the border may be computed on its other side. */
+		/* rounding may move a film point drawn on the border to the other side of it */
 		t->black++;
 		t->disagree += there != (want > 0);
 		return;
@@ -82,7 +82,7 @@ static void compare(struct path_context *c, unsigned s, unsigned edges, struct t
 		t->worst = off;
 }
 
-/* Returns how many of the paths had their connection refracted. */
+/* Returns the number of paths with a refracted connection. */
 static unsigned long check(const char *name, struct world *w, unsigned long samples)
 {
 	static struct path_context c;
@@ -149,13 +149,14 @@ static void test_surfaces(void **state)
 			"</bsdf>")), 1500);
 	/* clang-format on */
 	check("phong", world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='phong'/>")), 1500);
-	/* Its way straight on has another probability for a path from the lamp than for one from the camera. */
+	/* The probability of going straight on through a hair differs between paths from the lamp and paths from the
+	 * camera. */
 	check("hair", world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='hair'/>")), 3000);
-	/* The backs of curves are culled. */
+	/* Curves do not scatter at their backs. */
 	check("hairs", world_of_own_scene("integrators", "hair.xml", 32, 32), 3000);
 }
 
-/* Coloured glass around a stone that states no medium, and around a bubble that states what is outside of it; water up
+/* Coloured glass around a stone that states no medium and around a bubble that states its exterior medium; water up
  * to the lamp. */
 static void test_media(void **state)
 {
@@ -210,8 +211,8 @@ static void test_media(void **state)
 	/* clang-format on */
 }
 
-/* A sphere is drawn towards a vertex within the cone in which it is seen, and on all of its area for a light sub-path.
- */
+/* Next-event estimation samples a sphere within the cone in which the vertex sees it; a light sub-path starts
+ * anywhere on the sphere's area. */
 static void test_round_lamp(void **state)
 {
 	(void)state;
@@ -241,7 +242,7 @@ static void test_environment(void **state)
 	/* clang-format on */
 }
 
-/* A lens, and lights that no path hits beside one environment. */
+/* A lens, and lights that no path can hit, beside an environment. */
 static void test_ends(void **state)
 {
 	(void)state;
@@ -276,7 +277,8 @@ static void test_ends(void **state)
 	      world_of_text(32, 32, "%s%s%s%s", lens, lights, floor, BALL("<bsdf type='dielectric'/>")), 6000);
 }
 
-/* Joined through panes, holes, and a block that absorbs what its faces let straight through. */
+/* Connections through panes, through holes, and through a block that absorbs light between faces that let it straight
+ * through. */
 static void test_passed(void **state)
 {
 	(void)state;
@@ -308,7 +310,7 @@ static void test_passed(void **state)
 	check("panes", w, 3000);
 }
 
-/* Small lamps in, under and behind glass of several kinds; some of it absorbs, disperses or bends its normals. */
+/* Small lamps in, under and behind glass of several kinds, some of which absorbs, disperses or has bent normals. */
 static void test_refracted(void **state)
 {
 	(void)state;
@@ -339,8 +341,8 @@ static void test_refracted(void **state)
 	/* clang-format on */
 }
 
-/* Surfaces that are passed count as edges: no path is shorter or longer than requested, and some have their length only
- * by them. */
+/* Surfaces that a connection passes through count as edges: no path is shorter or longer than requested, and some
+ * paths are long enough only because of these surfaces. */
 static void test_passed_lengths(void **state)
 {
 	(void)state;
@@ -385,8 +387,9 @@ static void test_passed_lengths(void **state)
 	world_free(w);
 }
 
-/* A lamp straight behind more panes than a connection passes: no technique but a sub-path that passes them one by one
- * finds it, so its weight is 1. One pane less, and the lamp is joined to the lens, too, which is denser. */
+/* A lamp straight behind more panes than a connection may pass through: only a sub-path that goes through the panes
+ * one by one finds it, so the weight of this technique is 1. With one pane less, the lamp can be connected to the
+ * lens as well, a technique with the higher density. */
 static void test_passed_most(void **state)
 {
 	(void)state;
@@ -432,8 +435,8 @@ static void test_passed_most(void **state)
 	}
 }
 
-/* A wall before the near plane, another behind the far one, and the sky: all that a camera path finds between the
- * planes is visible. */
+/* A wall in front of the near plane, another behind the far plane, and the sky: everything that a camera path finds
+ * between the two planes is visible. */
 static void test_clipped(void **state)
 {
 	(void)state;
@@ -454,8 +457,8 @@ static void test_clipped(void **state)
 	/* clang-format on */
 }
 
-/* Both directions lie on the same side of the shading and of the geometric normal, each, or nothing scatters: the eight
- * cases of a normal that is bent by 60 degrees. */
+/* A surface scatters only if both directions lie on the same side of the shading normal and both on the same side of
+ * the geometric normal: all eight cases, with a shading normal tilted by 60 degrees. */
 static void test_sides(void **state)
 {
 	(void)state;

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Paths through hair, which is not reciprocal, and whose way out of the fibre is chosen with other probabilities by
- * paths from a light than by those from the camera: integrators that start at both ends, and chains, agree with the
- * path tracer on three thick hairs in front of a lamp. Chains need FULL=1.
+ * Paths through hair, whose scattering is not reciprocal: paths from a light choose the lobe in which light leaves
+ * the fibre with other probabilities than paths from the camera. Integrators that start at both ends, and chains,
+ * must agree with the path tracer on three thick hairs in front of a lamp. Chains need FULL=1. Statistics as in
+ * tests/support/agree.h.
  */
 #include "tests/support/agree.h"
 #include "tests/support/length.h"

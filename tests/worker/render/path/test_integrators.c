@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Every integrator of the registry against the path tracer, on small scenes (tests/scenes/integrators) that each
- * exercise something of their own: diffuse light and textures, glossy metal, smooth glass, rough glass, shading
- * normals, light from infinity. Chains take minutes where light comes through glass: FULL=1.
+ * exercise one feature: diffuse light and textures, glossy metal, smooth glass, rough glass, shading normals, light
+ * from infinity. Statistics as in tests/support/agree.h. Chains take minutes where light passes through glass and
+ * need FULL=1 there.
  */
 #include "worker/render/path/integrator.h"
 #include "worker/render/render.h"
@@ -18,14 +19,14 @@
 
 #include <cmocka.h>
 
-/* Samples a pixel, as many as the power asks for; 0: the scene says nothing new of such an integrator. */
+/* Samples per pixel that the power requires; 0: the scene tests nothing new of this integrator. */
 struct lengths {
 	uint64_t path, bdpt;
-	uint64_t rare;	 /* of few light sub-paths */
-	uint64_t spread; /* of short chains from samples; rare_spread: from samples with few light sub-paths */
+	uint64_t rare;	 /* integrators with few light sub-paths */
+	uint64_t spread; /* short chains from samples; rare_spread: with few light sub-paths */
 	uint64_t rare_spread;
-	uint64_t chain;	 /* of chains of all techniques */
-	uint64_t single; /* of chains of single paths, whose states say less a mutation */
+	uint64_t chain;	 /* chains over all techniques */
+	uint64_t single; /* chains over single paths, in which a mutation yields less information */
 };
 
 static uint64_t samples_of(const struct lengths *n, const struct render_integrator *r)
@@ -56,7 +57,7 @@ static void check_all(const char *name, const char *file, const struct lengths *
 	world_free(w);
 }
 
-/* Samples of what FULL=1 alone compares. */
+/* Returns spp with FULL=1, else 0. */
 static uint64_t at_length(uint64_t spp)
 {
 	return test_full() ? spp : 0;

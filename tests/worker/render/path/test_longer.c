@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The energy of paths that are too long to simulate, in a closed sphere whose wall shines and reflects the share r:
- * paths of e edges bring r^(e - 1) of what the wall emits. Each estimate against this sum, at 4 standard errors (level
- * 6e-5); a hundredth too much or too little is found where the share is large.
+ * The energy of paths that are too long to simulate, in a closed sphere whose wall emits light and reflects the share
+ * r: paths of e edges contribute r^(e - 1) times the emission. Each estimate is compared with this geometric series,
+ * at 4 standard errors (level 6e-5); an error of 1 % is found where the series is large.
  */
 #include "tests/support/worlds.h"
 #include "worker/render/path/integrate_path.h"
@@ -37,7 +37,8 @@ static struct world *make_room(const char *bsdf)
 		bsdf);
 }
 
-/* The mean of what is found of paths of more than `after` edges. */
+/* Returns the estimated mean of all paths of more than `after` and up to `longest` edges; *error: its standard error.
+ */
 static double mean_of_longer(struct world *w, uint32_t after, uint32_t longest, double *error)
 {
 	static struct path_context c;
@@ -55,7 +56,7 @@ static double mean_of_longer(struct world *w, uint32_t after, uint32_t longest, 
 	return sum;
 }
 
-/* The mean where radiance 1 is all that the camera sees. */
+/* Returns the mean of an image that sees radiance 1 everywhere. */
 static double mean_of_unit_light(void)
 {
 	static struct path_context c;
@@ -94,7 +95,7 @@ static void test_a_shining_sphere(void **state)
 	(void)state;
 	struct world *w = make_room("<bsdf type='diffuse'><spectrum name='reflectance' value='0.99'/></bsdf>");
 	expect(w, 32, 64, geometric_series(0.99, 32, 64), 0.02);
-	expect(w, 126, 131, geometric_series(0.99, 126, 131), 0.03); /* where one stretch ends and the next begins */
+	expect(w, 126, 131, geometric_series(0.99, 126, 131), 0.03); /* across the border of two segments */
 	expect(w, 128, LONGER_EDGES, geometric_series(0.99, 128, LONGER_EDGES), 0.05);
 	world_free(w);
 	w = make_room("<bsdf type='diffuse'><spectrum name='reflectance' value='0.5'/></bsdf>");
@@ -102,7 +103,7 @@ static void test_a_shining_sphere(void **state)
 	world_free(w);
 }
 
-/* The same by a lobe that scatters in one direction only. */
+/* Like the shining sphere, but the wall scatters in one direction only. */
 static void test_a_mirror(void **state)
 {
 	(void)state;
@@ -112,7 +113,7 @@ static void test_a_mirror(void **state)
 	world_free(w);
 }
 
-/* Light goes on by the diagonal between two plates, meeting each a step further on, to a lamp behind 300 of them. */
+/* Light travels diagonally between two plates, with hits one unit apart, to a lamp behind 300 hits. */
 static struct world *make_corridor(const char *bsdf)
 {
 	return world_of_text(
@@ -129,7 +130,7 @@ static struct world *make_corridor(const char *bsdf)
 		bsdf, bsdf);
 }
 
-/* Mirrors: a stretch goes on from where the one before it ended, with its throughput. */
+/* Mirrors: a segment of the continuation starts where the previous one ended, with its throughput. */
 static void test_a_corridor(void **state)
 {
 	(void)state;
@@ -141,8 +142,8 @@ static void test_a_corridor(void **state)
 	world_free(w);
 }
 
-/* A slab of glass that disperses, which reflects all of it. One wavelength travels on, which counts for four once,
- * however many stretches know of it. */
+/* Slabs of dispersive glass that reflect all of the light. One wavelength travels on, and its factor of four is
+ * applied only once, whatever the number of segments. */
 static void test_a_slab(void **state)
 {
 	(void)state;

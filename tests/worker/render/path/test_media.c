@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Edges through media that scatter (worker/render/path/media.h), on a ray through three layers with faces of `null`:
- * one that scatters, one that only absorbs, and one of other coefficients, in which a glass pane states no medium.
- * Events drawn for evenly spaced numbers are counted between any two places as often as the integral of their density
- * says; a grid is the same as layers of its values; an edge has the same depths from both ends; faces that do not fit
- * are noticed; and emitters know what surrounds them.
+ * Edges through scattering media (worker/render/path/media.h), on a ray through three layers with `null` faces: one
+ * that scatters, one that only absorbs, and one with other coefficients that contains a glass pane without a medium
+ * of its own. Events drawn from evenly spaced numbers must occur between any two positions as often as the integral
+ * of their density says; a grid must equal layers of its values; an edge must have the same optical depths from both
+ * ends; mismatched faces must be noticed; and emitters must know the medium around them.
  */
 #include "worker/render/path/media.h"
 #include "tests/support/memory_assets.h"
@@ -19,7 +19,7 @@
 
 #include <cmocka.h>
 
-/* From z = a to b. */
+/* A layer from z = middle - half to middle + half. */
 #define LAYER(middle, half, medium)                                                                            \
 	"<shape type='cube'><transform name='to_world'><scale x='9' y='9' z='" half "'/><translate z='" middle \
 	"'/></transform><bsdf type='null'/>" medium "</shape>"
@@ -27,8 +27,8 @@
 	"<medium type='homogeneous' name='" side "'><rgb name='sigma_t' value='" sigma_t \
 	"'/><rgb name='albedo' value='" albedo "'/></medium>"
 
-/* Layers at z in (-1, 1), (-3, -2) and (-7, -3). The third begins where the second ends: between them the exterior of
- * the one and the interior of the other would have to be told; so there is a gap of 0.25. */
+/* Layers at z in (-1, 1), (-3, -2) and (-7, -3). The third begins where the second ends; if the first began there
+ * too, one layer would have to state its exterior and another its interior, so a gap separates them. */
 static struct world *layers(void)
 {
 	return world_of_text(
@@ -54,7 +54,7 @@ static struct path_context context_of(const struct world *w, uint64_t *counters)
 
 static const vec3 down = {0, 0, -1};
 
-/* Of a medium that is the same everywhere. */
+/* Returns the transmittance of a homogeneous medium over `distance`. */
 static spectrum let_through(const struct medium *m, double distance, const struct wavelengths *w)
 {
 	spectrum t = medium_extinction(m, (vec3){0, 0, 0}, down, w);
@@ -71,7 +71,7 @@ static void test_events(void **state)
 	struct world *w = layers();
 	struct path_context c = context_of(w, counters);
 	struct path_vertex at = start_at(w, 3), to;
-	double length = 11 * w->scale; /* of the ray that is looked at */
+	double length = 11 * w->scale; /* length of the test ray */
 	unsigned events[PLACES] = {0}, free_ones = 0;
 	spectrum left, carried = spectrum_of(0);
 	double pdf_free = 0;
@@ -104,13 +104,14 @@ static void test_events(void **state)
 			if (edge.medium && path_medium(w, edge.medium)->scatters)
 				sum += path_edge_pdf(&c, &edge, edge.medium, &there) * length / PLACES / STEPS;
 		}
-		/* a face falls between steps; four wavelengths have an event or not at either end */
+		/* a face may fall between two steps; the four wavelengths differ in whether an event occurs at either
+		 * end */
 		assert_true(fabs(events[k] / (double)NUMBERS - sum) < 1.5e-3);
 	}
 	world_free(w);
 }
 
-/* A grid of four values, one above the other, and as many layers almost next to each other. */
+/* A grid of four values stacked along z, and four layers that almost touch each other. */
 #define VALUES 4
 static const double steps[VALUES] = {0.4, 2, 0, 0.9};
 
@@ -152,8 +153,8 @@ static struct world *as_grid(bool scatters)
 	return world_of_files(8, 8, files);
 }
 
-/* Where a grid steps from one value to the next, events are where they are in homogeneous layers, and as much light is
- * left. Three channels are compared where colours are rgb. */
+/* Where a grid steps from one value to the next, the events and the remaining light are those of homogeneous layers.
+ * Three channels are compared where colours are RGB. */
 static void test_grid_as_layers(void **state)
 {
 	(void)state;
@@ -177,7 +178,8 @@ static void test_grid_as_layers(void **state)
 		}
 		assert_int_equal(to[0].kind, to[1].kind);
 		in_media += to[0].kind == VERTEX_MEDIUM;
-		if (to[0].kind == VERTEX_MEDIUM) /* the first scene's middle may differ from the second's */
+		if (to[0].kind ==
+		    VERTEX_MEDIUM) /* the medium in the middle of the first scene may differ from that of the second */
 			assert_true(fabs(to[0].x.p.z / w[0]->scale + w[0]->center.z - to[1].x.p.z / w[1]->scale -
 					 w[1]->center.z) < 1e-5);
 		assert_true(fabs(pdf[0] / pdf[1] - 1) < 1e-5);
@@ -189,7 +191,8 @@ static void test_grid_as_layers(void **state)
 	world_free(w[1]);
 }
 
-/* The same where media only absorb, between points on both sides of the boundaries and within them. */
+/* Like test_grid_as_layers(), but in media that only absorb, between points on both sides of the boundaries and
+ * within them. */
 static void test_absorbing_grid(void **state)
 {
 	(void)state;
@@ -213,7 +216,8 @@ static void test_absorbing_grid(void **state)
 	world_free(w);
 }
 
-/* Points in the first and in the third layer see each other alike; only the ends differ. */
+/* Points in the first and in the third layer see each other with the same optical depths in both directions; only the
+ * ends of the edge are exchanged. */
 static void test_both_ends(void **state)
 {
 	(void)state;
@@ -235,16 +239,16 @@ static void test_both_ends(void **state)
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
 		assert_true(fabs(there.free.v[i] / back.free.v[i] - 1) < 1e-12);
 		assert_true(fabs(left.v[i] / left_back.v[i] - 1) < 1e-12);
-		assert_true(left.v[i] < 0.95 * there.free.v[i]); /* the layer between them absorbs */
+		assert_true(left.v[i] < 0.95 * there.free.v[i]); /* the layer between the points absorbs */
 	}
-	a.edge.medium = 2; /* not what the layer says of its inside */
+	a.edge.medium = 2; /* differs from the interior that the layer states */
 	assert_true(path_see_in_media(&c, &a, &b, &there, &left));
 	assert_false(there.fits);
 	world_free(w);
 }
 
-/* A lamp in fog without a medium of its own, one that states what is around it, a point light outside and one inside.
- */
+/* A lamp in fog that states no medium, a lamp that states the medium around it, a point light outside the fog, and
+ * one inside. */
 static void test_emitters(void **state)
 {
 	(void)state;

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Merging where the photon lies exactly where the camera's sub-path ends: what bdpt and path bring then is f over the
- * densities of the full path, multiplied out vertex by vertex. And the light of a room by merging, against path.
+ * Merging with a photon placed exactly where the camera's sub-path ends: the contribution found by bdpt and `path`
+ * must be f divided by the densities of the full path, multiplied out vertex by vertex. And the light of a room by
+ * merging, against `path`.
  */
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
@@ -35,7 +36,7 @@
 #define PANE(y)                                                                                                                 \
 	"<shape type='rectangle'>" AT("<scale value='1.9'/><rotate x='1' angle='80'/><translate y='" y "'/>")                    \
 	"<bsdf type='thindielectric'/></shape>"
-/* The room, its corners left out, is full of fog; beside it a ball of denser fog. */
+/* Fog fills the room except its corners; beside it lies a ball of denser fog. */
 #define FOG(side, sigma_t)                                                                                                      \
 	"<medium type='homogeneous' name='" side "'><rgb name='sigma_t' value='" sigma_t "'/>"                                   \
 	"<rgb name='albedo' value='0.9,0.8,0.6'/><phase type='hg'><float name='g' value='0.4'/></phase></medium>"
@@ -64,8 +65,8 @@ static double f_over(const double *log_pdf, unsigned last, double log_f)
 	return 1 / sum;
 }
 
-/* The camera's sub-path of t vertices goes on to the light's vertex s, as if it had been drawn there. false: it cannot.
- */
+/* Continues the camera's sub-path of t vertices to vertex s of the light sub-path as if this vertex had been sampled.
+ * Returns false if that is impossible. */
 static bool continue_to_light(struct path_context *c, unsigned s, unsigned t)
 {
 	const struct path_vertex *y = &c->light[s];
@@ -114,11 +115,11 @@ static unsigned long check_densities(const char *name, struct world *w, unsigned
 		sampler_random_init(&u, 0x6d65726765, RNG_TEST, i, 0);
 		unsigned camera = path_walk_camera(&c, &u.base, EDGES + 1, film),
 			 light = path_walk_light(&c, &u.base, EDGES);
-		/* From the longest on: meeting changes the vertices behind. */
+		/* From the longest sub-path down: each meeting changes the vertices after it. */
 		for (unsigned t = camera; t >= 2; t--)
 			for (unsigned s = 2; s < light && s + t <= EDGES; s++) {
 				struct merged found;
-				/* s + 1 vertices of light and t of the camera are joined */
+				/* s + 1 vertices of the light sub-path and t of the camera's are joined */
 				if (!full_path_from_subpaths(&c, s + 1, 0, s + t, &x) || !continue_to_light(&c, s, t))
 					continue;
 				struct photon p = photon_of(&c, s);
@@ -143,7 +144,7 @@ static void test_densities(void **state)
 	assert_true(check_densities("glass",
 				    world_of_text(32, 32, ROOM ROUND_LAMP BALL("<bsdf type='dielectric'/>") "%s", ""),
 				    3000) > 3000);
-	/* All that `path` finds of the point behind the ball it finds refracted. */
+	/* `path` finds all of the light from the point behind the ball by refracted connections. */
 	assert_true(check_densities("glass and a point",
 				    world_of_text(32, 32,
 						  ROOM "<emitter type='point'><point name='position' value='0.5,1,0'/>"
@@ -159,8 +160,8 @@ static void test_densities(void **state)
 							       "value='0.2'/></bsdf>") "%s",
 						  ""),
 				    1000) > 1000);
-	/* Techniques that pass the panes count, too, and some of them end at the photon. */
-	/* Events are vertices, and faces of `null` none. */
+	/* Techniques that pass through the panes count as well, and some of them end at the photon. */
+	/* Scattering events are vertices; `null` faces are not. */
 	assert_true(check_densities("fog and a lamp in it",
 				    world_of_text(32, 32,
 						  ROOM LAMP FOGGY "<emitter type='point'><point name='position' "
@@ -196,9 +197,9 @@ static void add(void *user, const struct merged *m)
 	*(double *)user += m->brings;
 }
 
-/* Light that arrives after two scatterings or more. Photons of a disk that reaches beyond a wall's edge are missed:
- * 1 % here. At 4.5 standard errors beyond 3 % a right one fails once in 10^5; a tenth too much or too little is found
- * nine times in ten. */
+/* Light that arrives after at least two scattering events. Merging misses photons in the part of the disk beyond the
+ * edge of a wall, here 1 %. The limit of 4.5 standard errors beyond 3 % rejects a correct program once in 10^5; an
+ * error of 10 % is found nine times in ten. */
 static void test_energy(void **state)
 {
 	(void)state;

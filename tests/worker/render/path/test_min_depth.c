@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Paths of exactly so many edges, where surfaces let light straight through: what connects two points without passing
- * anything is too short, and must not come back as a connection that passes the surface on which one of them lies.
- * Light sub-paths end on masks here, and those of `path` do not. Statistics as in tests/support/agree.h.
+ * Paths with a required number of edges, where surfaces let light straight through: a connection that passes through
+ * nothing has too few edges, and must not be counted as one that passes through the surface on which one of its ends
+ * lies. Here light sub-paths end on masks, and those of `path` do not. Statistics as in tests/support/agree.h.
  */
 #include "tests/support/agree.h"
 #include "tests/support/worlds.h"

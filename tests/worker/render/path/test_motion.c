@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Images of what moves. What the camera sees of a card that slides, or turns, is the share of the time that it is
- * there, which is known: a ramp, and an integral over angles. And the image while the shutter is open is the mean of
- * images at the middles of 32 parts of that time, of worlds that stand still, placed by transforms that this test
- * writes itself; the rule of midpoints leaves 32^-2 of what changes. The integrators make it; bdpt is what erpt begins
- * with (tests/support/agree.h: level 1e-4 over the suite, power printed and bounded). Chains take a minute each, and
- * run with FULL=1 only; test_balance has a room in which all of this moves. Lights over a plane: test_moving_lights.c.
+ * Images of moving scenes. The visibility of a card that slides or turns is the share of the time during which it
+ * covers a point, which is known: a ramp, and an integral over angles. And the image over the open shutter is the
+ * mean of images at the midpoints of 32 parts of this interval, rendered from static worlds placed by transforms that
+ * this test computes itself; the midpoint rule errs by 32^-2 of the change. The integrators are tested one by one,
+ * except that bdpt also stands for the samples with which erpt starts. Statistics as in tests/support/agree.h (level
+ * 1e-4 over the suite, power printed and bounded). Chains take a minute each and run with FULL=1 only; test_balance.c
+ * has a room in which all of this moves. Moving lights over a plane: test_moving_lights.c.
  */
 #include "tests/support/agree.h"
 #include "tests/support/dice.h"
@@ -34,7 +35,7 @@
 
 /* ---- what the camera sees */
 
-/* Whether a point of the film, which spans 2 x 2 around the origin, is on the card at that time. */
+/* Returns whether the card covers a point of the film at time t. The film spans 2 x 2 around the origin. */
 typedef bool covers_fn(double x, double y, double t);
 
 static bool slides(double x, double y, double t)
@@ -49,7 +50,8 @@ static bool turns(double x, double y, double t)
 	return fabs(u) < 0.8 && fabs(v) < 0.1;
 }
 
-/* Cells of the film: in each as many camera rays as chance wants meet the card. */
+/* Counts the camera rays that meet the card in each cell of the film, and fails unless the counts fit the expected
+ * shares. */
 static void check_seen(const char *test, struct world *w, covers_fn *covers)
 {
 	enum { CELLS = 12, FINE = 24, TIMES = 2000 };
@@ -91,13 +93,13 @@ static void check_seen(const char *test, struct world *w, covers_fn *covers)
 	assert_true(cells > 10);
 	double chi2 = 0, most = 0;
 	for (size_t i = 0; i < cells; i++) {
-		/* Binomial, with half a grid's step of the quadrature's own error. */
+		/* Binomial variance, plus the error of the quadrature: half a step of its grid. */
 		double p1 = expected[i] * CELLS * CELLS / (double)n, variance = expected[i] * fmax(1 - p1, 0.01) + 1;
 		chi2 += (got[i] - expected[i]) * (got[i] - expected[i]) / variance;
 		most = fmax(most, fabs(got[i] / expected[i] - 1));
 	}
 	print_message("%s: chi^2 %.1f of %zu cells\n", test, chi2, cells);
-	/* Level 1e-6: six standard deviations of chi^2 and more; a card at rest has hundreds of times that. */
+	/* Level 1e-6: at least six standard deviations of chi^2; a card at rest yields hundreds of times as much. */
 	assert_true(chi2 < (double)cells + 6 * sqrt(2 * (double)cells) + 12);
 	world_free(w);
 }
@@ -136,7 +138,7 @@ enum { PARTS = 32 };
 	"<translate y='3'/></transform>" SHINES("3") "</shape>"
 #define SKY "<emitter type='constant'><float name='radiance' value='0.2'/></emitter>"
 #define DEPTH "<integrator type='path'><integer name='max_depth' value='6'/></integrator>"
-/* A card in front of the camera, a ball of glass that grows, a group of rough metal that turns, two lights. */
+/* A card in front of the camera, a glass ball that grows, a group of rough metal that turns, and two lights. */
 #define CARD "<shape type='rectangle'>%s<bsdf type='diffuse'><float name='reflectance' value='0.3'/></bsdf></shape>"
 #define GLASS "<shape type='sphere'>%s<bsdf type='dielectric'/></shape>"
 #define GROUP                                                                                            \
@@ -148,17 +150,17 @@ enum { PARTS = 32 };
 	"<emitter type='spot'>%s<float name='intensity' value='2'/><float name='cutoff_angle' value='40'/></emitter>"
 #define POINT "<emitter type='point'>%s<float name='intensity' value='0.6'/></emitter>"
 
-/* Lamps: a card, a ball, and a group with a cube. The first and the last are stretched as well. */
+/* Emitting shapes: a card, a ball, and a group with a cube. The first and the last are stretched as well. */
 #define CARD_LAMP "<shape type='rectangle'>%s" SHINES("2") "</shape>"
 #define BALL_LAMP "<shape type='sphere'>%s" SHINES("2") "</shape>"
 #define GROUP_LAMP                                                                                           \
 	"<shape type='shapegroup' id='l'><shape type='cube'><transform name='to_world'><scale value='0.3'/>" \
 	"<rotate x='1' y='1' angle='50'/></transform>" SHINES("1") "</shape></shape>"                        \
 								   "<shape type='instance'><ref id='l'/>%s</shape>"
-/* Lights from afar. */
+/* Lights at infinity. */
 #define SUN "<emitter type='directional'>%s<float name='irradiance' value='0.5'/></emitter>"
 #define PICTURE "<emitter type='envmap'>%s<string name='filename' value='e.pgm'/></emitter>"
-/* A ball of a medium that shines. */
+/* A ball of an emitting medium. */
 #define GLOW                                                                                    \
 	"<shape type='sphere'>%s<bsdf type='null'/><medium type='homogeneous' name='interior'>" \
 	"<float name='sigma_t' value='0.5'/><spectrum name='albedo' value='0.3'/></medium>"     \
@@ -270,8 +272,9 @@ enum thing {
 static put_fn *const puts_of[THINGS] = {put_camera,    put_card,      put_glass,      put_group, put_spot,    put_point,
 					put_card_lamp, put_ball_lamp, put_group_lamp, put_sun,	 put_picture, put_glow};
 
-/* What moves, from the first to the last; all else stands where it is at STILL. No integrator but those with light
- * sub-paths finds light that points and spots send through glass, so there is none beside them. */
+/* The parts of the scene that move: one stage each, from the first to the last; the remaining parts stand at their
+ * position for STILL. Only integrators with light sub-paths find the light that points and spots send through glass,
+ * so the scene with these lights has no glass. */
 enum stage { SHAPES, CAMERA, LIGHTS, LAMPS, SKIES, MEDIA };
 static const struct {
 	const char *name;
@@ -281,7 +284,7 @@ static const struct {
 	      {"moving skies", SUNS, PICTURES}, {"moving glow", GLOWS, GLOWS}};
 #define STILL 0.4
 
-/* With a picture of the sky. */
+/* A world that has a picture of the sky among its files. */
 __attribute__((format(printf, 1, 2))) static struct world *world_of(const char *format, ...)
 {
 	static char xml[1 << 14];
@@ -295,7 +298,7 @@ __attribute__((format(printf, 1, 2))) static struct world *world_of(const char *
 	return world_of_files(16, 16, files);
 }
 
-/* At time t, or, below 0, as it moves. */
+/* Returns the static world at time t, or the moving world if t is negative. */
 static struct world *world_at(enum stage s, double t)
 {
 	char place[THINGS][768];
@@ -356,7 +359,8 @@ static void check_integrators(enum stage s, const struct agree_side *sides, size
 		agree_check(test, &image, &stills);
 	}
 	world_free(w);
-	/* Where everything is when the shutter opens, it is another image: the comparison can tell. */
+	/* The image of the static world at the opening of the shutter differs, so the comparison can tell them apart.
+	 */
 	struct agree_difference d;
 	const struct agree_side how = {"bdpt", test_scaled() ? 8192 : 1024, 32, 0, 0};
 	w = world_at(s, 0);
@@ -419,8 +423,8 @@ static void test_glow(void **state)
 
 /* ---- lights over a plane */
 
-/* A lamp of which all transforms are the same, and one that would move while the shutter is closed, are those that
- * stand there: equal bits. */
+/* A lamp whose transforms are all equal, and one that would move only while the shutter is closed, give the same bits
+ * as static lamps. */
 static void test_at_rest(void **state)
 {
 	(void)state;

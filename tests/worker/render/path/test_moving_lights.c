@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What a light brings a plane while it moves is an integral over the time: of the irradiance of a ball, which falls
- * with the square of the distance, of a polygon (Lambert 1760), of a beam, and of a projector. Statistics as in
+ * The light that a moving lamp sends to a plane is an integral over time: of the irradiance from a ball, which falls
+ * with the square of the distance, from a polygon (Lambert 1760), from a beam, and from a projector. Statistics as in
  * tests/support/agree.h (level 1e-4 over the suite, power printed and bounded).
  */
 #include "tests/support/agree.h"
@@ -23,7 +23,7 @@
 #define SHINES(radiance) "<emitter type='area'><float name='radiance' value='" radiance "'/></emitter>"
 /* A card in front of the camera, a ball of glass that grows, a group of rough metal that turns, two lights. */
 
-/* Half of the sides, or the radius, and the place at a time. */
+/* The half sides, or the radius, and the position of the light at one time. */
 struct light_at {
 	double a, b, x, height;
 };
@@ -44,7 +44,7 @@ static struct light_at is_stretched(double t)
 	return (struct light_at){.a = 0.1 + 0.8 * t, .b = 0.6 - 0.4 * t, .height = 1.5 + 0.5 * t};
 }
 
-/* What each kind of light, of strength 1, brings a point (x, y, 0), which looks up. */
+/* Returns the irradiance at the point (x, y, 0), with its normal towards +z, from a light of strength 1. */
 typedef double irradiance_fn(const struct light_at *l, double x, double y);
 
 static double of_ball(const struct light_at *l, double x, double y)
@@ -66,7 +66,7 @@ static double of_card(const struct light_at *l, double x, double y)
 	return sum;
 }
 
-/* Its edge is blurred evenly. */
+/* The edge of the beam falls off linearly. */
 static double of_beam(const struct light_at *l, double x, double y)
 {
 	return fabs(x - l->x) < l->a && fabs(y) < l->b;
@@ -92,7 +92,8 @@ static const struct over_plane {
 	{"a projector rises", rises, of_projector, "projector", "<float name='fov' value='60'/>"},
 };
 
-/* The mean over the image of a plane of reflectance 1 that the camera sees from a height of 1, and over the time. */
+/* Returns the mean, over time and over the image, of the radiance of a plane of reflectance 1 that the camera sees
+ * from a height of 1. */
 static double mean_radiance(const struct over_plane *o)
 {
 	enum { STEPS = 48, TIMES = 512 };

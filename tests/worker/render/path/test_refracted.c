@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Refracted connections change the noise of an image and not its mean, also where more than one refracted path joins
- * two points and where the walk finds none: the caustic of a ball. Statistics as in tests/support/agree.h, but finding
- * a bias of 3 % of the mean only; if all paths were weighted as those that the walk finds, nearly half would be lost.
- * The lamp's image in a floor that is partly a mirror would lose half if paths that are specular there were weighted as
- * if a connection could make them. Where straight lines are blocked and light bent at a plane passes, it is that of
- * Fresnel's formulas.
+ * Refracted connections change the noise of an image but not its mean, even where several refracted paths join two
+ * points and where the walk fails to find one: the caustic of a ball. Statistics as in tests/support/agree.h, but
+ * only a bias of 3 % of the mean is found; if all paths were weighted like those that the walk finds, nearly half of
+ * the light would be lost. The lamp's image in a floor that is partly a mirror would lose half if paths that are
+ * specular at the floor were weighted as if a connection could make them. Where straight lines are blocked and light
+ * refracted at a plane passes, the radiance must be that given by Fresnel's formulas.
  */
 #include "tests/support/agree.h"
 #include "tests/support/worlds.h"
@@ -35,7 +35,8 @@ static struct world *caustic_world(const char *effects)
 	return w;
 }
 
-/* A lamp above a pane, and its image in a floor that reflects half of the light as a mirror and scatters the rest. */
+/* A lamp above a pane, and its image in a floor that reflects one half of the light as a mirror and scatters the
+ * other half. */
 static struct world *image_of_lamp(const char *effects)
 {
 	worlds_effects = effects;
@@ -56,7 +57,8 @@ static struct world *image_of_lamp(const char *effects)
 	return w;
 }
 
-/* With so many samples a pixel, twice as many without, a quarter of bdpt. */
+/* Compares images with refracted connections, of spp samples per pixel (bdpt: a quarter), with a reference without
+ * them of twice as many. */
 static void check_both(const char *name, struct world *(*build)(const char *effects), uint64_t spp)
 {
 	static struct agree_image without, with;
@@ -87,8 +89,9 @@ static void test_image_of_lamp(void **state)
 	check_both("image of a lamp", image_of_lamp, 512);
 }
 
-/* The floor of a pool under a low sun, beside a wall that stands in the way of straight lines to it. Refracted light
- * passes above it: E cos a T(a) arrives, with Fresnel's T. */
+/* The floor of a pool under a low sun, behind a wall that blocks straight lines to the sun. Refracted light passes
+ * above the wall: the irradiance E cos a T(a) arrives, where a is the angle of incidence and T Fresnel's
+ * transmittance. */
 static void test_pool(void **state)
 {
 	(void)state;

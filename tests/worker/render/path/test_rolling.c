@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A rolling shutter. The time of a path is what its place on the film says: a share e of the time for each line, the
- * first from the beginning on and the last up to the end. Samples of `path` are those of the same world with a shutter
- * that opens for all lines at once, whose number of the time is that time, bit by bit; of a card that slides each cell
- * of the film sees the share of its own time that the card is there. Integrators that do not draw the place first are
- * refused, by the command line and by a lease.
+ * A rolling shutter. The time of a path follows from its position on the film: each line is exposed for the share e
+ * of the time, the first line from the beginning and the last up to the end. Samples of `path` must equal, bit by
+ * bit, those of the same world with a global shutter whose random number for the time is set to that time; and in
+ * each cell of the film, a sliding card must be visible for its share of the cell's own exposure. The command line
+ * and leases refuse integrators that do not draw the film position first.
  */
 #include "tests/support/dice.h"
 #include "tests/support/worlds.h"
@@ -22,7 +22,7 @@
 
 enum { WIDTH = 12, HEIGHT = 8 };
 
-/* 2 x 4/3 around the origin. */
+/* The film spans 2 x 4/3 around the origin. */
 #define SCENE                                                                                                       \
 	"<integrator type='path'><integer name='max_depth' value='4'/></integrator>"                                \
 	"<sensor type='orthographic'><float name='shutter_open' value='2'/><float name='shutter_close' value='3'/>" \
@@ -44,7 +44,7 @@ static struct world *world_of(const char *roll, const char *filter)
 	return world_of_text(WIDTH, HEIGHT, SCENE LIT, roll, filter);
 }
 
-/* Where the line is: 0 for the first. */
+/* Returns the line's position from 0, the first line, to 1, the last. */
 typedef double line_fn(double x, double y);
 
 static double none(double x, double y)
@@ -101,7 +101,7 @@ static double time_of(const struct roll *r, const double film[2], double u)
 
 /* ---- samples ---- */
 
-/* Random numbers, but for a time. */
+/* Random numbers with a fixed number for the time. */
 struct timed {
 	struct sampler base;
 	struct sampler_random random;
@@ -173,7 +173,7 @@ static void test_samples(void **state)
 
 /* ---- what the camera sees ---- */
 
-/* Pearson's chi^2 of the 96 cells, fewer where all or none of the samples meet the card: level 1e-6. */
+/* Pearson's chi^2 over the 96 cells, less those in which all or none of the samples meet the card: level 1e-6. */
 static void check_seen(const struct roll *r)
 {
 	enum { FINE = 32 };
@@ -203,7 +203,7 @@ static void check_seen(const struct roll *r)
 			share += fabs(x - (t - 0.6)) < 0.2 && fabs(y) < 0.9;
 		}
 		share /= FINE * FINE * FINE;
-		double variance = all * (share * (1 - share) + 1e-3); /* and what the quadrature leaves */
+		double variance = all * (share * (1 - share) + 1e-3); /* plus the error of the quadrature */
 		chi2 += (found - all * share) * (found - all * share) / variance;
 		cells += share > 0 && share < 1;
 	}
@@ -264,7 +264,7 @@ static void test_who_renders_it(void **state)
 	assert_string_equal(open.plan.integrator, "path");
 	assert_int_equal(render_plan_from_scene(&chains, &summary, &e), -EINVAL);
 	world_free(w);
-	/* Where nothing moves, all can. */
+	/* Where nothing moves, every integrator can render. */
 	worlds_effects = "-motion";
 	w = world_of(ROLL("top", "0.5"), BOX_FILTER);
 	worlds_effects = NULL;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Low-discrepancy samples: the generator matrices are those of the named polynomials, every elementary interval holds
- * its share, each number alone is uniform, halves of a block, pixels and replicates are independent, and means are
- * those of independent samples with less variance. Level 1e-6 each; seeds are the hash of the test's name.
+ * its share, each number alone is uniform, the halves of a block, pixels and replicates are independent, and means
+ * equal those of independent samples with less variance. Each test has level 1e-6; its seed is the hash of its name.
  */
 #include "tests/support/stats.h"
 #include "worker/render/path/sobol.h"
@@ -28,7 +28,7 @@ static void draw(uint64_t seed, uint64_t index, uint64_t replicate, uint64_t sam
 	assert_memory_equal(u, out, SAMPLER_BLOCK * sizeof *out);
 }
 
-/* How many of the points lie in each box of 2^-e[0] x .. x 2^-e[3]. */
+/* Counts the points in each box of size 2^-e[0] x .. x 2^-e[3]; each must hold 2^t points. */
 static void check_boxes(const double (*u)[4], unsigned m, unsigned t, const unsigned e[4])
 {
 	static unsigned count[1u << 10];
@@ -43,8 +43,8 @@ static void check_boxes(const double (*u)[4], unsigned m, unsigned t, const unsi
 		assert_int_equal(count[b], 1u << t);
 }
 
-/* All elementary intervals of volume 2^(t - m), for the first two, three and four numbers of a half: 2^t of 2^m points
- * lie in each, whichever aligned range of samples is taken. */
+/* Checks all elementary intervals of volume 2^(t - m) for the first two, three and four numbers of a half: each holds
+ * 2^t of 2^m points, whichever aligned range of samples is taken. */
 static void check_net(const double (*u)[4], unsigned m)
 {
 	const unsigned quality[5] = {0, 0, 0, 1, 3};
@@ -81,8 +81,8 @@ static void test_elementary_intervals(void **state)
 		}
 }
 
-/* bdpt8 has a light sub-path where this number is below 1/8: in one of any eight samples that begin at a multiple of 8.
- */
+/* bdpt8 traces a light sub-path where this number is below 1/8: in exactly one of any eight samples that begin at a
+ * multiple of 8. */
 static void test_one_of_eight(void **state)
 {
 	(void)state;
@@ -99,8 +99,8 @@ static void test_one_of_eight(void **state)
 		}
 }
 
-/* Points without scrambling by the recurrence of Bratley and Fox 1988 from the polynomials x + 1, x^2 + x + 1, x^3 + x
- * + 1: a scramble keeps how many leading bits two points share, in every dimension. */
+/* Points without scrambling, by the recurrence of Bratley and Fox 1988 from the polynomials x + 1, x^2 + x + 1 and
+ * x^3 + x + 1. A scramble preserves the number of leading bits that two points share, in every dimension. */
 static void directions(unsigned degree, unsigned inner, const uint32_t *initial, uint32_t v[32])
 {
 	uint32_t m[32];
@@ -125,9 +125,9 @@ static uint32_t unscrambled(const uint32_t v[32], uint32_t i)
 	return x;
 }
 
-/* A prefix of 2^11 samples is, shuffled, an aligned range of Sobol' points, and what two of these share depends on the
- * exclusive or of their numbers only: so the multiset, over all pairs, of the bits shared in dimension 0 and in another
- * is that of the plain points. */
+/* A prefix of 2^11 samples is a shuffled, aligned range of Sobol' points, and the leading bits shared by two of these
+ * points depend only on the exclusive or of their indices. So the multiset, over all pairs, of the bits shared in
+ * dimension 0 and in another dimension is that of the plain points. */
 static void test_directions(void **state)
 {
 	(void)state;
@@ -180,7 +180,8 @@ static int cell_of(double u)
 	return (int)(u * CELLS);
 }
 
-/* One sample of many sequences: each number by itself, and its bits below the 2^-32 that stratify. */
+/* One sample of each of many sequences: each number alone is uniform, and so are its bits below the 2^-32 that
+ * stratify. */
 static void test_marginals(void **state)
 {
 	(void)state;
@@ -203,7 +204,7 @@ static void test_marginals(void **state)
 	}
 }
 
-/* Numbers beyond 2^32 do not repeat those before. */
+/* Samples with indices from 2^32 on do not repeat earlier ones. */
 static void test_long_sequences(void **state)
 {
 	(void)state;
@@ -254,15 +255,15 @@ static void test_independence(void **state)
 	check_uniform(count, CELLS * CELLS, TRIALS, "halves");
 }
 
-/* Smooth, a corner, and two halves together; its mean is known: 1 + 0.6^2 / 2 + 0. */
+/* A smooth term, a corner, and a term that joins two halves; the mean is known: 1 + 0.6^2 / 2 + 0. */
 static double integrand(const double u[SAMPLER_BLOCK])
 {
 	double smooth = (0.5 + u[0]) * (0.5 + u[1]) * (0.5 + u[2]) * (0.5 + u[5]), corner = u[4] + u[5] < 0.6;
 	return smooth + corner + (u[0] - 0.5) * (u[4] - 0.5);
 }
 
-/* Means of 64 samples over many replicates; power: a bias of 1 % or less is found with 95 %, one of 2 % here. The
- * variance between replicates is at most a third of that of independent samples. */
+/* Means of 64 samples over many replicates; power: a bias of 1 % or less is found with 95 % probability, and one of 2
+ * % is found here. The variance between replicates is at most a third of that of independent samples. */
 static void test_means(void **state)
 {
 	(void)state;

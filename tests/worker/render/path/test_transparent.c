@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What a connection through surfaces passes lies between its ends: never the surface on which the far end itself lies,
- * which a ray to it meets as well, by rounding. Past an occluder's very edge that ray may get by although the ends were
- * found not to see each other; here it is followed between ends that do. Deterministic.
+ * A connection through surfaces passes only surfaces between its ends, never the surface on which the far end lies,
+ * although rounding lets a ray to that end meet this surface as well. Past the very edge of an occluder, such a ray
+ * may get through although the visibility test found the ends blocked; so the connections of ends that see each other
+ * are checked here. Deterministic.
  */
 #include "tests/support/worlds.h"
 #include "worker/render/path/next_event.h"
@@ -37,7 +38,7 @@ static void connect_to(struct path_context *c, unsigned t, const struct path_ver
 	c->passed_count = 0;
 }
 
-/* Ends on masks and thin glass, flat, round and in pieces, that emit light or reflect it. */
+/* The ends lie on masks and thin glass, flat, round or made of several faces, that emit or reflect light. */
 static void test_far_end(void **state)
 {
 	(void)state;

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Normals that relief bends away from the camera: seen from there, a surface scatters as one whose normal map has x and
- * y the other way round, and paths from the light do not sample that.
+ * Shading normals that relief tilts away from the camera: seen from the camera, the surface must scatter like one
+ * whose normal map is mirrored in x and y, and sampling from the light must not use such normals. Checked against
+ * worlds with the mirrored map, and by comparing integrators (tests/support/agree.h).
  */
 #include "tests/support/agree.h"
 #include "tests/support/memory_assets.h"
@@ -19,7 +20,7 @@
 
 #include <cmocka.h>
 
-/* One triangle whose normals are not its own. */
+/* One triangle whose vertex normals differ from its geometric normal. */
 static const char mesh[] = "v 0 0 0\nv 2 0 0\nv 0 2 0\nvt 0 0\nvt 1 0\nvt 0 1\nvn 0.3 0 1\nvn 0.2 0.3 1\nvn 0 -0.2 1\n"
 			   "f 1/1/1 2/2/2 3/3/3\n";
 
@@ -63,7 +64,7 @@ static bool right_side(const struct path_vertex *v, vec3 w)
 	return vec3_dot(v->x.ng, w) * vec3_dot(v->x.sh.n, w) > 0;
 }
 
-/* Scattering towards o of light from i, and the densities of i seen from o and of o seen from i. */
+/* f: scattering towards o of light from i; to_light: density of i seen from o; to_camera: density of o seen from i. */
 struct seen {
 	double f, to_light, to_camera;
 };
@@ -85,7 +86,7 @@ static void assert_same(double got, double expected)
 		fail_msg("%.12g is not %.12g", got, expected);
 }
 
-/* turns: the material does. */
+/* turns: the material turns such normals. */
 static void check(const char *shape, const char *inner, bool turns)
 {
 	enum { POINTS = 4000 };
@@ -132,7 +133,7 @@ static void test_turned(void **state)
 	}
 }
 
-/* Not in files of 0.6, unless they say so. */
+/* Files of version 0.6 turn normals only if they say so. */
 static void test_dialects(void **state)
 {
 	(void)state;
@@ -164,7 +165,7 @@ static void test_dialects(void **state)
 #define STEEP(inner)                                                                                                           \
 	"<bsdf type='normalmap'><texture type='checkerboard'><rgb name='color0' value='0.5,0.93,0.75'/>"                       \
 	"<rgb name='color1' value='0.5,0.07,0.75'/></texture>" inner "</bsdf>"
-/* Half of the floor's normals lean away from the camera, and the others from the wall behind it. */
+/* Half of the floor's normals lean away from the camera, the other half away from the wall behind it. */
 static const char room[] =
 	"<integrator type='path'><integer name='max_depth' value='5'/></integrator>" SENSOR("0,1.2,5", "0,0.7,0")
 	"<shape type='rectangle'><transform name='to_world'><scale value='2'/><rotate x='1' angle='-90'/></transform>"

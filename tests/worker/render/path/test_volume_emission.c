@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Media that shine. Layers and balls whose radiance is known in closed form; furnaces, in which a medium emits sigma_a
- * L and everything around it shines with L, so that nothing can be seen of it, whatever its coefficients, shape,
- * boundary and grid (Kirchhoff's law); and a ball that scatters, against a random walk of its own. By all integrators
+ * Emitting media. Layers and balls whose radiance is known in closed form; furnaces, in which a medium emits sigma_a
+ * L and everything around it emits L, so that the medium is invisible, whatever its coefficients, shape, boundary and
+ * grid (Kirchhoff's law); and a ball that scatters, against a random walk written for this test. By all integrators
  * that find such light. Statistics as in tests/support/agree.h.
  */
 #include "tests/support/agree.h"
@@ -33,7 +33,7 @@ static double sum3(const double v[3])
 	return v[0] + v[1] + v[2];
 }
 
-/* Values that are the same in every sample have no statistics. */
+/* Cells that have the same value in every sample have no variance to test with. */
 static void forgive_rounding(struct agree_image *image, double expected)
 {
 	for (uint32_t g = 0; g < image->groups; g++)
@@ -42,8 +42,8 @@ static void forgive_rounding(struct agree_image *image, double expected)
 				image->mean[g][c] = expected;
 }
 
-/* Samples per pixel. all: also by the integrators that are made of others. What takes long is for FULL=1: the others
- * from LONG samples on, and bdpt from LONGER on, half as many again. */
+/* spp: samples per pixel; all: run also the integrators that build on `path` and bdpt. Long runs are for FULL=1 and
+ * then half as many samples longer: bdpt from LONGER samples on, these other integrators from LONG on. */
 struct effort {
 	uint64_t spp;
 	bool all;
@@ -59,7 +59,8 @@ static uint64_t spp_of(size_t i, struct effort e)
 	return e.spp < most[i] ? e.spp : test_full() ? 3 * e.spp / 2 : 0;
 }
 
-/* Every block of the image has X + Y + Z = `sum`, by paths of `least` edges or more. Takes the world. */
+/* Expects X + Y + Z = `sum` in every block of the image, from paths of at least `least` edges. Takes ownership of the
+ * world. */
 static void expect_sum(const char *name, struct world *w, uint32_t least, double sum, struct effort e)
 {
 	static struct agree_image image;
@@ -96,13 +97,13 @@ static void expect(const char *name, struct world *w, double radiance, struct ef
 	"<medium type='homogeneous' name='interior' id='fog'><float name='sigma_t' value='" sigma_t "'/><spectrum " \
 	"name='albedo' value='" albedo "'/></medium>"
 #define NULL_FACES "<bsdf type='null'/>"
-/* Between z = 0 and -2. */
+/* A layer between z = 0 and -2. */
 #define LAYER(inner)                                                                                                \
 	"<shape type='cube'><transform name='to_world'><translate z='-1'/><scale x='40' y='40'/></transform>" inner \
 	"</shape>"
 
-/* Seen from above: what a layer of thickness 2 emits, and what it leaves of the sky behind it. Lengths are the scene's;
- * the medium's scale is that of its coefficients alone. */
+/* Seen from above: the emission of a layer of thickness 2, and the remaining light of the sky behind it. Lengths are
+ * in units of the scene; the medium's scale applies to its coefficients only. */
 static void test_layer(void **state)
 {
 	(void)state;
@@ -124,20 +125,20 @@ static void test_layer(void **state)
 	       world_of_text(SIDE, SIDE,
 			     DEPTH("1") FROM_ABOVE("1", "") LAYER(FOG("0", "0.5") NULL_FACES SHINES("0.4"))),
 	       0.4 * 2, e);
-	/* The camera's near plane lies in the middle. */
+	/* The camera's near plane lies in the middle of the layer. */
 	left = exp(-1);
 	expect("inside of a layer",
 	       world_of_text(SIDE, SIDE,
 			     DEPTH("8") FROM_ABOVE("91", "<ref name='medium' id='fog'/>")
 				     SKY LAYER(FOG("1", "0") NULL_FACES SHINES("0.4"))),
 	       0.4 * (1 - left) + 0.7 * left, e);
-	/* Of a layer that scatters, what does not scatter: one edge. */
+	/* One edge: the unscattered part of the light of a layer that scatters. */
 	left = exp(-2 * 1.5);
 	expect("one edge in a layer that scatters",
 	       world_of_text(SIDE, SIDE,
 			     DEPTH("1") FROM_ABOVE("1", "") LAYER(FOG("1.5", "0.8") NULL_FACES SHINES("0.4"))),
 	       0.4 / 1.5 * (1 - left), (struct effort){1024, true});
-	/* Two edges or more of a layer that does not: none. */
+	/* A layer that does not scatter contributes nothing to paths of two edges or more. */
 	struct world *w = world_of_text(
 		SIDE, SIDE, DEPTH("8") FROM_ABOVE("1", "") SKY LAYER(FOG("1", "0") NULL_FACES SHINES("0.4")));
 	static struct agree_image image;
@@ -153,8 +154,8 @@ static void test_layer(void **state)
 	"target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'><rfilter type='box'/></film></sensor>"
 #define BALL(inner) "<shape type='sphere'>" inner "</shape>"
 
-/* A camera in fog, in a room that reflects 0.4 and emits the rest. The fog is the inside of a ball, and around the
- * rest: edges pass from it into others that shine. */
+/* A camera in fog, in a room that reflects 0.4 and emits the rest. The fog is the interior of a ball and the exterior
+ * of the other shapes: edges pass from it into other emitting media. */
 /* clang-format off */
 #define ROOM                                                                                                           \
 	DEPTH("128") "<sensor type='perspective'><float name='fov' value='70'/><transform name='to_world'><lookat "    \
@@ -174,7 +175,7 @@ static void test_layer(void **state)
 	"<float name='sigma_s' value='2'/></medium><ref name='exterior' id='fog'/>" SHINES("1.575"))
 /* clang-format on */
 
-/* Emission of sigma_a times the sky's radiance, 0.7. Within glass radiance is its squared index as large. */
+/* The emission is sigma_a times the sky's radiance, 0.7. Within glass, radiance is larger by the squared index. */
 #define GLASS(type, more) \
 	"<bsdf type='" type "'><float name='int_ior' value='1.5'/><float name='ext_ior' value='1'/>" more "</bsdf>"
 
@@ -201,8 +202,8 @@ static void test_furnace(void **state)
 	       (struct effort){5760, false});
 }
 
-/* Chains that share the fog's light among many pixels cannot tell half a percent in a test, but what they find of it
- * all. */
+/* Chains that spread the fog's light over many pixels cannot resolve half a percent per block in a test, but they can
+ * resolve their total. */
 static void test_chains(void **state)
 {
 	(void)state;
@@ -220,7 +221,7 @@ static void test_chains(void **state)
 
 /* ---- grids ---- */
 
-/* Linear between its points, and 0 in most of one half. */
+/* Linear between grid points, and 0 in most of one half of the box. */
 static double cloud(double x, double y, double z, uint32_t channel)
 {
 	return (x < 0.5 ? 0 : 2 + 3 * y) + (z > 0.9 ? 4 : 0) + 0.3 * channel * (y + z);
@@ -240,7 +241,7 @@ static struct world *in_files(const char *xml, const struct vol *extinction, con
 	return world_of_files(SIDE, SIDE, files);
 }
 
-/* Twice its values, as the emission where the albedo leaves so much. */
+/* Makes a grid of extinction, and one of emission that has its values times `factor`. */
 static void make_cloud(struct vol *extinction, struct vol *light, uint32_t channels, double factor)
 {
 	const uint32_t side[3] = {5, 4, 6};
@@ -270,7 +271,8 @@ static void test_grid_furnace(void **state)
 	expect("fog on a grid", in_files(fog, &extinction, &light), 0.7, (struct effort){2048, false});
 }
 
-/* Grids of light where the medium is the same everywhere, and the other way round; what is beyond a grid's box. */
+/* Grids of emission in a homogeneous medium, and grids of extinction with constant emission; and positions beyond a
+ * grid's box. */
 static double ramp(double x, double y, double z, uint32_t channel)
 {
 	(void)x;
@@ -284,8 +286,8 @@ static void test_grid_layer(void **state)
 	static struct vol box, light;
 	vol_make(&box, (const uint32_t[3]){1, 1, 1}, 1, ramp);
 	vol_make(&light, (const uint32_t[3]){1, 1, 2}, 1, ramp);
-	/* Points lie at z = -0.75 and -0.25, 1 below and 3 above; the light goes on evenly beyond the box, from z = -1
-	 * to 0, in which the grid is, down to -2. */
+	/* Grid points lie at z = -0.75 (value 1) and z = -0.25 (value 3). Beyond the grid's box, which reaches from z
+	 * = -1 to 0, the emission continues with the last value, down to -2. */
 #define RAMP                                                                                                  \
 	"<emitter type='volumelight'><volume name='radiance' type='gridvolume'><string name='filename' "      \
 	"value='l.vol'/><transform name='to_world'><translate x='-.5' y='-.5' z='-1'/><scale x='80' y='80'/>" \
@@ -323,7 +325,7 @@ static void test_grid_layer(void **state)
 
 #define WHITE "<emitter type='constant'><spectrum name='radiance' value='%s'/></emitter>"
 
-/* The same image as that of the sky alone. */
+/* Expects the image of the sky alone. */
 static void expect_unseen(const char *name, struct world *w, struct world *sky, struct effort e)
 {
 	static struct agree_image image, of_sky;
@@ -366,7 +368,7 @@ static void test_colours(void **state)
 		expect_unseen(balls[i].name,
 			      world_of_text(SIDE, SIDE, DEPTH("64") VIEW WHITE BALL("%s"), FLAT, balls[i].inner),
 			      world_of_text(SIDE, SIDE, DEPTH("64") VIEW WHITE, FLAT), balls[i].e);
-	/* In glass that disperses: half of sigma_t times its squared index. */
+	/* In dispersive glass: half of sigma_t times the squared index at each wavelength. */
 	char light_in_glass[4096], *to = light_in_glass;
 	for (int nm = 360; nm <= 830; nm += 5) {
 		double sigma_t = nm <= 595 ? 1 + (nm - 360) / 235.0 : 2 + 2 * (nm - 595) / 235.0,
@@ -394,8 +396,9 @@ static void test_colours(void **state)
 
 /* ---- another walk ---- */
 
-/* From the surface of a ball of radius 1 at height y straight down z, light of 1 per length, by a walk whose events
- * have all of the extinction, and whose weight is the albedo: what is emitted until the first event, and so on. */
+/* Returns one sample of the light that leaves a ball of radius 1 and emission 1 per unit length, seen from its
+ * surface at height y straight down z. Events of the walk are drawn by extinction and weighted by the albedo; each
+ * step adds the light emitted until the next event. */
 static double random_walk(struct dice *d, double y, double sigma, double albedo)
 {
 	vec3 at = {0, y, sqrt(1 - y * y)}, w = {0, 0, -1};
@@ -403,7 +406,7 @@ static double random_walk(struct dice *d, double y, double sigma, double albedo)
 	for (;;) {
 		double along = vec3_dot(at, w), end = -along + sqrt(fmax(along * along - vec3_dot(at, at) + 1, 0)),
 		       free = -log1p(-dice_throw(d)) / sigma;
-		sum += weight * -expm1(-sigma * end) / sigma; /* expected up to the surface */
+		sum += weight * -expm1(-sigma * end) / sigma; /* expected value of the last step, up to the surface */
 		if (free >= end)
 			return sum;
 		at = vec3_madd(at, free, w);
@@ -462,7 +465,7 @@ static void test_refused(void **state)
 		      "`radiance` may be a texture, but not a volume");
 }
 
-/* One emitter that two shapes of one medium refer to, and which the medium around the camera is, too. */
+/* Two shapes with one medium refer to the same emitter, and so does the medium around the camera. */
 static void test_shared(void **state)
 {
 	(void)state;
@@ -480,7 +483,7 @@ static void test_shared(void **state)
 	world_free(w);
 }
 
-/* Chains of whole paths would leave it out. */
+/* Chains over full paths would leave the emission out. */
 static void test_who_finds_it(void **state)
 {
 	(void)state;
@@ -506,7 +509,7 @@ static void test_who_finds_it(void **state)
 	world_free(w);
 }
 
-/* Behind a vertex that disperses one wavelength travels on, for all four. */
+/* After a vertex that disperses, one wavelength travels on and stands for all four. */
 static void test_dispersed(void **state)
 {
 	(void)state;
