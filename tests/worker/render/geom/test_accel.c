@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Rays that begin and end on surfaces: none meets what it starts from, none slips through a closed body, segments see
- * what lies between and nothing else, but for those that pass an edge by less than floats can tell. Deterministic:
- * every count below is exact, no rate is estimated.
+ * Rays that begin and end on surfaces: no ray meets the surface point from which it starts, none slips through a
+ * closed body, and segments are blocked exactly by the surfaces between their ends, except for segments that pass an
+ * edge by less than float precision. Checked against a search over all triangles in double. Deterministic: every
+ * count below is exact; no rate is estimated.
  */
 #include "common/base/liveness.h"
 #include "tests/support/bodies.h"
@@ -25,14 +26,14 @@ static vec3 vertex_of(const struct geom_shape *s, uint32_t prim, int k)
 	return (vec3){(double)p[0], (double)p[1], (double)p[2]};
 }
 
-/* Into the half space of n. */
+/* Returns a random direction into the half space of n. */
 static vec3 direction_beyond(struct dice *d, vec3 n)
 {
 	vec3 w = dice_direction(d);
 	return vec3_dot(w, n) < 0 ? vec3_neg(w) : w;
 }
 
-/* Along the surface, rising by `slope`. */
+/* Returns a direction along the surface that rises by `slope`. */
 static vec3 grazing(struct dice *d, vec3 n, double slope)
 {
 	vec3 w = dice_direction(d);
@@ -40,7 +41,8 @@ static vec3 grazing(struct dice *d, vec3 n, double slope)
 	return vec3_normalize(vec3_madd(w, slope, n));
 }
 
-/* Outwards from a bumpy closed mesh: what is met is there in double too, and what is there is met. */
+/* Rays leave a bumpy closed mesh: each hit must also be found by a search in double, and each hit of that search by
+ * the ray. */
 static void test_outside_of_mesh(void **state)
 {
 	(void)state;
@@ -60,7 +62,7 @@ static void test_outside_of_mesh(void **state)
 			vec3 v0 = vertex_of(&s, hit.prim.prim, 0);
 			vec3 m = vec3_normalize(vec3_cross(vec3_sub(vertex_of(&s, hit.prim.prim, 1), v0),
 							   vec3_sub(vertex_of(&s, hit.prim.prim, 2), v0)));
-			/* A triangle that lies behind the start, seen along the ray, cannot be met. */
+			/* A ray cannot meet a triangle whose plane lies behind its start. */
 			double height = vec3_dot(vec3_sub(v0, x.p), m), speed = vec3_dot(w, m);
 			false_hits += hit.prim.prim == x.prim.prim || height / speed < -1e-12;
 		}
@@ -128,8 +130,9 @@ static void test_closed(void **state)
 	accel_free(a);
 }
 
-/* Many triangles in one plane: nothing is met from any of them, on either side, however low the ray. Planes whose float
- * vertices lie in it exactly; the flat one through the origin, tilted ones, and one far from it. */
+/* Many triangles in one plane: rays from any of them, on either side and however low, meet none of the others. The
+ * float vertices lie exactly in their planes: a horizontal one through the origin, tilted ones, and one far from the
+ * origin. */
 static void test_plane(void **state)
 {
 	(void)state;
@@ -167,7 +170,8 @@ static bool hidden_by_mesh(const struct geom_shape *s, vec3 a, vec3 b)
 	return !s->is_sphere && body_nearest(s, a, vec3_sub(b, a), 1e-9, &prim) < 1 - 1e-9;
 }
 
-/* Two points of a convex body's surface see each other; with a ball in the middle those whose line passes it do not. */
+/* Two points on the surface of a convex body see each other; with a ball in the middle, the two points do not see
+ * each other if their line passes through the ball. */
 static void check_segments(const char *name, const struct geom_shape *body)
 {
 	struct dice d = dice_of(name);
@@ -180,7 +184,8 @@ static void check_segments(const char *name, const struct geom_shape *body)
 		struct ray_end from = body_end(&x), to = body_end(&y);
 		if (!body->is_sphere && x.prim.prim == y.prim.prim)
 			continue;
-		if (accel_occluded(open, &from, &to)) /* the ball of triangles has valleys: is it so in double? */
+		if (accel_occluded(open, &from,
+				   &to)) /* the ball of triangles has valleys: does the search in double agree? */
 			unseen += !hidden_by_mesh(body, x.p, y.p);
 		else if (i % 50 == 0)
 			unseen += hidden_by_mesh(body, x.p, y.p);
@@ -190,7 +195,7 @@ static void check_segments(const char *name, const struct geom_shape *body)
 			continue;
 		tried++;
 		seen += !accel_occluded(blocked, &from, &to);
-		/* Up to the ball itself, and from it: the far side is hidden, the near side is not. */
+		/* Segments to and from the ball: points on its far side are hidden, points on its near side are not. */
 		struct surface_point z = body_point(&both[1], 1, &d);
 		struct ray_end ball = body_end(&z);
 		bool hidden = vec3_dot(vec3_sub(x.p, z.p), z.ng) < 0;
@@ -198,7 +203,7 @@ static void check_segments(const char *name, const struct geom_shape *body)
 		unseen += accel_occluded(blocked, &ball, &from) != hidden;
 	}
 	print_message("%s: %zu falsely hidden, %zu of %zu falsely seen\n", name, unseen, seen, tried);
-	/* A segment that passes an edge of the mesh by less than floats can tell may be taken to meet it. */
+	/* A segment that passes an edge of the mesh by less than float precision may be taken to meet it. */
 	assert_true(unseen <= 1 + n / 20000);
 	assert_int_equal(seen, 0);
 	assert_true(tried > n / 50);
@@ -217,7 +222,7 @@ static void test_segments(void **state)
 	check_segments("segments in a sphere", &ball);
 }
 
-/* From 1e6 radii away every ray meets what a search in double meets, and one that passes by meets nothing. */
+/* From 1e6 radii away, every ray has the hit that a search in double finds, and a ray that misses the body has none. */
 static void test_far_away(void **state)
 {
 	(void)state;
@@ -257,13 +262,14 @@ static void test_far_away(void **state)
 	body_free(&s[0]);
 }
 
-/* Rays that just touch a sphere, and rays that just do not; where its box touches it too. */
+/* Rays that just touch a sphere and rays that just miss it, including positions at which the sphere touches its
+ * bounding box. */
 static void test_silhouettes(void **state)
 {
 	(void)state;
 	struct dice d = dice_of("silhouettes");
 	for (double radius = 1; radius > 1e-7; radius /= 30) {
-		/* In company: Embree does not look at the box of a primitive that is alone. */
+		/* Other spheres are added because Embree ignores the bounding box of a single primitive. */
 		struct geom_shape all[12],
 			s = {.is_sphere = true, .center = {0.4, -0.7, 0.3}, .radius = radius, .normal_sign = 1};
 		for (int i = 0; i < 12; i++)
@@ -290,7 +296,8 @@ static void test_silhouettes(void **state)
 	}
 }
 
-/* A square cut into slivers of aspect 1e6 is as tight as one of two triangles; triangles of no area do no harm. */
+/* A square cut into slivers of aspect ratio 1e6 lets no more rays through than one of two triangles; triangles
+ * without area do no harm. */
 static void test_slivers(void **state)
 {
 	(void)state;
@@ -298,7 +305,7 @@ static void test_slivers(void **state)
 	struct dice d = dice_of("slivers");
 	struct geom_shape s;
 	body_plane(&s, STRIPS, 0, 0);
-	/* Strips of width 2^-19 and length 2 in the middle, the rest in two wide ones. */
+	/* Strips of width 2^-19 and length 2 in the middle; two wide strips cover the rest. */
 	s.vertex_count = s.triangle_count = 0;
 	for (uint32_t i = 0; i <= STRIPS; i++) {
 		double x = i == 0 ? -1 : i == STRIPS ? 1 : ((double)i - STRIPS / 2) * 0x1p-19;
@@ -336,7 +343,7 @@ static void test_slivers(void **state)
 	body_free(&s);
 }
 
-/* Whoever watches a long building sees it get on. */
+/* A long build reports progress to its liveness counter. */
 static void test_building_ticks(void **state)
 {
 	(void)state;
@@ -352,8 +359,9 @@ static void test_building_ticks(void **state)
 	body_free(&s);
 }
 
-/* Two sheets closer together than floats can be off in their scene, so that a ray in float begins beyond the second: it
- * is met all the same by what leaves the first, however low, and hides what lies beyond it. */
+/* Two sheets closer together than float precision in their scene, so that a ray in float begins beyond the second
+ * sheet: rays that leave the first sheet meet the second all the same, however low, and the second hides what lies
+ * beyond it. */
 static void test_sheets(void **state)
 {
 	(void)state;

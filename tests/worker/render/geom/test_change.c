@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * How points of a surface change as they move, against points a little further on: central differences of 1e-5 lengths,
- * extrapolated once, leave less than 1e-7 of what is small beside nothing nearby.
+ * Derivatives of surface points along the surface, against points a little further on. Central differences with a
+ * step of 1e-5 lengths, extrapolated once, err by less than 1e-7, unless the neighbouring values are large.
  */
 #include "tests/support/bodies.h"
 #include "tests/support/strands.h"
@@ -43,7 +43,7 @@ static struct geom_shape triangle(struct dice *d, bool smooth, bool with_uv)
 				   .uv = with_uv ? uv : NULL};
 }
 
-/* With tangents that turn by up to a radian between corners. */
+/* Adds tangents that turn by up to a radian between corners. */
 static struct geom_shape with_tangents(struct geom_shape s, struct dice *d)
 {
 	vec3 along = vec3_normalize((vec3){(double)(position[1][0] - position[0][0]),
@@ -57,7 +57,7 @@ static struct geom_shape with_tangents(struct geom_shape s, struct dice *d)
 	return s;
 }
 
-/* An instance of it: turned, of uneven scale, and mirrored every other time. */
+/* Returns an instance of the shape: turned, unevenly scaled, and mirrored every other time. */
 static struct geom_shape random_placement(struct geom_shape s, struct dice *d)
 {
 	static struct placement place;
@@ -74,7 +74,7 @@ static struct geom_shape random_placement(struct geom_shape s, struct dice *d)
 	return s;
 }
 
-/* Waves: a height's gradient and second derivatives, or a normal. */
+/* Waves as relief: the gradient and second derivatives of a height; wave_normal() gives a normal. */
 static void wave_height(const void *data, double u, double v, struct relief_value *out)
 {
 	const double *a = data;
@@ -120,7 +120,7 @@ static struct geom_shape sphere(struct dice *d)
 	return s;
 }
 
-/* A cone with its spheres, off by up to half a radian from smooth tangents. */
+/* A cone with its end spheres; if smooth, with tangents that deviate from smooth ones by up to half a radian. */
 static struct geom_shape curve(struct dice *d, bool smooth)
 {
 	static struct strand strand;
@@ -131,8 +131,8 @@ static struct geom_shape curve(struct dice *d, bool smooth)
 	return (struct geom_shape){.curves = &strand.c, .normal_sign = dice_throw(d) < 0.5 ? -1 : 1};
 }
 
-/* Anywhere on it, but not so near the poles that the meridians turn within the steps of differences, nor where they
- * would cross from one part to another. */
+/* Finds a random point of the curve, but not so near the poles that the meridians turn within the steps of the
+ * differences, nor where these steps would cross from one part to another. */
 static bool curve_point(const struct geom_shape *s, struct dice *d, struct surface_point *x)
 {
 	double along = dice_between(d, -1.5, 2.5), around = dice_between(d, -M_PI, M_PI);
@@ -142,7 +142,7 @@ static bool curve_point(const struct geom_shape *s, struct dice *d, struct surfa
 	       vec3_length(vec3_cross(x->ng, curves_cone(s->curves, 0).axis)) > 0.1;
 }
 
-/* The point that lies h further along t, as the surface itself makes it. */
+/* Returns the point at the distance h along t, as the surface itself computes it. */
 static struct surface_point moved_by(const struct geom_shape *s, const struct surface_point *x, vec3 t, double h)
 {
 	struct surface_point y;
@@ -202,8 +202,8 @@ static void test_differences(void **state)
 {
 	(void)state;
 	struct dice d = dice_of("changes of surface points");
-	/* Triangles: flat, without and with uv; smooth, without and with uv, with tangents. Sphere. */
-	/* A curve, as its cones are and smooth. */
+	/* The first kinds are triangles: flat, without and with uv; smooth, without and with uv, and with tangents.
+	 * Then a sphere, and curves with the normals of their cones and with smooth ones. */
 	enum { TANGENTS = 4, SPHERE, CURVE, SMOOTH_CURVE, KINDS };
 	double worst[1 + RELIEFS][KINDS] = {{0}};
 	uint32_t counts[KINDS] = {0};
@@ -230,7 +230,7 @@ static void test_differences(void **state)
 		if (!s.is_sphere && vec3_dot(x.sh.n, x.ng) < 0.1)
 			continue;
 		counts[kind] += curved;
-		/* Slivers: the points further on would lie outside. */
+		/* In slivers, the points further on would lie outside. */
 		vec3 e1 = {(double)(position[1][0] - position[0][0]), (double)(position[1][1] - position[0][1]),
 			   (double)(position[1][2] - position[0][2])};
 		vec3 e2 = {(double)(position[2][0] - position[0][0]), (double)(position[2][1] - position[0][1]),
@@ -253,8 +253,8 @@ static void test_differences(void **state)
 	assert_true(counts[CURVE] > dice_count(32000) / 40 && counts[SMOOTH_CURVE] > dice_count(32000) / 40);
 }
 
-/* The normal of p + h n itself, by differences of its points: to first order in the height where n turns, else exactly.
- */
+/* The bent normal is that of the displaced surface p + h n, computed by differences of its points: to first order in
+ * the height on a sphere, where n turns, and exactly on a flat triangle. */
 static void test_bent_normal_is_that_of_the_surface(void **state)
 {
 	(void)state;
@@ -305,9 +305,9 @@ static void tilted(const void *data, double u, double v, struct relief_value *ou
 	*out = (struct relief_value){.x = *(const vec3 *)data};
 }
 
-/* A picture on a square that faces +z, v downwards: the normal (a, b, c) leans a to the picture's right and b to its
- * top. Where it lies there as in a mirror its right is the other way, its top is not. Mitsuba's frames, n x dp/du, do
- * not know that. */
+/* A picture on a square that faces +z, with v downwards: the normal (a, b, c) leans by a to the picture's right and
+ * by b to its top. In a mirrored picture the right changes sides and the top does not. Mitsuba's frames, built from n
+ * x dp/du, ignore mirroring. */
 static void test_mirrored_pictures(void **state)
 {
 	(void)state;
@@ -353,7 +353,7 @@ static void test_degenerate(void **state)
 	struct dice d = dice_of("changes of degenerate surfaces");
 	struct surface_point x;
 	struct surface_change c;
-	/* At the poles, and as near as numbers get. */
+	/* At the poles, and as near to them as double can represent. */
 	for (int i = 0; i < 400; i++) {
 		struct geom_shape s = sphere(&d);
 		s.sphere_axes = frame_around((vec3){0, 0, i & 1 ? 1 : -1});
@@ -366,7 +366,7 @@ static void test_degenerate(void **state)
 	}
 	for (int i = 0; i < 400; i++) {
 		struct geom_shape s = triangle(&d, true, true);
-		/* Degenerate or huge uv, slivers down to floats' own limit, normals that turn away or vanish. */
+		/* Degenerate or huge uv, slivers down to the limit of floats, and normals that turn away or vanish. */
 		for (int m = 0; m < 3; m++) {
 			uv[m][0] = i % 3 ? 1e30f * uv[m][0] : 0.25f;
 			position[m][1] =
@@ -379,10 +379,10 @@ static void test_degenerate(void **state)
 			s = bent_shape(s, &d, i / 2 % 2);
 		surface_on_triangle(&s, (struct prim_ref){0, 0, 0}, 0.3, 0.3, &x);
 		if (!vec3_is_finite(x.ng))
-			continue; /* no area: no such triangle is kept */
+			continue; /* no area: the reader drops such triangles */
 		assert_finite(&s, &x);
 	}
-	/* Shaded flat: nothing turns. */
+	/* With a flat shading normal nothing turns. */
 	struct geom_shape s = triangle(&d, true, true);
 	for (int m = 0; m < 3; m++)
 		for (int i = 0; i < 3; i++)

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Surfaces that coincide. Two triangles: against their separation along the edges of each (an axis on which they lie
- * apart), in planes of any direction, near the origin and far from it, with vertices rounded to float. The search:
- * against all pairs. Rays and segments: against the one rule that says which of two is there.
+ * Coinciding surfaces. Pairs of triangles: against their separating axes along the edges, in planes of any direction,
+ * near the origin and far from it, with vertices rounded to float. The search: against all pairs. Rays and segments:
+ * against the rule that says which of two coinciding surfaces exists.
  */
 #include "tests/support/bodies.h"
 #include "tests/support/failing_memory.h"
@@ -19,7 +19,7 @@
 
 enum { MOST = 4096 };
 
-/* Triangles without shared vertices. */
+/* A list of triangles without shared vertices. */
 struct soup {
 	float position[3 * MOST + 2][3];
 	uint32_t index[MOST][3];
@@ -56,7 +56,7 @@ static struct triangle triangle_at(const struct soup *s, uint32_t i)
 
 /* ---- two triangles ---- */
 
-/* Corners within the square [-1,1]^2 of the plane through `at`, `size` large; a sliver is thrown again. */
+/* Draws corners within the square [-1,1]^2 of the plane; slivers are drawn again. */
 static void throw_corners(struct dice *d, double c[3][2])
 {
 	double area;
@@ -68,7 +68,8 @@ static void throw_corners(struct dice *d, double c[3][2])
 	} while (fabs(area) < 0.1);
 }
 
-/* The widest gap (above 0) or, where there is none, the least overlap (below 0) along the normals of all edges. */
+/* Returns the widest gap (above 0) along the normals of all edges or, if there is none, the smallest overlap (below
+ * 0). */
 static double widest_gap(const double a[3][2], const double b[3][2])
 {
 	double widest = -INFINITY;
@@ -121,7 +122,7 @@ static void test_two(void **state)
 		s.count = 0;
 		put(&s, &f, at, size, a);
 		put(&s, &f, at, size, b);
-		/* Apart by so much more than vertices are rounded (coordinates are below 2); and tilted. */
+		/* Farther apart than the rounding of the vertices (coordinates are below 2); and a tilted copy. */
 		vec3 off = vec3_madd(at, dice_throw(&d) < 0.5 ? 0x1p-20 : -0x1p-18, f.n);
 		put(&s, &f, off, size, b);
 		struct frame tilted = frame_around(vec3_normalize(vec3_madd(f.n, 0.02, f.s)));
@@ -140,7 +141,7 @@ static void test_two(void **state)
 	assert_true(seen[0] > 0 && seen[1] > 0);
 }
 
-/* Neighbours that share an edge or a corner, in one plane or not, never coincide: a plane and a ball. */
+/* Neighbours that share an edge or a corner, in one plane or not, never coincide: tested on a plane and a ball. */
 static void test_neighbours(void **state)
 {
 	(void)state;
@@ -162,8 +163,8 @@ static void test_neighbours(void **state)
 
 /* ---- the search ---- */
 
-/* What is there by the rule, of all primitives: the first as they rank that overlaps this one, or is hidden by what
- * does. */
+/* Returns the primitive that exists at p by the rule: the first, in order of rank, of all primitives that overlap
+ * this one or are hidden by one that does. */
 static struct prim_ref first_by_rule(const struct accel_shape *s, uint32_t count, struct prim_ref at, vec3 p)
 {
 	const struct triangle t = triangle_from(s[at.shape].position, s[at.shape].index[at.prim]);
@@ -190,7 +191,8 @@ static vec3 point_on(const struct accel_shape *s, uint32_t prim, struct dice *d)
 	return vec3_madd(vec3_madd(t.v[0], u, vec3_sub(t.v[1], t.v[0])), v, vec3_sub(t.v[2], t.v[0]));
 }
 
-/* Triangles of all sizes in a few planes that cross; exact in float, so that all of a plane coincide. */
+/* Triangles of all sizes in a few planes that cross; their coordinates are exact in float, so that all triangles of
+ * one plane coincide. */
 static void fill_planes(struct soup *s, uint32_t count, struct dice *d)
 {
 	for (s->count = 0; s->count < count;) {
@@ -240,8 +242,8 @@ static void test_search(void **state)
 	coincide_free(c);
 }
 
-/* A plant whose round leaves, fans of thin triangles, cross each other everywhere: no two coincide, and the search gets
- * to its end. */
+/* A plant whose round leaves, made of fans of thin triangles, cross each other everywhere: no two coincide, and the
+ * search finishes. */
 static void test_crossing_leaves(void **state)
 {
 	(void)state;
@@ -278,7 +280,7 @@ struct tube {
 	uint32_t index[2 * AROUND][3];
 };
 
-/* The part [first, last] of the tube from a to b. */
+/* Returns the part [first, last] of the tube from a to b. */
 static struct accel_shape make_tube(struct tube *t, vec3 a, vec3 b, double first, double last)
 {
 	struct frame f = frame_around(vec3_normalize(vec3_sub(b, a)));
@@ -299,8 +301,8 @@ static struct accel_shape make_tube(struct tube *t, vec3 a, vec3 b, double first
 				    .rank = SURFACE_OPAQUE};
 }
 
-/* Long thin tubes that lie askew, whose boxes overlap everywhere: the search gets to its end, which to compare the
- * triangles of a few per cent of the pairs would not, and finds each that is a part of another. */
+/* Long thin skewed tubes, whose boxes overlap everywhere. The search finishes, which it would not if it compared the
+ * triangles of only a few per cent of the pairs, and it finds each tube that is a part of another. */
 static void test_tubes(void **state)
 {
 	(void)state;
@@ -342,8 +344,9 @@ static void test_tubes(void **state)
 	mem_free(tube);
 }
 
-/* A stack of equal triangles is no square; a heap that is one ends with what the bounds allow. Where nothing coincides
- * nothing is kept, one sphere hides another, and without memory there is a sentence. */
+/* A stack of equal triangles does not need a quadratic number of pairs; a heap that does ends at the search's bounds.
+ * If nothing coincides, no result is kept; one sphere hides another; and an allocation failure gives an error
+ * message. */
 static void test_bounds(void **state)
 {
 	(void)state;
@@ -398,8 +401,8 @@ static void test_bounds(void **state)
 
 /* ---- rays ---- */
 
-/* A pane and a smaller lamp in its plane, turned: what is there from both sides; what leaves one does not meet the
- * other; no segment begins or ends on what is hidden. */
+/* A turned pane and a smaller lamp in its plane: the right one is met from both sides, rays that leave one do not
+ * meet the other, and no segment begins or ends on a hidden surface. */
 static void test_rays(void **state)
 {
 	(void)state;
@@ -457,7 +460,7 @@ static void test_rays(void **state)
 			pane += !right;
 			if (!right)
 				continue;
-			/* The pane's own point there. */
+			/* The point of the pane at the same position. */
 			struct triangle t = triangle_from(shape[0].position, shape[0].index[0]);
 			double unused;
 			struct prim_ref prim = {0, triangle_meets(&t, p, f.n, &unused) ? 0 : 1, 0};
@@ -474,7 +477,7 @@ static void test_rays(void **state)
 	assert_true(lamp > 0 && pane > 0);
 }
 
-/* The parts of a disk meet in its middle, where coordinates are 0 and so is what they are rounded by. */
+/* The parts of a disk meet in its middle, where the coordinates, and with them their rounding errors, are 0. */
 static void test_fan(void **state)
 {
 	(void)state;

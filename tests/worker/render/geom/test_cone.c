@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Round cones: distances against a search along the axis, rays against the sign of that distance, areas against closed
- * forms, and rays that start on the surface.
+ * Round cones: distances against a search along the axis, rays against the sign of this distance, areas against
+ * closed forms; and rays that start on the surface.
  */
 #include "tests/support/strands.h"
 
@@ -37,7 +37,7 @@ static struct cone cone_of(const struct kind *k, vec3 *p0, vec3 *p1, struct dice
 	return cone_between(*p0, k->r0, *p1, k->r1);
 }
 
-/* By searching, of the unrounded cone. */
+/* Returns the distance to the unrounded cone, found by a search along the axis. */
 static double distance_by_search(vec3 p0, double r0, vec3 p1, double r1, vec3 p)
 {
 	double low = 0, high = 1;
@@ -69,7 +69,7 @@ static void test_distance(void **state)
 	}
 }
 
-/* All roots in their parts, sorted. */
+/* Stores all roots that lie on their own parts of the cone, sorted; returns their number. */
 static int roots_of(const struct cone *c, vec3 o, vec3 d, double slack, double t[6])
 {
 	int n = 0;
@@ -89,8 +89,9 @@ static int roots_of(const struct cone *c, vec3 o, vec3 d, double slack, double t
 	return n;
 }
 
-/* A line meets the convex body twice or not at all: at both the distance is 0, between them less, and with none it is
- * nowhere less. Rays from near and far, in all directions, at the axis and past it. */
+/* A line meets the convex body twice or not at all: at both hits the distance is 0, between them it is negative, and
+ * on a line without hits it is negative nowhere. Rays from near and far, in all directions, towards the axis and past
+ * it. */
 static void test_rays(void **state)
 {
 	(void)state;
@@ -111,7 +112,7 @@ static void test_rays(void **state)
 			if (!(fabs(off) <= tolerance))
 				fail_msg("%s: root %.17g is off by %g", k->name, t[j], off);
 		}
-		double least = INFINITY; /* where the line is nearest */
+		double least = INFINITY; /* smallest distance on the line */
 		double low = away - 3, high = away + 3;
 		for (int j = 0; j < 200; j++) {
 			double x = low + (high - low) / 3, y = high - (high - low) / 3;
@@ -133,7 +134,7 @@ static void test_rays(void **state)
 		assert_true(hits[i] > 100 * dice_count(60000) / 60000);
 }
 
-/* For a line with an end on the surface: its other root, against all roots. Outwards, none is in front. */
+/* The other root of a line that starts on the surface, against all roots. Outwards, no root lies ahead. */
 static void test_other_root(void **state)
 {
 	(void)state;

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Rays among instances of one bumpy ball: plain, uneven, mirrored, turned, tiny and far away, one within another, over
- * a floor that is no instance. Against a search in long double over all triangles, placed by the test itself: every ray
- * from a surface or from free space meets the same triangle at the same place, every segment is blocked or not, however
- * low it runs, however near the next surface is. At most one in two thousand, which passes an edge by less than floats
- * can tell, meets its neighbour.
+ * Rays among instances of one bumpy ball: plain, unevenly scaled, mirrored, turned, tiny and far away, one within
+ * another, over a floor that is no instance. Checked against a search in long double over all triangles, placed by
+ * the test itself: every ray from a surface or from free space must meet the same triangle at the same point, and
+ * every segment must be blocked or open alike, however low it runs and however near the next surface is. At most one
+ * ray in two thousand, which passes an edge by less than float precision, may meet the neighbouring triangle.
  */
 #include "tests/support/bodies.h"
 #include "worker/render/geom/coincide.h"
@@ -73,7 +73,7 @@ static mat4 transform(int k)
 			       product(mat4_rotate(axis, -20), mat4_scale((vec3){-0.2, 0.1, 0.2})));
 	case 3: /* around the plain one */
 		return product(mat4_translate((vec3){-0.5, 0.1, 0}), mat4_scale((vec3){-0.28, -0.28, -0.28}));
-	case 4: /* of floats as rough as a thousandth of it */
+	case 4: /* its floats err by a thousandth of its size */
 		return product(mat4_translate((vec3){0.9, -0.1, 0.3}), mat4_scale((vec3){0.0005, 0.0006, 0.0004}));
 	default:
 		return product(mat4_translate((vec3){-0.2, -0.4, -0.6}),
@@ -102,7 +102,7 @@ static void turn_scene(struct scene *s)
 		       sizeof s->turned[i]);
 }
 
-/* `first`: which of the transforms the first shape has, so that the tree is of one winding or the other. */
+/* first: the transform of the first shape, so that the tree is built with one winding or the other. */
 static struct scene *scene_of(int first)
 {
 	struct scene *s = mem_alloc(1, sizeof *s);
@@ -149,8 +149,8 @@ static void scene_free(struct scene *s)
 	mem_free(s);
 }
 
-/* Nearest along o + t d, but for the triangles that are left out; margin: how near its edge it is met, in barycentrics.
- */
+/* The nearest hit along o + t d, without the excluded triangles. margin: distance of the hit from the triangle's
+ * edge, in barycentric coordinates. */
 struct met {
 	struct prim_ref prim;
 	long double t, margin;
@@ -181,7 +181,7 @@ static struct surface_point point_of(const struct scene *s, struct dice *d)
 	return body_point(&s->shape[k], k, d);
 }
 
-/* Along the surface nearly as often as not. */
+/* Returns a direction, nearly half of the time one along the surface. */
 static vec3 direction_leaving(const struct surface_point *x, struct dice *d)
 {
 	vec3 w = dice_direction(d);
@@ -225,7 +225,8 @@ static void check_closest(struct scene *s, struct dice *d, size_t n, size_t met[
 		const wide *v = s->corner[hit.prim.shape][hit.prim.prim];
 		wide ng = wide_cross(wide_sub(v[1], v[0]), wide_sub(v[2], v[0])), p = widen(x.p);
 		long double along = wide_dot(ng, widen(x.ng)) / sqrtl(wide_dot(ng, ng));
-		/* In the plane, on the ray as far as its slope allows, facing as its corners are wound. */
+		/* The point lies in the triangle's plane and, as far as the slope allows, on the ray, and its normal
+		 * follows the winding of the corners. */
 		long double high = wide_dot(ng, wide_sub(p, v[0])) / sqrtl(wide_dot(ng, ng));
 		double slope = fabs(vec3_dot(x.ng, w)),
 		       off = vec3_length(vec3_sub(x.p, vec3_madd(from.p, (double)want.t, w)));
@@ -242,7 +243,7 @@ static void check_segments(struct scene *s, struct dice *d, size_t n, size_t *bl
 		const struct surface_point a = point_of(s, d), b = point_of(s, d);
 		const struct ray_end from = body_end(&a), to = body_end(&b);
 		const struct prim_ref out[2] = {a.prim, b.prim};
-		bool plane = a.prim.shape == INSTANCES && b.prim.shape == INSTANCES; /* the segment lies in it */
+		bool plane = a.prim.shape == INSTANCES && b.prim.shape == INSTANCES; /* the segment lies in the plane */
 		bool want = search(s, widen(a.p), wide_sub(widen(b.p), widen(a.p)), out, 1).prim.shape != UINT32_MAX;
 		*blocked += want && !plane;
 		*wrong += !plane && accel_occluded(s->accel, &from, &to) != want;
@@ -308,8 +309,9 @@ static void test_refused(void **state)
 	assert_true(placement_make(&p, &fine, low, high));
 }
 
-/* Instances of a table's top on a floor at 0, at which floats are exact: the tops are not, by the rounding of 0.3 in
- * their frame. One that is lifted, and one that is tilted, coincide with nothing; of the others all triangles do. */
+/* Instances of a table top on a floor at height 0, where floats are exact; the tops deviate by the rounding of 0.3 in
+ * their own frame. The lifted instance and the tilted one coincide with nothing; of all others, every triangle
+ * coincides with the floor. */
 static void test_coincident(void **state)
 {
 	(void)state;
@@ -350,7 +352,7 @@ static void test_coincident(void **state)
 	body_free(&top);
 }
 
-/* Along the surface, rising by `slope`. */
+/* Returns a direction along the surface that rises by `slope`. */
 static vec3 grazing(struct dice *d, vec3 n, double slope)
 {
 	vec3 w = dice_direction(d);
@@ -358,8 +360,8 @@ static vec3 grazing(struct dice *d, vec3 n, double slope)
 	return vec3_normalize(vec3_madd(w, slope, n));
 }
 
-/* Two instances of a sheet closer together than Embree may be off in its frame (2^-21): the second is met by what
- * leaves the first, however low, and hides what lies beyond it. */
+/* Two instances of a sheet closer together than Embree's error in its frame (2^-21): rays that leave the first sheet
+ * meet the second, however low, and the second hides what lies beyond it. */
 static void check_sheets(struct dice *d, const mat4 *m, double gap)
 {
 	float position[5][3] = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};

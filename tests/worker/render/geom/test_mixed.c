@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Rays in a scene of mixed scales: a floor of two triangles, and on the middle of it a bumpy ball, half sunk, and a
- * sphere, both a millionth or less as large. From near and from far, with the far end first or last, every ray meets
- * what a search in double meets, at the same place; but for one in a thousand, which passes an edge of the small ball
- * by less than floats can tell.
+ * Rays in a scene of mixed scales: a floor of two triangles, and in its middle a half-sunk bumpy ball and a sphere,
+ * both 2^-12 to 2^-36 as large. From near and from far, with the far end first or last, every ray must meet what a
+ * search in double meets, at the same point, except for one in a thousand (3 % at the smallest size), which passes an
+ * edge of the small ball by less than float precision.
  */
 #include "tests/support/bodies.h"
 #include "worker/render/geom/accel.h"
@@ -41,7 +41,7 @@ static void scene_free(struct scene *s)
 	body_free(&s->shape[1]);
 }
 
-/* Of a sphere, from outside; d: unit. */
+/* Returns the nearest hit of a sphere from outside; d is a unit vector. */
 static double sphere_nearest(const struct geom_shape *s, vec3 o, vec3 d)
 {
 	vec3 oc = vec3_sub(s->center, o);
@@ -66,7 +66,7 @@ static double nearest(const struct scene *s, vec3 o, vec3 d, uint32_t *shape)
 	return best;
 }
 
-/* Over the floor, within a few times what is small, not in the sphere. */
+/* Returns a point over the floor, within a few sizes of the small shapes and outside the sphere. */
 static vec3 near_point(const struct scene *s, struct dice *d)
 {
 	for (;;) {
@@ -105,7 +105,8 @@ static size_t check_closest(const struct scene *s, struct dice *d, bool far, siz
 			continue;
 		met[shape]++;
 		surface_from_hit(&s->shape[shape], from.p, w, &hit, &x);
-		/* The floor's vertices and the directions of rays from far are doubles of about 1, too. */
+		/* The floor's vertices and the directions of far rays are doubles of about 1, whose rounding adds to
+		 * the error. */
 		double off = vec3_length(vec3_sub(x.p, vec3_madd(from.p, t, w)));
 		wrong += !(off <= 1e-4 * s->small + 0x1p-48);
 	}
@@ -129,7 +130,7 @@ static size_t check_segments(const struct scene *s, struct dice *d, size_t n, si
 	return wrong;
 }
 
-/* Light that leaves the floor beside what is small: up and down, along it, towards the ball. */
+/* Rays that leave the floor beside the small shapes: upwards, along the floor, and towards the ball. */
 static size_t check_from_the_floor(const struct scene *s, struct dice *d, size_t n)
 {
 	size_t wrong = 0;
@@ -163,10 +164,10 @@ static size_t check_from_the_floor(const struct scene *s, struct dice *d, size_t
 static void test_mixed(void **state)
 {
 	(void)state;
-	/* Of the last, 1.5e-11, the floor's own doubles leave 1e-4. */
+	/* At the last size, 1.5e-11, the rounding of the floor's own doubles amounts to 1e-4 of the size. */
 	static const struct {
 		double size;
-		size_t wrong; /* of a million */
+		size_t wrong; /* allowed per million rays */
 	} sizes[] = {{0x1p-12, 1000}, {0x1p-20, 1000}, {0x1p-30, 1000}, {0x1p-36, 30000}};
 	size_t n = dice_count(20000);
 	for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
@@ -180,7 +181,8 @@ static void test_mixed(void **state)
 			"%zu %zu %zu, blocked %zu\n",
 			sizes[i].size, n, close, far, segments, floor, met[0], met[1], met[2], blocked);
 		double expected = (double)n * (double)sizes[i].wrong * 1e-6;
-		size_t most = (size_t)(expected + 4 * sqrt(expected) + 1); /* of a small sample, too */
+		size_t most = (size_t)(expected + 4 * sqrt(expected) +
+				       1); /* with an allowance of four standard deviations for small samples */
 		assert_true(close <= most && far <= most && segments <= most && floor <= most);
 		for (int k = 0; k < SHAPES; k++)
 			assert_true(met[k] > n / 50);

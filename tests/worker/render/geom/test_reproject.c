@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Points put back onto one primitive along a ray through a point of it. Tolerances: a few roundings of the coordinates
- * over the cosine between ray and normal.
+ * Projecting points back onto one primitive along a ray through a point of that primitive, against this point.
+ * Tolerances: a few roundings of the coordinates over the cosine between ray and normal.
  */
 #include "tests/support/bodies.h"
 
@@ -18,7 +18,8 @@ static double distance_of(const struct surface_point *a, const struct surface_po
 	return vec3_length(vec3_sub(a->p, b->p));
 }
 
-/* Through a point of the triangle from either side: that point. Behind the start, or beside the triangle: none. */
+/* A ray through a point of the triangle from either side gives that point. A triangle behind the start, or a ray
+ * beside the triangle, gives none. */
 static void test_triangles(void **state)
 {
 	(void)state;
@@ -37,7 +38,7 @@ static void test_triangles(void **state)
 		assert_true(y.b1 >= 0 && y.b2 >= 0 && y.b1 + y.b2 <= 1 + 0x1p-52);
 		assert_false(surface_reproject(&s, x.prim, PRIM_NONE, o, vec3_neg(w), t, &y));
 		assert_false(surface_reproject(&s, x.prim, x.prim, o, w, t, &y));
-		/* Beyond the side that joins vertices 1 and 2. */
+		/* Beyond the edge that joins vertices 1 and 2. */
 		struct surface_point beside;
 		surface_on_triangle(&s, x.prim, x.b1 + 0.6 * (1 - x.b1 - x.b2), x.b2 + 0.6 * (1 - x.b1 - x.b2),
 				    &beside);
@@ -66,24 +67,24 @@ static void test_spheres(void **state)
 		assert_true(surface_reproject(&s, x.prim, PRIM_NONE, o, w, t, &y));
 		assert_true(distance_of(&x, &y) < SAME);
 		assert_true(fabs(vec3_length(vec3_sub(y.p, s.center)) - s.radius) < 1e-15);
-		/* From the sphere itself: the other end of the chord, or nothing when it leads outwards. */
+		/* From the sphere itself: the other end of the chord, or nothing if the ray leads outwards. */
 		bool inwards = vec3_dot(w, x.ng) < 0;
 		assert_int_equal(surface_reproject(&s, x.prim, x.prim, x.p, w, t, &z), inwards);
 		if (!inwards)
 			continue;
 		double chord = -2 * s.radius * vec3_dot(w, x.ng);
 		assert_true(vec3_length(vec3_sub(z.p, vec3_madd(x.p, chord, w))) < SAME);
-		/* From outside both crossings lie ahead: the one asked for. */
+		/* From outside, both crossings lie ahead: the requested one is returned. */
 		vec3 outside = vec3_madd(x.p, -3, w);
 		assert_true(surface_reproject(&s, x.prim, PRIM_NONE, outside, w, 3 + 0.4 * chord, &y) &&
 			    distance_of(&x, &y) < SAME);
 		assert_true(surface_reproject(&s, x.prim, PRIM_NONE, outside, w, 3 + 0.6 * chord, &y) &&
 			    distance_of(&z, &y) < SAME);
 		assert_false(surface_reproject(&s, x.prim, PRIM_NONE, outside, vec3_neg(w), 3, &y));
-		/* From the middle one of them does. */
+		/* From the middle of the chord, only one crossing lies ahead. */
 		vec3 middle = vec3_madd(x.p, 0.5 * chord, w);
 		assert_true(surface_reproject(&s, x.prim, PRIM_NONE, middle, w, 0, &y) && distance_of(&z, &y) < SAME);
-		/* Past it. */
+		/* A ray that misses the sphere. */
 		vec3 aside = vec3_normalize(vec3_cross(w, x.ng)),
 		     passing = vec3_madd(vec3_madd(s.center, 0.401, aside), -2, w);
 		assert_false(surface_reproject(&s, x.prim, PRIM_NONE, passing, w, 2, &y));

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Chains of cones: what rays meet is the border of the union, found by searching along the axes; rays enter and leave
- * it in turn, at joints, too, and from the surface itself; points are where their coordinates say.
+ * Chains of cones: rays must meet the boundary of the union, found by a search along the axes; rays enter and leave
+ * the union alternately, also at joints and from the surface itself; and points must lie where their coordinates say.
  */
 #include "tests/support/strands.h"
 
@@ -28,7 +28,7 @@ static void make_strand(struct strand *s, const struct kind *k, struct dice *d)
 	strand_random(s, k->count, k->turn, k->length, k->radius, d);
 }
 
-/* The nearest primitive that the ray meets; false: none. */
+/* Finds the nearest primitive that the ray meets; returns false if there is none. */
 static bool nearest(const struct strand *s, struct curve_ray *r, uint32_t *prim, struct curve_crossing *x)
 {
 	bool any = false;
@@ -50,8 +50,8 @@ static vec3 aimed_at(const struct strand *s, struct dice *d)
 	return vec3_madd((vec3){(double)p[0], (double)p[1], (double)p[2]}, off * (double)p[3], dice_direction(d));
 }
 
-/* From outside through the chain until nothing is met: it is entered and left in turn, and at each crossing the
- * distance is 0. A crossing that is left out, or met twice, breaks the turn. */
+/* A ray from outside goes on through the chain until it has no hit: it enters and leaves alternately, and the
+ * distance is 0 at each crossing. A crossing that is missed, or met twice, breaks the alternation. */
 static void test_crossings(void **state)
 {
 	(void)state;
@@ -82,7 +82,7 @@ static void test_crossings(void **state)
 		}
 		if (depth != 0)
 			fail_msg("%s, ray %zu: it ends inside", k->name, i);
-		if (met == 0) { /* it passes */
+		if (met == 0) { /* the ray misses the chain */
 			double least = INFINITY;
 			for (int j = -200; j <= 200; j++)
 				least = fmin(least, strand_distance(&s, vec3_madd(o, 20 + 0.01 * j, w)));
@@ -91,7 +91,8 @@ static void test_crossings(void **state)
 	}
 }
 
-/* A culled chain is met where a ray enters it, and nowhere else: of the crossings of one that is not, every second. */
+/* Rays meet a culled chain where they enter it and nowhere else: at every second crossing of the same chain without
+ * culling. */
 static void test_culled(void **state)
 {
 	(void)state;
@@ -138,7 +139,7 @@ static void test_segments(void **state)
 	size_t inner = 0;
 	for (size_t i = 0; i < dice_count(20000); i++) {
 		struct strand s;
-		make_strand(&s, &kinds[i % 2], &d); /* straight and bent */
+		make_strand(&s, &kinds[i % 2], &d); /* straight and bent in turn */
 		vec3 w = dice_direction(&d);
 		struct curve_ray r = {.o = vec3_madd(aimed_at(&s, &d), -20, w), .d = w, .t_max = INFINITY};
 		uint32_t first, second, between;
@@ -177,8 +178,8 @@ static void test_segments(void **state)
 	assert_true(inner > dice_count(20000) / 4);
 }
 
-/* From points so near to a joint that they are on two cones as far as double can tell: outwards a straight chain is not
- * met again, inwards once. Straight in float, too; of one radius, and tapered. */
+/* From points so near a joint that in double they lie on two cones: outwards, a ray does not meet a straight chain
+ * again; inwards, it meets the chain once. The axis is straight in float as well; with one radius, and tapered. */
 static void test_joints(void **state)
 {
 	(void)state;
@@ -204,7 +205,7 @@ static void test_joints(void **state)
 	}
 }
 
-/* Open ends: a ray along the axis of a straight chain meets nothing, and one from the side two walls. */
+/* Open ends: a ray along the axis of a straight chain meets nothing, and a ray from the side meets two walls. */
 static void test_open(void **state)
 {
 	(void)state;
@@ -225,8 +226,8 @@ static void test_open(void **state)
 	}
 }
 
-/* Coordinates: the point nearest to one of the surface is that one; tangents are those of differences; v is that of
- * the points, and u goes around once. */
+/* Coordinates: the nearest point of the chain to a surface point is that point; tangents are those of differences; v
+ * interpolates that of the control points, and u goes around once. */
 static void test_places(void **state)
 {
 	(void)state;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Where rays meet primitives, refined in double: on the primitive, and on the ray. Tolerances are a few roundings of
- * double times the condition of the problem, said where they are used.
+ * Hits of rays on primitives, refined in double, lie on the primitive and on the ray. Tolerances are a few roundings
+ * of double times the condition number of the problem, which is stated where it is used.
  */
 #include "tests/support/bodies.h"
 
@@ -22,7 +22,8 @@ static double off_line(vec3 p, vec3 o, vec3 d)
 	return vec3_length(vec3_cross(vec3_sub(p, o), d));
 }
 
-/* On the triangle's plane to 1e-15 of the coordinates, on the ray to 1e-15 over the cosine between both. */
+/* Hits lie on the triangle's plane to 1e-15 of the coordinates, and on the ray to 1e-15 over the cosine between ray
+ * and normal. */
 static void test_triangles(void **state)
 {
 	(void)state;
@@ -46,8 +47,8 @@ static void test_triangles(void **state)
 		vec3 e2 = vec3_sub(corner(&s, hit.prim.prim, 2), v0), n = vec3_normalize(vec3_cross(e1, e2));
 		worst_plane = fmax(worst_plane, fabs(vec3_dot(vec3_sub(x.p, v0), n)));
 		assert_true(vec3_length(vec3_sub(n, x.ng)) < 1e-15);
-		/* Beside an edge Embree's floats may choose the neighbour: then the nearest point of it, within float.
-		 */
+		/* Beside an edge, Embree's floats may choose the neighbouring triangle: the hit is then that
+		 * triangle's nearest point, within float precision. */
 		double line = off_line(x.p, o, w);
 		if (line > 1e-9) {
 			beside++;
@@ -66,8 +67,8 @@ static void test_triangles(void **state)
 	body_free(&s);
 }
 
-/* Points are center + radius x unit vector: on the sphere to rounding. On the ray to 1e-15 over the cosine; from far
- * away to the rounding of the distance. */
+/* Points are center + radius x unit vector, so they lie on the sphere to rounding. They lie on the ray to 1e-15 over
+ * the cosine; from far away, to the rounding of the distance. */
 static void test_spheres(void **state)
 {
 	(void)state;
@@ -86,7 +87,7 @@ static void test_spheres(void **state)
 				struct ray_end from = {.p = o, .prim = PRIM_NONE};
 				vec3 w = vec3_normalize(vec3_sub(aim, o));
 				struct ray_hit hit;
-				/* Nearer than a rounding of the distance a ray may miss in truth. */
+				/* For a sphere smaller than the rounding of its distance, the ray may miss in truth. */
 				if (radius < 1e-14 * distance)
 					continue;
 				assert_true(accel_closest(a, &from, w, 0, INFINITY, &hit));
@@ -95,7 +96,7 @@ static void test_spheres(void **state)
 				double r = vec3_length(vec3_sub(x.p, s.center));
 				assert_true(fabs(r - radius) < 2e-16 + 4e-16 * radius);
 				assert_true(fabs(vec3_length(x.ng) - 1) < 4e-16);
-				/* The near side, unless the ray starts inside. */
+				/* The hit lies on the near side, unless the ray starts inside. */
 				double cosine = -vec3_dot(x.ng, w);
 				assert_true(distance > radius ? cosine > 0 : cosine < 0);
 				assert_true(off_line(x.p, o, w) * fabs(cosine) < 1e-15 * (1 + 4 * distance));
@@ -105,7 +106,7 @@ static void test_spheres(void **state)
 	}
 }
 
-/* From a point of the sphere through it: the other crossing, however flat the ray. */
+/* A ray from a point of the sphere into it meets the other end of the chord, however flat the ray. */
 static void test_sphere_from_itself(void **state)
 {
 	(void)state;
@@ -127,7 +128,8 @@ static void test_sphere_from_itself(void **state)
 		assert_true(accel_closest(a, &from, w, 0, INFINITY, &hit));
 		surface_from_hit(&s, x.p, w, &hit, &y);
 		double chord = 2 * s.radius * -vec3_dot(w, x.ng), t = vec3_dot(vec3_sub(y.p, x.p), w);
-		/* The start is on the sphere to a rounding, which moves the other crossing by that over the cosine. */
+		/* The start lies on the sphere to a rounding, which moves the other crossing by this rounding over
+		 * the cosine. */
 		if (!(fabs(t - chord) * cosine < 1e-15))
 			fail_msg("chord %.17g, %.17g found at cosine %g", chord, t, cosine);
 		assert_true(off_line(y.p, x.p, w) < 2e-15);
@@ -135,7 +137,7 @@ static void test_sphere_from_itself(void **state)
 	accel_free(a);
 }
 
-/* A point beside a sliver moves across it, not along it. */
+/* A point beside a sliver is moved across the sliver, not along it. */
 static void test_beside_a_sliver(void **state)
 {
 	(void)state;
@@ -154,7 +156,7 @@ static void test_beside_a_sliver(void **state)
 	}
 }
 
-/* u grows with the longitude, v from pole to pole, and the derivative of the position agrees with differences. */
+/* u grows with the longitude and v from pole to pole, and the derivatives of the position agree with differences. */
 static void test_parameters(void **state)
 {
 	(void)state;
@@ -191,7 +193,7 @@ static void test_parameters(void **state)
 	struct surface_point a, b;
 	surface_on_triangle(&t, (struct prim_ref){0, 0, 0}, 0.25, 0.25, &a);
 	surface_on_triangle(&t, (struct prim_ref){0, 0, 0}, 0.35, 0.45, &b);
-	/* The position is linear in (u,v): along a line of constant v it moves by dpdu. */
+	/* The position is linear in (u,v): along a line of constant v it changes by dpdu. */
 	double det = (double)(uv[1][0] - uv[0][0]) * (double)(uv[2][1] - uv[0][1]) -
 		     (double)(uv[1][1] - uv[0][1]) * (double)(uv[2][0] - uv[0][0]);
 	vec3 e1 = corner(&t, 0, 1), e2 = corner(&t, 0, 2);

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Curves as they are traced: Embree's hits against a search through all cones in double, from far, from inside and from
- * the surface itself; points of the surface, put back along rays; memory and bits.
+ * Curves as they are traced: Embree's hits against a search through all cones in double, from far away, from inside
+ * and from the surface itself; points of the surface, projected back along rays; memory use, and equal bits of two
+ * trees.
  */
 #include "common/base/mem.h"
 #include "tests/support/bodies.h"
@@ -16,7 +17,7 @@
 
 enum { STRANDS = 3 };
 
-/* Several strands around each other, all within the unit sphere; of ordinary thickness, or thin as hair. */
+/* Several strands around each other, all within the unit sphere, of ordinary thickness or as thin as hair. */
 static void make_strand(struct strand *s, struct geom_shape *g, double radius, struct dice *d)
 {
 	for (int i = 0; i < STRANDS; i++) {
@@ -55,7 +56,7 @@ static vec3 direction_to_strand(const struct strand *s, struct dice *d)
 	return vec3_madd(vec3_madd(vec3_scale(x, a), 1 - x, b), 1.1 * dice_throw(d) * (double)p[3], dice_direction(d));
 }
 
-/* A ray from somewhere, and on from each point that it meets. */
+/* Follows a ray and starts another at each hit. */
 static void follow_ray(const struct strand *s, const struct geom_shape *g, const struct accel *a, struct dice *d,
 		       double away, size_t *met)
 {
@@ -74,8 +75,8 @@ static void follow_ray(const struct strand *s, const struct geom_shape *g, const
 		struct surface_point x, y;
 		surface_from_hit(&g[hit.prim.shape], from.p, w, &hit, &x);
 		if (vec3_length(vec3_cross(vec3_sub(x.p, from.p), w)) > 4e-8)
-			return; /* the roots of a ray that only touches are off by the square root of rounding */
-		/* Nothing lies before it, and something does behind it. */
+			return; /* the roots of a tangent ray are off by the square root of the rounding */
+		/* Nothing lies in front of the hit, and the curve lies behind it. */
 		struct ray_end to = body_end(&x), beyond = {vec3_madd(x.p, 1e-4, w), {0, 0, 0}, PRIM_NONE};
 		assert_false(accel_occluded(a, &from, &to));
 		assert_false(accel_occluded(a, &to, &from));
@@ -108,8 +109,8 @@ static void test_rays(void **state)
 	}
 }
 
-/* Low over a plane, whose rays Embree gets a little higher, a thin hair along an axis fills its boxes up to their
- * sides: it is met as in double all the same. */
+/* Embree lifts rays that run low over a plane. A thin hair along an axis fills its boxes up to their sides; the
+ * lifted rays must meet it where the search in double does. */
 static void test_lifted(void **state)
 {
 	(void)state;
@@ -146,8 +147,8 @@ static void test_lifted(void **state)
 	body_free(&g[0]);
 }
 
-/* The frame: dp/du around, so that t runs along the strand; smooth normals are perpendicular to the tangents at the
- * points, from both sides. */
+/* The frame: dp/du runs around the strand, so that t runs along it; smooth normals are perpendicular to the tangents
+ * at the control points, from both sides. */
 static void test_frames(void **state)
 {
 	(void)state;
@@ -199,7 +200,7 @@ static void make_hairs(struct hairs *h, struct dice *d)
 	}
 }
 
-/* What a segment takes, and that two trees give the same bits. */
+/* The memory per segment, and equal bits from two trees. */
 static void test_memory_and_bits(void **state)
 {
 	(void)state;
