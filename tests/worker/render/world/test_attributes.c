@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Attributes of meshes as textures, against independent ways to the same: colours that are a linear function of the
- * place against that function, on meshes that are mirrored, displaced and shine; vertex colours against a picture;
- * a number for each triangle against a mesh for each number. And what cannot be, refused by name.
+ * Attributes of meshes as textures, against independent ways to obtain the same values: colours that are a linear
+ * function of the position, against this function, on meshes that are mirrored, displaced or emit light; vertex
+ * colours against a picture; one mesh with a number for each triangle against one mesh per number. Invalid attributes
+ * are refused by name.
  */
 #include "tests/support/memory_assets.h"
 #include "tests/support/pictures.h"
@@ -29,8 +30,9 @@ static const struct wavelengths colour = {.nm = {450, 550, 600, 700}};
 #define PLY(file, inner) "<shape type='ply'><string name='filename' value='" file "'/>" inner "</shape>"
 #define DIFFUSE(inner) "<bsdf type='diffuse'>" inner "</bsdf>"
 
-/* Of the node in column i and row j: sums of a part by column and one by row, so that what is bilinear between four
- * nodes is linear there. Exact in a picture's 8 bits. */
+/* Computes the colour of the node in column i and row j: the sum of one term per column and one per row, so that
+ * bilinear interpolation between four nodes is linear in each triangle. The values are exact in the 8 bits of a
+ * picture. */
 static void node_colour(int i, int j, double rgb[3])
 {
 	rgb[0] = (i + j) / 16.0;
@@ -43,8 +45,8 @@ static int heat_of(int triangle)
 	return triangle * 3 % HEATS;
 }
 
-/* The grid over [-1,1]^2 at z = 0, its nodes at the centres of a picture's pixels; only the triangles of that heat, or
- * all: heat -1. linear: colours are of the place. */
+/* Writes the grid over [-1,1]^2 at z = 0, with its nodes at the centres of a picture's pixels, and returns its size.
+ * heat: only the triangles with this value, or all if -1. linear: the colours are a linear function of the position. */
 static size_t write_grid(char *text, int heat, bool linear)
 {
 	char *at = text, *end = text + TEXT_MAX;
@@ -101,7 +103,7 @@ static struct world *world_of(const char *body)
 	return world_of_files(16, 16, files);
 }
 
-/* Reflectance of a diffuse surface, all lanes. */
+/* Returns the reflectance of a diffuse surface at each wavelength. */
 static spectrum albedo(const struct world *w, const struct surface_point *x)
 {
 	const struct bsdf *b = &w->bsdfs[w->parts[x->prim.shape].bsdf];
@@ -116,7 +118,8 @@ static void assert_close(spectrum a, spectrum b, double tolerance)
 			fail_msg("lane %d: %.9g is not %.9g", l, a.v[l], b.v[l]);
 }
 
-/* What write_grid makes of the place; scene units are the world's here but for a power of two. */
+/* The linear colour of write_grid() as a function of the position; lengths of the world are those of the scene but
+ * for a power of two. */
 static void linear_colour(const struct world *w, vec3 p, double rgb[3])
 {
 	vec3 q = vec3_madd(w->center, 1 / w->scale, p);
@@ -140,7 +143,7 @@ static void assert_linear(const struct world *w, uint32_t shape, bool mirrored)
 	}
 }
 
-/* Normals, winding and cutting up turn and move what attributes belong to; they go along. */
+/* Flipped normals, winding and splitting turn and move vertices; the attributes must move with them. */
 static void test_linear(void **state)
 {
 	(void)state;
@@ -157,13 +160,14 @@ static void test_linear(void **state)
 	for (uint32_t i = 0; i < 5; i++)
 		assert_linear(w, i, i == 2);
 	assert_int_equal(w->shapes[4].triangle_count, 16 * TRIANGLES);
-	/* Of one shape each. */
+	/* one material for each of the two shapes */
 	assert_true(w->parts[0].bsdf != w->parts[1].bsdf && w->bsdfs[0].textured &&
 		    w->bsdfs[0].shape == COLOR_SHAPE_OTHER);
 	world_free(w);
 }
 
-/* Instances share a mesh with its attributes, and a BSDF where they share triangles: mirrored ones have them turned. */
+/* Instances share a mesh with its attributes, and share a BSDF where they share triangles; mirrored instances have
+ * triangles, and with them attributes, in reversed order. */
 static void test_instances(void **state)
 {
 	(void)state;
@@ -177,7 +181,7 @@ static void test_instances(void **state)
 	world_free(w);
 }
 
-/* Shapes 0 and 1, at the same places. */
+/* Compares the colours of shapes 0 and 1 at the same points. */
 static void assert_alike(const struct world *w)
 {
 	for (uint32_t t = 0; t < TRIANGLES; t++)
@@ -190,7 +194,7 @@ static void assert_alike(const struct world *w)
 		}
 }
 
-/* The picture that has the vertices' colours at its pixels. */
+/* A picture whose pixels have the colours of the vertices. */
 static void test_picture(void **state)
 {
 	(void)state;
@@ -201,7 +205,8 @@ static void test_picture(void **state)
 	world_free(w);
 }
 
-/* An image by other coordinates: pairs of numbers at the vertices that are an affine map of (u,v), against that map. */
+/* An image looked up by other coordinates: pairs of numbers at the vertices that are an affine map of (u,v), against
+ * this map. */
 static void test_coordinates(void **state)
 {
 	(void)state;
@@ -214,7 +219,7 @@ static void test_coordinates(void **state)
 	world_free(w);
 }
 
-/* A mesh for each heat, of that colour, and one mesh of all heats: the same picture to the bit. */
+/* One mesh per heat with the colour of this heat, against one mesh with all heats: the images are equal bit by bit. */
 static void test_faces(void **state)
 {
 	(void)state;
@@ -224,7 +229,8 @@ static void test_faces(void **state)
 			       "<shape type='ply'><string name='filename' value='h%d'/><bsdf type='diffuse'>"
 			       "<float name='reflectance' value='%.9g'/></bsdf></shape>",
 			       h, (double)(float)(h / (double)HEATS));
-	/* By place, chances would differ: walks end where a whole material is black. */
+	/* With the choice of emitters by position, the probabilities would differ: the walks behind it end where a
+	 * whole material is black. */
 	worlds_accuracy = "emitter-choice=power";
 	struct world *many = world_of(text),
 		     *one = world_of(SKY PLY("grid.ply", DIFFUSE(FIELD("reflectance", "face_heat"))));
@@ -243,12 +249,13 @@ static void test_faces(void **state)
 	assert_true(sum > 0);
 	picture_fini(&a);
 	picture_fini(&b);
-	/* Triangles without an area take their numbers with them: tests/worker/render/shape/test_attributes.c. */
+	/* Triangles without area are dropped together with their numbers:
+	 * tests/worker/render/shape/test_attributes.c. */
 	world_free(many);
 	world_free(one);
 }
 
-/* Points that are drawn on a light, and points that are met. */
+/* Points sampled on a light, and points that rays meet. */
 static void test_light(void **state)
 {
 	(void)state;
@@ -274,7 +281,7 @@ static void test_light(void **state)
 	world_free(w);
 }
 
-/* One material for meshes of different numbers; the least roughness is found wherever it is. */
+/* One material for meshes with different numbers; the smallest roughness is found wherever it lies. */
 static void test_roughness(void **state)
 {
 	(void)state;
@@ -288,7 +295,7 @@ static void test_roughness(void **state)
 			fail_msg("%u: alpha %g", i, b->alpha);
 	}
 	world_free(w);
-	/* Of colours the mean of their components, least at one node. */
+	/* The roughness of a colour is the mean of its components; one node has the smallest. */
 	w = world_of(SKY PLY("linear.ply", "<bsdf type='roughconductor'>" FIELD("alpha", "vertex_color") "</bsdf>"));
 	double least = INFINITY;
 	for (int k = 0; k < SIDE * SIDE; k++) {
@@ -324,7 +331,7 @@ static void test_colours_as_numbers(void **state)
 	world_free(w);
 }
 
-/* What may exceed 1 is the attribute's number: the index of a metal, an exponent, an absorption. */
+/* Parameters whose attribute may exceed 1: the index of a metal, an exponent, an absorption. */
 static void test_beyond_one(void **state)
 {
 	(void)state;
@@ -370,7 +377,7 @@ static void test_beyond_one(void **state)
 		assert_close(a, b, 1e-6);
 		world_free(w);
 	}
-	/* Colours as those of other parameters. */
+	/* Attributes of these parameters are colours like those of other parameters. */
 	struct world *w = world_of(
 		SKY PLY("linear.ply",
 			"<bsdf type='coating'>" FIELD("sigma_a", "vertex_color") "<bsdf type='diffuse'/></bsdf>"));
@@ -378,7 +385,7 @@ static void test_beyond_one(void **state)
 	world_free(w);
 }
 
-/* 0.6 takes floats at vertices as sRGB, unless the shape says that they are not. */
+/* Files of version 0.6 interpret floats at vertices as sRGB, unless the shape says otherwise. */
 static void test_vertexcolors(void **state)
 {
 	(void)state;
@@ -415,7 +422,7 @@ static void test_shared(void **state)
 	assert_ptr_not_equal(attribute_keep(&t, &of[2], false, &arena), first);
 	const struct attribute_values *decoded = attribute_keep(&t, &of[1], true, &arena);
 	assert_true(decoded != first && decoded->value[2] == 1 && decoded->value[1] < 0.25F);
-	of[1].channels = 1; /* the same bytes as two numbers a vertex less */
+	of[1].channels = 1; /* same bytes, but two numbers fewer per vertex */
 	assert_ptr_not_equal(attribute_keep(&t, &of[1], false, &arena), first);
 	arena_fini(&arena);
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The setting `backs`: what an opaque material without `twosided` shows on its back, alone, under a mask and in a
- * blend, under a sky of radiance 1, of which a grey of 0.5 shows a half; the note on backs that are black; and two
- * integrators that agree on a room of rectangles of which some face away from the light.
+ * The setting `backs`: the appearance of the back of an opaque material without `twosided`, alone, under a mask and
+ * in a blend, under a sky of radiance 1, of which a grey of 0.5 reflects one half; the note about black backs; and
+ * two integrators that must agree on a room of rectangles, some of which face away from the light.
  */
 #include "tests/support/agree.h"
 #include "tests/support/leases.h"
@@ -22,7 +22,7 @@ enum { SIDE = 8, SPP = 64 };
 #define GREY "<bsdf type='diffuse'><rgb name='reflectance' value='0.5'/></bsdf>"
 #define TWO_SIDES "<bsdf type='twosided'>" GREY "</bsdf>"
 
-/* The mean luminance of a rectangle that fills the picture. */
+/* Returns the mean luminance of a rectangle that fills the image. */
 static double mean_luminance(const char *accuracy, const char *material, bool back)
 {
 	worlds_accuracy = accuracy;
@@ -45,7 +45,7 @@ static void backs_by_material_and_setting(void **state)
 	(void)state;
 	static const struct {
 		const char *material;
-		double front, lit, black; /* the front, and the back by either setting */
+		double front, lit, black; /* of the front, and of the back with backs=lit and backs=black */
 	} cases[] = {
 		{GREY, 0.5, 0.5, 0},
 		{TWO_SIDES, 0.5, 0.5, 0.5},
@@ -66,13 +66,14 @@ static void backs_by_material_and_setting(void **state)
 	}
 }
 
-/* One in twenty of what is seen, under the file's own rule; lamps, glass and what has two sides do not count. */
+/* The note appears if black backs cover at least one twentieth of the visible surfaces under the file's own rule;
+ * lamps, glass and two-sided materials do not count. */
 static void one_sided_materials_are_noted(void **state)
 {
 	(void)state;
 	static const struct {
 		const char *accuracy, *material;
-		double half; /* of the rectangle's width; 9.1 pixels are seen of 1 */
+		double half; /* half width of the rectangle; of 1 it covers 9.1 pixels */
 		bool back, noted;
 	} cases[] = {
 		{"backs=auto", GREY, 9, true, true},
@@ -115,8 +116,8 @@ static void one_sided_materials_are_noted(void **state)
 	}
 }
 
-/* A cube is seen from inside: all of its sides are backs. The lamp's light comes by the floor, which faces it, and by a
- * wall that does not, and by the two sides of a screen. */
+/* A cube is seen from inside, so that all of its sides are backs. The lamp's light arrives by way of the floor, which
+ * faces the lamp, of a wall that does not, and of both sides of a screen. */
 static void integrators_agree(void **state)
 {
 	(void)state;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Rays that meet boxes, against points along them; and around which panes of a scene the box for connections is. */
+/* Intersection of rays with boxes, against points along the rays; and which surfaces of a scene the box for
+ * connections encloses. */
 #include "tests/support/dice.h"
 #include "tests/support/worlds.h"
 #include "worker/render/world/box.h"
@@ -17,7 +18,8 @@ static bool is_inside(const struct box *b, vec3 p, double out)
 	       p.z >= b->low.z - out && p.z <= b->high.z + out;
 }
 
-/* Points along the ray, no further apart than `out`, find the box or miss it by more than that. */
+/* If a point along the ray lies in the box, the ray must meet it; if none comes within `out`, the spacing of the
+ * points, the ray must miss it. */
 static void test_points(void **state)
 {
 	(void)state;

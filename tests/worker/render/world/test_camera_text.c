@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The camera in an image's header: what a scene that is written from it would be. */
+/* The camera in an image's header, against the camera of a scene written from this header. */
 #include "tests/support/worlds.h"
 
 #include <setjmp.h>
@@ -57,7 +57,7 @@ static void test_text(void **state)
 		  "<float name='focus_distance' value='4'/>" LOOK FILM "</sensor>",
 		  text, &m);
 	assert_true(strncmp(text, "thinlens fov=30 fov_axis=x aperture_radius=0.25 focus_distance=4 ", 65) == 0);
-	camera_of("", text, &m); /* a ball of radius 1 at the origin, seen whole */
+	camera_of("", text, &m); /* a ball of radius 1 at the origin, entirely in view */
 	assert_true(strncmp(text, "perspective fov=45 fov_axis=x ", 30) == 0);
 	assert_true(fabs(m.m[2][3] + 1 + 1 / tan(M_PI / 8)) < 1e-9);
 	camera_of("<sensor type='orthographic'>" LOOK FILM "</sensor>", text, &m);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* render_check_all: every shape, material and emitter that is wrong, each once; of a good scene what render_check says.
- */
+/* render_check_all() reports every invalid shape, material and emitter once each; for a valid scene it reports the
+ * same as render_check(). */
 #include "tests/support/memory_assets.h"
 #include "worker/render/render.h"
 #include "worker/render/world/build.h"
@@ -74,7 +74,7 @@ static void test_all_problems(void **state)
 	free_checked(&c);
 }
 
-/* What is wrong with instances comes first, because shapes are listed before they are read. */
+/* Errors in instances come first, because shapes are listed before they are read. */
 static void test_instances(void **state)
 {
 	(void)state;
@@ -111,7 +111,8 @@ static void test_good_scene(void **state)
 	free_checked(&c);
 }
 
-/* Of most metals Mitsuba has two tables, and here is one: that is said, unless Mitsuba has this one alone. */
+/* Mitsuba has two tables for most metals, and this renderer one: a note says so, unless this table is Mitsuba's only
+ * one. */
 static void test_second_tables(void **state)
 {
 	(void)state;
@@ -127,7 +128,7 @@ static void test_second_tables(void **state)
 	free_checked(&c);
 }
 
-/* A name that Mitsuba has and this does not is unknown, and stands for nothing. */
+/* A metal that only Mitsuba has is unknown, and no other metal replaces it. */
 static void test_unknown_metals(void **state)
 {
 	(void)state;
@@ -163,7 +164,7 @@ static void test_unknown_indices(void **state)
 	free_checked(&c);
 }
 
-/* The texture inside, which Mitsuba 0.6 takes; a value alone is no mistake. */
+/* A value beside a texture: the texture applies, which Mitsuba 0.6 accepts; a value alone is no mistake. */
 static void test_values_beside_textures(void **state)
 {
 	(void)state;
@@ -183,7 +184,7 @@ static void test_values_beside_textures(void **state)
 	free_checked(&c);
 }
 
-/* No more than there is room for. */
+/* The number of reported errors ends where the report is full. */
 static void test_too_many(void **state)
 {
 	(void)state;

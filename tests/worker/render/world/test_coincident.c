@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What is said of shapes that coincide: which of two is there and why, by name; nothing where nobody can see it. And of
- * shapes that are too small beside others. */
+/* Notes about coinciding shapes: which of two exists and why, by name, and no note where nobody can see the
+ * difference; and about shapes that are too small beside others. */
 #include "tests/support/worlds.h"
 
 #include <setjmp.h>
@@ -32,7 +32,7 @@
 /* clang-format on */
 #define VIEW SENSOR("0,3,8", "0,0,0") "\n"
 
-/* NULL: nothing is said. on: whether rays have to ask. */
+/* Expects the notes `first` and `second`; NULL: no such note. on: whether rays must look coinciding primitives up. */
 static void expect(const char *text, const char *first, const char *second, bool on)
 {
 	struct world *w = world_of_text(8, 8, "%s", text);
@@ -71,7 +71,7 @@ static void test_notes(void **state)
 	       "`hole` (test.xml:4) and `glass` (test.xml:2) coincide: where they overlap, only the latter is present, "
 	       "because it refracts or scatters",
 	       true);
-	/* Glass with holes is glass, which a sheet with holes is not. */
+	/* Glass with holes counts as glass; an opaque sheet with holes does not. */
 	expect(VIEW CUBE("lace", "0", "0.5", HOLES(GLASS)) CUBE("glass", "1", "0.5", GLASS)
 		       CUBE("net", "-1", "0.5", HOLES(GREY)),
 	       "`glass` (test.xml:3) and `lace` (test.xml:2) coincide: where they overlap, only the latter is present, "
@@ -80,7 +80,8 @@ static void test_notes(void **state)
 	       "`net` (test.xml:4) and `lace` (test.xml:2) coincide: where they overlap, only the latter is present, "
 	       "because it refracts or scatters",
 	       true);
-	/* Two lamps back to back are one, which shines to its own side; a lamp that is there twice loses nothing. */
+	/* Of two lamps back to back only one exists, which emits towards its own side; a lamp that is there twice
+	 * loses no light. */
 	expect(VIEW LAMP "<shape type='rectangle' id='back'>" AT(
 		       "<scale value='0.3'/><rotate y='1' angle='180'/><translate z='0.5' y='0.5'/>") SHINES
 	       "</shape>\n",
@@ -93,7 +94,8 @@ static void test_notes(void **state)
 	       "`twin` (test.xml:3) and `lamp` (test.xml:2) coincide: where they overlap, only the latter is present, "
 	       "because it comes first in the file",
 	       NULL, true);
-	/* A block on a floor shows nothing of it; a picture on the wall that is the wall does. */
+	/* A block on a floor hides the coinciding part of the floor, so there is no note; a picture in the plane of a
+	 * wall is visible, so there is one. */
 	expect(VIEW FLOOR(GREY) CUBE("block", "0", "0.5", RED), NULL, NULL, true);
 	expect(VIEW FLOOR(GREY) "<shape type='rectangle'>" AT("<rotate x='1' angle='-90'/>") RED "</shape>",
 	       "the rectangle in test.xml:3 and `floor` (test.xml:2) coincide: where they overlap, only the latter is "
@@ -101,7 +103,7 @@ static void test_notes(void **state)
 	       NULL, true);
 }
 
-/* From where on doubles do not hold both. */
+/* The ratio of sizes from which on double precision does not suffice for both shapes. */
 static void test_scales(void **state)
 {
 	(void)state;
@@ -123,7 +125,7 @@ static void test_scales(void **state)
 	}
 }
 
-/* Of many not more is said than a few, and how many more there are. */
+/* Of many pairs, only a few are named; a last note counts the rest. */
 static void test_many(void **state)
 {
 	(void)state;

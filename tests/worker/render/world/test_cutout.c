@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A material that a picture cuts in two, against two rectangles: of `mask` one half is not there, of `blendbsdf` the
- * halves have the two materials.
+ * A material that a picture divides in two halves, against two rectangles: with `mask` one half is absent, with
+ * `blendbsdf` the halves have two materials. Statistics as in tests/support/agree.h.
  */
 #include "tests/support/agree.h"
 #include "tests/support/memory_assets.h"
@@ -23,7 +23,7 @@
 #define HALF(side, bsdf)                                                                         \
 	"<shape type='rectangle'><transform name='to_world'><scale x='0.5'/><translate x='" side \
 	"'/></transform>" bsdf "</shape>"
-/* 0 to the left, 1 to the right. */
+/* A picture that is 0 on the left and 1 on the right. */
 #define PICTURE(name)                                                                 \
 	"<texture type='bitmap' name='" name "'><string name='filename' value='p0'/>" \
 	"<boolean name='raw' value='true'/><string name='filter_type' value='nearest'/></texture>"
@@ -59,7 +59,7 @@ static void test_mask(void **state)
 		HALF("0.5", DIFFUSE("0.8")));
 }
 
-/* A leaf: lit from behind through itself, and through what is cut off. */
+/* A leaf lit from behind: light passes through its material, and through the part that is cut off. */
 static void test_mask_over_what_transmits(void **state)
 {
 	(void)state;
@@ -68,7 +68,7 @@ static void test_mask_over_what_transmits(void **state)
 		HALF("0.5", LEAF));
 }
 
-/* A pane of glass whose one half is cut off, and frosted glass likewise: what refracts and what passes stay apart. */
+/* Smooth and frosted glass with one half cut off: refraction and straight transmission must stay separate. */
 static void test_mask_over_glass(void **state)
 {
 	(void)state;
@@ -91,13 +91,13 @@ static void test_blend(void **state)
 		HALF("-0.5", DIFFUSE("0.8")) HALF("0.5", DIFFUSE("0.3")));
 }
 
-/* With a normal that faces away from the camera, and one that faces it. */
+/* Panes with a normal that faces away from the camera, and with one that faces it. */
 #define BENT(opacity, y)                                                                              \
 	"<shape type='rectangle'><bsdf type='mask'><float name='opacity' value='" opacity "'/>"       \
 	"<bsdf type='twosided'><bsdf type='normalmap'><rgb name='normalmap' value='0.5 " y " 0.67'/>" \
 	"<boolean name='flip_invalid_normals' value='false'/>" DIFFUSE("0.8") "</bsdf></bsdf></bsdf></shape>"
 
-/* Light passes through a hole whatever the normal would be. */
+/* Light passes through a hole whatever the normal at that point. */
 static void test_bent_hole(void **state)
 {
 	(void)state;
@@ -117,7 +117,7 @@ static void test_bent_hole(void **state)
 	}
 }
 
-/* A lamp through panes that let half of the light pass and face the camera, or not. */
+/* A lamp seen through panes that transmit half of the light, with normals that face the camera or do not. */
 static void test_bent_panes(void **state)
 {
 	(void)state;

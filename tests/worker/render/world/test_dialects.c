@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * One scene in the words of 0.6 and in those of 3.x: the same picture to the bit. What one dialect leaves to its
- * defaults, the other states.
+ * One scene in the notation of version 0.6 and in that of 3.x gives the same image, bit by bit. Values that one
+ * version leaves to its defaults are stated in the other.
  */
 #include "tests/support/memory_assets.h"
 #include "tests/support/pictures.h"
@@ -112,8 +112,8 @@ static void test_twins(void **state)
 	pictures_fini(&p);
 }
 
-/* As light, <spectrum value="2"> is 2 at each wavelength in 3.x, where Mitsuba documents its colour as purple-ish, and
- * rgb 2 in 0.6; as a reflectance it is the same in both. */
+/* <spectrum value="2"> as a light is 2 at each wavelength in 3.x, where Mitsuba documents its colour as purple-ish,
+ * and rgb 2 in 0.6; as a reflectance it is the same in both. */
 static void test_number_as_spectrum(void **state)
 {
 	(void)state;
@@ -153,8 +153,8 @@ static void test_number_as_spectrum(void **state)
 	}
 }
 
-/* Shapes without a BSDF are grey, on both sides in tests; in 0.6 those that bound a medium let light through, unless
- * they shine. */
+/* Shapes without a BSDF are grey, on both sides in tests; in 0.6 shapes that bound a medium let light through, unless
+ * they emit light. */
 static void test_boundaries_of_media(void **state)
 {
 	(void)state;

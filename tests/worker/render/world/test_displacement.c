@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Displacement in scenes: what the reader takes and refuses, heights as bitmaps have them, the effect that is reported,
- * the same image at height zero, and that the integrators agree on displaced matter and displaced light.
+ * Displacement in scenes: which parameters the reader accepts and refuses, the heights of bitmaps, the reported
+ * effect, an unchanged image at height zero, and agreement of the integrators on displaced surfaces and displaced
+ * lights (tests/support/agree.h).
  */
 #include "worker/render/render.h"
 #include "tests/support/agree.h"
@@ -53,7 +54,7 @@ static void test_effect(void **state)
 	world_free(w);
 }
 
-/* In units of the scene. */
+/* Returns the position of a vertex in scene units. */
 static vec3 vertex(const struct world *w, uint32_t shape, uint32_t i)
 {
 	const float *p = w->shapes[shape].position[i];
@@ -72,7 +73,7 @@ static struct world *world_with_picture(const char *inner)
 	return w;
 }
 
-/* At pixel centres the stored value over 255 itself, unless the scene says that it is sRGB. */
+/* At pixel centres the height is the stored value over 255, unless the scene says that the bitmap is sRGB. */
 static void test_heights_of_a_bitmap(void **state)
 {
 	(void)state;
@@ -174,7 +175,8 @@ static struct world *flat_world(const char *displacement)
 		displacement, displacement);
 }
 
-/* Floats round differently on finer triangles: a path near an edge may change as a whole, the others by rounding. */
+/* Floats round differently on finer triangles: a path near an edge may change completely, and all others change by
+ * rounding. */
 static void test_height_zero_is_the_same_image(void **state)
 {
 	(void)state;
@@ -196,8 +198,7 @@ static void test_height_zero_is_the_same_image(void **state)
 	free(zero);
 }
 
-/* A rough ground, a glossy displaced ball, and a displaced lamp whose light has a texture; a sky
- * against noise. */
+/* A rough ground, a glossy displaced ball, and a displaced lamp with textured radiance; a dim sky reduces the noise. */
 static void test_integrators_agree(void **state)
 {
 	(void)state;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Which effects a scene needs (worker/render/world/effects.h), without rendering: what light can reach, what encloses
- * what, colour, depth, media, shadows through glass. Each case expects the decision and the sentence that explains it;
- * then what --effects forces on or off.
+ * Which effects a scene needs (worker/render/world/effects.h), decided without rendering: which surfaces light can
+ * reach, which shapes enclose others, colour, depth, media, and shadows through glass. Each case expects the decision
+ * and the sentence that explains it; the last tests force effects on or off with --effects.
  */
 #include "tests/support/worlds.h"
 
@@ -85,7 +85,7 @@ static void test_dispersion_that_no_path_meets(void **state)
 	expect(VIEW LAMP BALL("1", ""), "dispersion", false, "no material refracts");
 }
 
-/* An enclosure must be closed and opaque with the camera outside, and the things inside must not reach through it. */
+/* Only a closed and opaque shape with the camera outside encloses others, and these must not reach through it. */
 static void test_what_does_not_enclose(void **state)
 {
 	(void)state;
@@ -94,7 +94,7 @@ static void test_what_does_not_enclose(void **state)
 		VIEW LAMP SF11("sf") BALL("1", USES("sf")) BOX("0.9", ""),
 		VIEW LAMP SF11("sf") BALL("1", USES("sf")) BOX("20", ""),
 		VIEW LAMP SF11("sf") BALL("1", USES("sf")) BALL("1", ""),
-		/* The near plane lies within. */
+		/* The camera's near plane lies inside the enclosure. */
 		VIEW LAMP SF11("sf") BALL("1", USES("sf")) BALL("8.999", ""),
 		/* clang-format off */
 		VIEW LAMP SF11("sf") BALL("1", USES("sf"))
@@ -121,7 +121,7 @@ static void test_colour(void **state)
 	expect(VIEW LAMP BALL("1",
 			      "<bsdf type='diffuse' id='red'><rgb name='reflectance' value='0.8,0.1,0.1'/></bsdf>"),
 	       "colour", true, "`red` varies with wavelength");
-	/* Within a box, on a lamp of no power. */
+	/* Inside a box, and on a lamp without power. */
 	expect(VIEW LAMP BALL("1", "<bsdf type='diffuse'><rgb name='reflectance' value='0.8,0.1,0.1'/></bsdf>")
 		       BOX("1.5", ""),
 	       "colour", false, "all materials are grey and all emitters have one spectrum");
@@ -206,8 +206,8 @@ static void test_forced(void **state)
 	"<bsdf type='null'/><medium type='homogeneous' name='interior'><float name='sigma_a' value='1'/>" \
 	"<spectrum name='sigma_s' value='" sigma_s "'/></medium>"
 
-/* Media that scatter also let light turn where no surface does. Forced off, what they scatter counts for nothing; it
- * cannot be forced on, as nothing says what would be scattered. */
+/* Scattering media change the direction of light even where there is no surface. Forced off, scattered light is lost;
+ * the effect cannot be forced on, as nothing says how light would scatter. */
 static void test_scattering(void **state)
 {
 	(void)state;
@@ -221,7 +221,7 @@ static void test_scattering(void **state)
 	assert_non_null(strstr(line_of(w, "scattering")->why, "borders on a medium that scatters"));
 	world_free(w);
 	w = world_with_effects("", VIEW LAMP BALL("1", CLOUD("2") "<emitter type='area'/>"));
-	assert_true(w->effects.scattering && !w->has_passable); /* what shines is a vertex */
+	assert_true(w->effects.scattering && !w->has_passable); /* the surface of an emitter is a vertex */
 	world_free(w);
 	w = world_with_effects("-scattering", VIEW LAMP BALL("1", CLOUD("2")));
 	assert_true(!w->effects.scattering && !w->media[0].scatters && w->media[0].absorbs && !w->has_passable);
@@ -239,7 +239,7 @@ static void test_scattering(void **state)
 	assert_non_null(strstr(e.text, "scattering cannot be forced on"));
 }
 
-/* A medium that shines is walked through like one that scatters, and is what lights a scene. */
+/* Paths walk through an emitting medium as through one that scatters, and the medium counts as a light of the scene. */
 static void test_medium_light(void **state)
 {
 	(void)state;
@@ -266,7 +266,7 @@ static void test_medium_light(void **state)
 	world_free(w);
 }
 
-/* Not through hair, and not where media scatter: there edges pass faces of `null` anyway. */
+/* Not through hair, and not in scenes with scattering media, in which edges pass through `null` faces anyway. */
 static void test_transparent_shadows(void **state)
 {
 	(void)state;
@@ -293,8 +293,8 @@ static void test_transparent_shadows(void **state)
 	world_free(w);
 }
 
-/* Refracted shadows: behind surfaces that refract exactly and let nothing straight through, and not where media
- * scatter. */
+/* Refracted shadows apply behind surfaces that refract exactly and transmit nothing straight through, but not in
+ * scenes with scattering media. */
 static void test_refracted_shadows(void **state)
 {
 	(void)state;
@@ -329,7 +329,7 @@ static void test_texts(void **state)
 {
 	(void)state;
 	static const struct {
-		const char *text, *canonical; /* NULL: refused */
+		const char *text, *canonical; /* canonical form; NULL: refused */
 	} texts[] = {
 		{"", ""},
 		{"all", "all"},
@@ -365,7 +365,7 @@ static void test_texts(void **state)
 	char text[PLAN_EFFECTS_MAX];
 	render_effects("+dispersoin", text, &e);
 	assert_non_null(strstr(e.text, "did you mean `dispersion`?"));
-	/* Each alone and the longest of all fit. */
+	/* Each effect alone fits the buffer, and so does the longest combination. */
 	struct effects_choice c = {.any_on = false};
 	for (int i = 0; i < EFFECTS; i++)
 		c.of[i] = (effect_table[i].may & EFFECT_MAY_FORCE_OFF) ? -1 : 0;

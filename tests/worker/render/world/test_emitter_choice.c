@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * How emitters are chosen by place: what each point gets against closed forms, chances against how often emitters are
- * drawn, and images against those of the choice by power. Level of the statistical tests: 1e-6 each; power is said with
- * each.
+ * The choice of emitters by position: the contribution to each point against closed forms, probabilities against the
+ * frequencies of drawn emitters, and images against those with the choice by power. Level of the statistical tests:
+ * 1e-6 each; their power is stated with each.
  */
 #include "tests/support/agree.h"
 #include "tests/support/dice.h"
@@ -58,7 +58,7 @@ static void find(const struct world *w, uint32_t most, struct arena *arena, stru
 	assert_int_equal(emitter_points_find(w, most, arena, out), 0);
 }
 
-/* On a floor, lights of intensities 1 and 3 bring I (0.1 + 0.9 cos) / d^2. */
+/* Lights of intensities I = 1 and 3 contribute I (0.1 + 0.9 cos) / d^2 to a point on the floor. */
 static void test_shares_of_point_lights(void **state)
 {
 	(void)state;
@@ -99,7 +99,8 @@ static double share_of_second(const char *shapes)
 	return sum;
 }
 
-/* Light passes glass, and not a ball that is opaque; what the latter encloses lights nothing. */
+/* Light passes through glass and not through an opaque ball; a light enclosed by the opaque ball contributes nothing.
+ */
 static void test_obstacles(void **state)
 {
 	(void)state;
@@ -108,12 +109,12 @@ static void test_obstacles(void **state)
 	       glass = share_of_second(FLOOR TWO BALL("-2", "2", "1", "0.3", "<bsdf type='dielectric'/>")),
 	       hidden = share_of_second(FLOOR TWO BALL("-2", "2", "1", "0.3", "<bsdf type='diffuse'/>"));
 	assert_true(open > 0.3 && fabs(glass - open) < 0.1);
-	/* Points are inside the ball, too, if walks begin there; none does. */
+	/* Points would lie inside the ball, too, if walks began there; none does. */
 	assert_true(hidden < 1e-9);
 }
 
-/* Two closed rooms with a lamp each, and a camera in one: only the lamp of its room is chosen, however strong the other
- * is. */
+/* Two closed rooms with a lamp each, and a camera in one of them: only the lamp of this room is chosen, however much
+ * stronger the other is. */
 static void test_rooms(void **state)
 {
 	(void)state;
@@ -130,14 +131,15 @@ static void test_rooms(void **state)
 		assert_true(emitter_choice_pick(w, in_world(w, 0.5, -1.9, 0.3), u, &pick));
 		ours += pick.emitter == 0;
 	}
-	/* Power gives it a thousandth. Cells choose so in a tenth of all cases, half of which are again by place. */
+	/* By power this lamp has a probability of 1/1000. A cell uses the global probabilities in one tenth of all
+	 * cases; these are half by power and half by position. */
 	assert_true(ours > 940 && ours < 960);
 	assert_true(w->emitter_pdf[0] > 0.499 && w->emitter_pdf[0] < 0.502);
 	assert_true(w->emitter_cdf[2] == 1 && fabs(w->emitter_cdf[1] - w->emitter_pdf[0]) < 1e-12);
 	world_free(w);
 }
 
-/* One emitter, which is not divided, needs no choice. */
+/* A single emitter that is not divided into parts needs no choice. */
 static void test_without(void **state)
 {
 	(void)state;
@@ -149,7 +151,7 @@ static void test_without(void **state)
 	assert_true(fabs(w->emitter_pdf[0] - w->emitters[0].power / (w->emitters[0].power + w->emitters[1].power)) <
 		    1e-12);
 	world_free(w);
-	/* No light reaches anything by a straight line. */
+	/* No light reaches any surface in a straight line. */
 	w = world_by(NULL, FLOOR POINT_LIGHT("1", "-2", "0", "1") POINT_LIGHT("-2", "-2", "1", "1"));
 	assert_null(w->emitter_choice);
 	world_free(w);
@@ -161,8 +163,8 @@ static int by_value(const void *a, const void *b)
 	return (x > y) - (x < y);
 }
 
-/* Each cell has points: a floor's are not all at one side of a cut through its height. Nothing is in shadow, so no two
- * cells have the same chances. */
+/* Each cell has points: those of a floor do not all lie on one side of a split along its height. Nothing is in
+ * shadow, so the probabilities differ between any two cells. */
 static void test_cells(void **state)
 {
 	(void)state;
@@ -184,7 +186,7 @@ static void test_cells(void **state)
 	world_free(w);
 }
 
-/* Emitters that were switched off are there still, and are never chosen. */
+/* Emitters that are switched off keep their place in the list and are never chosen. */
 static void test_switched_off(void **state)
 {
 	(void)state;
@@ -206,9 +208,9 @@ static void test_switched_off(void **state)
 	}
 }
 
-/* At places within the scene and far from it: emitters are drawn as often as densities say. For an emitter that is not
- * divided `denser` is its chance; for the environment its mean over evenly drawn points is. 100,000 draws find a chance
- * that is off by 2 %. */
+/* At positions within the scene and far from it, emitters are drawn as often as their densities say. For an emitter
+ * that is not divided, emitter_choice_denser() is its probability; for the environment, its mean over uniformly drawn
+ * points is. 100,000 draws find an error of 2 % in a probability. */
 static void test_densities(void **state)
 {
 	(void)state;
@@ -248,7 +250,7 @@ static void test_densities(void **state)
 	world_free(w);
 }
 
-/* Lights of extreme power, size and place: no invalid operation, and all densities are finite. */
+/* Lights of extreme power, size and position: no invalid operation, and all densities are finite. */
 static void test_extremes(void **state)
 {
 	(void)state;
@@ -259,10 +261,10 @@ static void test_extremes(void **state)
 	static const char *const scenes[] = {
 		FLOOR POINT_LIGHT("0", "2", "0", "1e25") POINT_LIGHT("0", "1", "0", "1e-25") SKY,
 		FLOOR LAMP("0", "1", "0", "1e-6", "1e20") LAMP("1", "1", "0", "1e-3", "1") SKY,
-		/* in, on and far from the floor, whose middle is near the world's */
+		/* in, on and far from the floor, whose middle is near the world's origin */
 		FLOOR POINT_LIGHT("0", "0", "0", "1") POINT_LIGHT("0", "1e-18", "0", "1")
 			POINT_LIGHT("0", "1e6", "0", "1"),
-		/* half sunk, around the camera, and around everything */
+		/* half sunk into the floor, around the camera, and around everything */
 		FLOOR LAMP("0", "0", "0", "1", "1") LAMP("0", "5", "6", "0.2", "1") LAMP("0", "0", "0", "99", "1"),
 		FOG FLOOR POINT_LIGHT("0", "0", "0", "1") LAMP("1", "1", "0", "0.1", "1e12") SKY,
 	};
@@ -311,7 +313,7 @@ static void test_the_same_twice(void **state)
 	world_free(b);
 }
 
-/* Light does not depend on how emitters are chosen: agree.h says level and power. */
+/* The image does not depend on the choice of emitters; level and power as in tests/support/agree.h. */
 static void test_the_same_image(void **state)
 {
 	(void)state;

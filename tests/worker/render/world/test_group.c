@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Shapes in merges and instances: the world has the same shapes, materials and emitters as from a scene in which every
- * copy is written out. Also shapes without area, which are left out and noted, materials that come with mesh files, the
- * choice of a sensor, and orthographic cameras.
+ * Shapes in merges and instances: the world has the same shapes, materials and emitters as a scene in which every
+ * copy is written out. Also shapes without area, which are left out and noted; materials that come with mesh files;
+ * the choice of a sensor; and orthographic cameras.
  */
 #include "worker/render/render.h"
 #include "tests/support/memory_assets.h"
@@ -72,7 +72,7 @@ static void test_copies(void **state)
 	assert_int_equal(a->emitter_count, 3);
 	for (uint32_t i = 0; i < 6; i++)
 		assert_same_shape(&a->shapes[i], &b->shapes[i]);
-	/* One material, however many copies. */
+	/* All copies share one material. */
 	assert_int_equal(a->parts[0].bsdf, a->parts[2].bsdf);
 	assert_int_equal(a->parts[0].bsdf, a->parts[5].bsdf);
 	assert_true(a->parts[1].emitter >= 0 && a->parts[3].emitter >= 0 && a->parts[1].emitter != a->parts[3].emitter);
@@ -105,8 +105,8 @@ static void refuses(const char *inside, const char *accuracy, const char *text)
 		fail_msg("%s\n gave: %s\n not: %s", inside, e.text, text);
 }
 
-/* Such a mesh is left out with its material and its light; of another its triangles with an area stay. All is counted.
- */
+/* A mesh without area is left out together with its material and its light; of a partly degenerate mesh, the
+ * triangles with an area remain. Both are counted. */
 static void test_flat(void **state)
 {
 	(void)state;
@@ -126,14 +126,14 @@ static void test_flat(void **state)
 	assert_int_equal(w->shapes[1].triangle_count, 1);
 	assert_true(w->shapes[2].is_sphere && w->parts[2].emitter >= 0 && w->parts[1].emitter < 0);
 	assert_true(w->parts[0].bsdf != w->parts[1].bsdf);
-	assert_int_equal(w->emitter_count, 2); /* the sphere and the sky */
+	assert_int_equal(w->emitter_count, 2); /* those of the sphere and of the sky */
 	assert_non_null(strstr(w->notes.flat,
 			       "3 triangles without area are left out, in 2 shapes (first: the obj in scene.xml:1)"));
 	assert_non_null(strstr(w->notes.flat, "1 of these shapes has no others"));
 	world_free(w);
 }
 
-/* Mitsuba 0.6 reads the materials of a mesh whose shape has no BSDF; whoever has such a file is told. */
+/* Mitsuba 0.6 reads the materials in the file of a mesh whose shape has no BSDF; a note tells users of such files. */
 static void test_materials_of_files(void **state)
 {
 	(void)state;
@@ -175,7 +175,7 @@ static void test_refused(void **state)
 	refuses(VIEW "<shape type='merge'>" GROUP("a", "") "</shape>", "",
 		"a shapegroup may stand directly in <scene>");
 	refuses(VIEW "<shape type='merge' id='m'><ref id='m'/></shape>", "", "refers to itself");
-	/* Sixteen of sixteen of ... are counted before anything is built. */
+	/* The nested instances, sixteen of sixteen and so on, are counted before anything is built. */
 	char deep[8192], *at = deep, *end = deep + sizeof deep;
 	at += snprintf(at, (size_t)(end - at), VIEW "<shape type='merge' id='m0'><shape type='cube'/></shape>");
 	for (int level = 1; level < 7; level++) {
@@ -205,7 +205,7 @@ static void test_sensors(void **state)
 	refuses(ORTHO("<transform name='to_world'><scale x='2' y='3'/></transform>"), "", "only square pixels");
 }
 
-/* Where points of the scene are on the film: x from -s to s over the width, whatever their depth. */
+/* Positions of scene points on the film: over the width of the film x runs from -s to s, whatever the depth. */
 static void test_orthographic(void **state)
 {
 	(void)state;
@@ -221,10 +221,10 @@ static void test_orthographic(void **state)
 		double t_min, t_max;
 		camera_clip(c, d, &t_min, &t_max);
 		for (int deep = 0; deep < 2; deep++) {
-			/* From the near plane, and 15 units behind it, back in the scene's units. */
+			/* Points on the near plane, and 15 units behind it, back in scene units. */
 			double t = t_min + deep * 15 * w->scale;
 			vec3 p = vec3_madd(w->center, 1 / w->scale, vec3_madd(c->position, t, d)), at;
-			/* Looking along +z with y up, x grows to the left. */
+			/* With the view along +z and y up, film x grows to the left. */
 			at = (vec3){3 + 4 * (1 - x / 20), 1 + 4 * (0.5 - y / 20), -10 + 0.01 + 15 * deep};
 			assert_true(vec3_length(vec3_sub(p, at)) < 1e-3);
 			double fx, fy;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Instances that share a mesh against the same meshes written out: the surface at each point, what coincides, what is
- * not shared, and the image.
+ * Instances that share a mesh, against the same meshes written out: the surface at each point, coinciding primitives,
+ * shapes that cannot share, and the image (tests/support/agree.h).
  */
 #include "tests/support/agree.h"
 #include "tests/support/dice.h"
@@ -33,7 +33,7 @@
 	"</shape>"
 /* clang-format on */
 
-/* What instances do: turn; stretch; mirror; and all of it. */
+/* Transforms of instances: a plain one, a stretched and turned one, a mirrored one, and one that combines all. */
 static const char *const places[] = {
 	"<translate x='-1.6' y='0.47'/>",
 	"<scale x='0.7' y='1.5' z='1'/><rotate z='1' angle='20'/><translate y='0.9' z='-0.4'/>",
@@ -42,8 +42,8 @@ static const char *const places[] = {
 };
 enum { PLACES = 4 };
 
-/* A pot with a flat foot at y = -0.47, which is no float in its frame: n around, rows upwards, smooth with texture
- * coordinates. */
+/* Writes a pot with a flat foot at y = -0.47, which is no float in its frame: n vertices around, `rows` rows upwards,
+ * smooth normals and texture coordinates. */
 static size_t print_pot(char *out, size_t size, int n, int rows)
 {
 	size_t at = 0;
@@ -75,8 +75,8 @@ static size_t print_pot(char *out, size_t size, int n, int rows)
 	return at;
 }
 
-/* `common` comes first, `inside` is what stands in each place; shared: by one group, else by one for each, which is
- * used once and built as if it were written out. */
+/* `common` precedes the instances, and `inside` is the content of each. shared: all instances refer to one group;
+ * otherwise each has its own group, which is used once and therefore built as if it were written out. */
 static struct world *world_of_pots(bool shared, const char *common, const char *inside, int n, int rows)
 {
 	static char obj[1 << 19], xml[1 << 14];
@@ -101,13 +101,14 @@ static struct world *world_of_pots(bool shared, const char *common, const char *
 	"<bsdf type='bumpmap'><float name='scale' value='0.02'/><texture type='checkerboard' name='any'/>" \
 	"<bsdf type='diffuse'/></bsdf>"
 
-/* Vertices are rounded in the mesh's frame instead of the world's: by parts in 2^24 of either. */
+/* Positions differ because vertices are rounded in the mesh's frame instead of the world's: by 2^-24 of either size. */
 static double distance(vec3 a, vec3 b)
 {
 	return vec3_length(vec3_sub(a, b));
 }
 
-/* turn: how far frames may be turned. Tangents are weighted by angles, which a stretched instance has in its mesh. */
+/* turn: allowed rotation of the frames. Tangents are weighted by angles, and a stretched instance has the angles of
+ * its mesh. */
 static void compare_surfaces(const char *shape, bool tangents, double turn)
 {
 	struct dice d = dice_of("surfaces of instances");
@@ -124,7 +125,7 @@ static void compare_surfaces(const char *shape, bool tangents, double turn)
 		assert_ptr_equal(s->position, a->shapes[0].position);
 		assert_ptr_equal(s->normal, a->shapes[0].normal);
 		assert_true((s->tangent != NULL) == tangents && (t->tangent != NULL) == tangents);
-		/* Instances that are mirrored alike share them. */
+		/* Instances that are mirrored in the same way share their arrays. */
 		for (uint32_t l = 0; l < k; l++)
 			assert_true((s->tangent == a->shapes[l].tangent) ==
 				    (!tangents || s->place->mirrored == a->shapes[l].place->mirrored));
@@ -136,7 +137,7 @@ static void compare_surfaces(const char *shape, bool tangents, double turn)
 			double root = sqrt(dice_throw(&d)), b1 = 1 - root, b2 = root * dice_throw(&d);
 			surface_on_triangle(s, prim, b1, b2, &x);
 			surface_on_triangle(t, prim, b1, b2, &y);
-			/* The scenes' boxes differ, and with them their centres. */
+			/* The bounding boxes of the two scenes differ, and with them their centres. */
 			vec3 p = vec3_madd(a->center, 1 / a->scale, x.p), q = vec3_madd(b->center, 1 / b->scale, y.p);
 			assert_true(distance(p, q) < 1e-6);
 			assert_true(distance(x.ng, y.ng) < 1e-4 && distance(x.sh.n, y.sh.n) < 1e-5);
@@ -162,7 +163,7 @@ static void test_surfaces(void **state)
 			 true, 0.1);
 }
 
-/* Pots of glass stand on the floor by their feet: what hides what is the same. */
+/* Glass pots stand with their feet on the floor: the same primitives must hide the same others. */
 static void test_coincident(void **state)
 {
 	(void)state;
@@ -176,7 +177,8 @@ static void test_coincident(void **state)
 		assert_int_equal(a->sharing_count, PLACES);
 		assert_true((a->coincidence != NULL) == !lift && (b->coincidence != NULL) == !lift);
 		if (!lift) {
-			/* The plain one and a mirrored one; the others are tilted, or stand elsewhere. */
+			/* The plain instance and a mirrored one coincide with the floor; the others are tilted, or
+			 * stand elsewhere. */
 			assert_int_equal(a->coincidence->pair_count, b->coincidence->pair_count);
 			assert_true(a->coincidence->pair_count >= 48);
 			for (size_t i = 0; i < a->coincidence->pair_count; i++)
@@ -188,7 +190,8 @@ static void test_coincident(void **state)
 	}
 }
 
-/* Displacement is in the scene's units: a stretched instance has a mesh of its own, which is as high as the others. */
+/* Displacement is in scene units: a stretched instance has a mesh of its own, displaced by the same height as the
+ * others. */
 static void test_displaced(void **state)
 {
 	(void)state;
@@ -197,7 +200,7 @@ static void test_displaced(void **state)
 	"<integer name='displacement_level' value='1'/>"
 	struct world *a = world_of_pots(true, VIEW SKY, FILE_OF(DISPLACED), 12, 8),
 		     *b = world_of_pots(false, VIEW SKY, FILE_OF(DISPLACED), 12, 8);
-	assert_int_equal(a->sharing_count, 1); /* of the four one is merely moved */
+	assert_int_equal(a->sharing_count, 1); /* only one of the four is merely moved */
 	for (uint32_t k = 0; k < PLACES; k++) {
 		struct surface_point x, y;
 		surface_on_triangle(&a->shapes[k], (struct prim_ref){k, 77, 0}, 0.3, 0.3, &x);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Which motions are accepted: worlds in which nothing moves while the shutter is open draw no times and are the same as
- * still ones, motions that cannot be followed are refused with a sentence, and thousands of keyframes work. */
+/* Which motions are accepted: worlds in which nothing moves while the shutter is open draw no times and equal static
+ * worlds, motions that cannot be represented are refused with an error message, and thousands of keyframes work. */
 #include "tests/support/memory_assets.h"
 #include "tests/support/worlds.h"
 
@@ -27,7 +27,7 @@ static vec3 in_scene(const struct world *w, vec3 p)
 	return vec3_madd(w->center, 1 / w->scale, p);
 }
 
-/* Vertices are rounded in another frame. */
+/* Tolerance in scene units: vertices are rounded to float in the frame of the world. */
 #define OFF 1e-5
 
 #define SLIDES(type, inside)                                                                          \
@@ -51,7 +51,8 @@ static void check_still(const char *shutter, double x)
 	world_free(w);
 }
 
-/* The shutter's times are 0 where the scene has none, and a shutter that is open for no time sees one place. */
+/* Without shutter times in the scene, the shutter opens and closes at 0; a shutter that opens and closes at the same
+ * time sees a single position. */
 static void test_still(void **state)
 {
 	(void)state;
@@ -79,7 +80,7 @@ static void refused(const char *body, const char *sentence)
 	world_of_files_refused(files, sentence);
 }
 
-/* It would look as if it were not stretched. */
+/* A stretched environment map would look as if it were not stretched, so its transform is refused. */
 static void refused_picture(void)
 {
 	static const char xml[] = "<scene version='3.0.0'>" VIEW(OPEN(
@@ -146,7 +147,7 @@ static void test_refused(void **state)
 	/* clang-format on */
 }
 
-/* As many as a file may have are read in a moment, and only those that matter stay. */
+/* The maximum number of keyframes in a file is read quickly, and only those that matter are kept. */
 static void test_many_keyframes(void **state)
 {
 	(void)state;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Shapes without anything to hit: left out and counted, whatever their format, with what shines on them; the other
- * shapes keep their materials and lights. Files that are no meshes stay errors.
+ * Shapes without any surface are left out and counted, whatever their format, together with their emitters; the other
+ * shapes keep their materials and lights. Files that are not meshes remain errors.
  */
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_parts.h"
@@ -32,12 +32,12 @@ static const char points_obj[] = "v 0 0 0\nv 1 0 0\nv 0 1 0\n",
 		  empty_ply[] =
 			  PLY_HEAD "element vertex 0\nproperty float x\nproperty float y\nproperty float z\n" PLY_FACES(
 				  "0") "end_header\n",
-		  /* each too small for a world that holds the others, too */
+		  /* each is also too small for a world that contains the others */
 	small_obj[3][80] = {"v 1 1 1\nv 1.000000001 1 1\nv 1 1.000000001 1\nf 1 2 3\n",
 			    "v -1 0.7 0.3\nv -1.000000001 0.7 0.3\nv -1 0.700000001 0.3\nf 1 2 3\n",
 			    "v 0.3 -1 0.1\nv 0.300000001 -1 0.1\nv 0.3 -1.000000001 0.1\nf 1 2 3\n"};
 
-/* A mesh of version 4, with that many vertices and no triangles. */
+/* Writes a .serialized file of version 4 with the given number of vertices and no triangles; returns its size. */
 static size_t faceless_serialized(unsigned char *file, size_t room, unsigned vertices)
 {
 	unsigned char raw[64] = {0x00, 0x10, 0, 0, 'm', 0};
@@ -101,7 +101,7 @@ static void test_without_triangles(void **state)
 	world_free(w);
 }
 
-/* glTF has no such mesh by its specification, but exporters write some: here with 0 indices. */
+/* The glTF specification forbids such meshes, but some exporters write them: here with 0 indices. */
 static void test_without_triangles_in_gltf(void **state)
 {
 	(void)state;
@@ -122,7 +122,7 @@ static void test_without_triangles_in_gltf(void **state)
 	world_free(w);
 }
 
-/* Of three shapes and four that are too small for a world with them, these go. */
+/* Three shapes, and four that are too small for a world that contains them: the latter are left out. */
 static void test_too_small(void **state)
 {
 	(void)state;
@@ -152,7 +152,8 @@ static void test_too_small(void **state)
 	world_free(w);
 }
 
-/* Left out with `lenient` only; what it leaves of a group and its instances is what stands. */
+/* Shapes flattened by their transform are left out with `lenient` only; the remaining shapes of a group and its
+ * instances are kept. */
 static void test_flattened(void **state)
 {
 	(void)state;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The setting `media`, and whether a scene's own integrator leaves media out: a sky of radiance 1 behind a ball that
- * absorbs nearly all of it. And the note where a medium around the camera hides a sky.
+ * The setting `media`, and whether a scene's own integrator ignores media: a sky of radiance 1 behind a ball that
+ * absorbs nearly all of its light. And the note for a medium around the camera that hides the sky.
  */
 #include "tests/support/leases.h"
 #include "tests/support/worlds.h"
@@ -22,7 +22,7 @@ enum { SIDE = 4, SPP = 64 };
 #define BALL(inside) "<shape type='sphere'><float name='radius' value='6'/><bsdf type='null'/>" inside "</shape>"
 #define INSIDE(integrator) "<integrator type='" integrator "'/>"
 
-/* The mean luminance. */
+/* Returns the mean luminance of the image. */
 static double brightness(const char *accuracy, const char *integrator)
 {
 	worlds_accuracy = accuracy;
@@ -87,7 +87,7 @@ static void test_what_hides_the_sky(void **state)
 	} cases[] = {
 		{NULL, "", camera, LAMP SKY, true},
 		{NULL, INSIDE("volpath"), camera, LAMP SUN, true},
-		{NULL, INSIDE("path"), camera, LAMP SKY, false}, /* there is no smoke */
+		{NULL, INSIDE("path"), camera, LAMP SKY, false}, /* without smoke */
 		{"media=shown", INSIDE("path"), camera, LAMP SKY, true},
 		{"media=none", INSIDE("volpath"), camera, LAMP SKY, false},
 		{NULL, "", camera, LAMP, false},

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A world that moves, at a time, against one that stands where the first one then is, by transforms that this test
- * writes itself: surfaces, their derivatives, what rays and segments meet, the camera, and lights with their power.
+ * A moving world at time t, against a static world placed where the moving one is at that time, by transforms that
+ * this test computes itself: surfaces, their derivatives, hits of rays and segments, the camera, and lights with
+ * their power.
  */
 #include "tests/support/dice.h"
 #include "tests/support/memory_assets.h"
@@ -32,7 +33,7 @@ static const char ball_obj[] = "v 1 0 0\nv -1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nv
 			       "f 1//1 3//3 5//5\nf 3//3 2//2 5//5\nf 2//2 4//4 5//5\nf 4//4 1//1 5//5\n"
 			       "f 3//3 1//1 6//6\nf 2//2 3//3 6//6\nf 4//4 2//2 6//6\nf 1//1 4//4 6//6\n";
 
-/* Of shape k at time t: scaled, turned and moved at constant rates. */
+/* The motion of a shape: its scale, rotation and position change at constant rates. */
 struct course {
 	const char *axis;
 	double turn[2]; /* degrees */
@@ -61,7 +62,7 @@ static size_t put_steps(char *out, size_t size, const struct course *c, double t
 		at_time(c->scale, t), c->axis, at_time(c->turn, t), at[0], at[1], at[2]);
 }
 
-/* As shape k is at time t; below 0: as it moves. */
+/* Writes the transform of shape k at time t, or its animation if t is negative; returns the length. */
 static size_t put_place(char *out, size_t size, int k, double t)
 {
 	size_t at = (size_t)snprintf(out, size, "%s", t < 0 ? "<animation name='to_world'>" : "");
@@ -74,7 +75,7 @@ static size_t put_place(char *out, size_t size, int k, double t)
 	return at + (size_t)snprintf(out + at, size - at, "%s", t < 0 ? "</animation>" : "");
 }
 
-/* A mesh, a card, a sphere, and a group with both; a floor that stands still. */
+/* A mesh, a card, a sphere, and a group with a mesh and a sphere; a floor that does not move. */
 static struct world *world_at(double t)
 {
 	static char xml[1 << 14];
@@ -122,7 +123,7 @@ static struct surface_point point_on(const struct world *w, uint32_t shape, doub
 		double z = 2 * u[0] - 1, r = sqrt(1 - z * z);
 		const struct geom_shape *still = s;
 		struct placement now;
-		vec3 d = {r * cos(6 * u[1]), r * sin(6 * u[1]), z}; /* of the sphere's own frame */
+		vec3 d = {r * cos(6 * u[1]), r * sin(6 * u[1]), z}; /* in the sphere's own frame */
 		vec3 a = still->sphere_axes.s, b = still->sphere_axes.t, c = still->sphere_axes.n;
 		if (s->place) {
 			placement_move(s->place, t, &now);
@@ -138,7 +139,7 @@ static struct surface_point point_on(const struct world *w, uint32_t shape, doub
 	return x;
 }
 
-/* Vertices are rounded in another frame. */
+/* Tolerance in scene units: vertices are rounded to float in another frame. */
 #define OFF 1e-5
 
 static void check_point(const struct world *moving, const struct world *still, uint32_t shape, double t, struct dice *d)
@@ -185,7 +186,7 @@ static void check_ray(const struct world *moving, const struct world *still, dou
 	surface_from_hit(&still->shapes[hit2.prim.shape], from2.p, w, &hit2, &y);
 	near(in_scene(moving, x.p), in_scene(still, y.p), 100 * OFF);
 	near(x.sh.n, y.sh.n, 100 * OFF);
-	/* From there on: not at once into itself again. */
+	/* The next ray starts at the hit and must not meet the same point again. */
 	from = (struct ray_end){x.p, x.ng, x.prim};
 	vec3 away = vec3_scale(vec3_dot(x.ng, w) < 0 ? 1 : -1, x.ng);
 	if (accel_closest(moving->accel, &from, away, 0, INFINITY, &hit))
@@ -213,7 +214,7 @@ static void test_at_a_time(void **state)
 	world_free(moving);
 }
 
-/* It turns and moves, and mirrors what it sees. */
+/* The camera turns, moves, and mirrors the image. */
 static struct world *camera_world(double t)
 {
 #define STEPS "<scale x='-2' y='2' z='2'/><rotate y='1' angle='%.17g'/><translate x='%.17g' y='0.5' z='%.17g'/>"
@@ -264,9 +265,9 @@ static void test_camera(void **state)
 	world_free(moving);
 }
 
-/* ---- lights */
+/* ---- lights ---- */
 
-/* The shapes shine, and there are lights without a surface. */
+/* The shapes emit light, and there are lights without a surface. */
 static struct world *lights_at(double t)
 {
 	static char xml[1 << 14];
@@ -301,7 +302,8 @@ static void expect_close(double a, double b, double tolerance)
 		fail_msg("%.17g is not %.17g", a, b);
 }
 
-/* Densities per area of the rescaled world, and intensities, which are per square of its lengths, in scene units. */
+/* Converts to scene units a density per area of the rescaled world, or an intensity, which is per square of the
+ * world's unit of length. */
 static double per_area(const struct world *w, const struct emitter *em, double value)
 {
 	return em->delta || em->infinite ? value : value * w->scale * w->scale;
@@ -330,7 +332,7 @@ static void check_light(const struct world *moving, const struct world *still, u
 	assert_true(moving->emitters[id].moves && !b->moves);
 	assert_true(a->ops->sample_point(a, u, &x, &p));
 	assert_true(b->ops->sample_point(b, u, &y, &q));
-	near_point(moving, still, &x, &y, 100 * OFF); /* of a narrow triangle's cell */
+	near_point(moving, still, &x, &y, 100 * OFF); /* the point lies in the cell of a narrow triangle */
 	expect_close(per_area(moving, a, p), per_area(still, b, q), OFF);
 	expect_close(a->ops->pdf_point(a, &x), p, 1e-9);
 	if (moving->emitter_shape[id] != UINT32_MAX) {
@@ -358,7 +360,7 @@ static void check_light(const struct world *moving, const struct world *still, u
 	     met2 = emitter_sample_toward(b, in_world(still, ref), u, &y, &q);
 	if (!met || !met2)
 		return;
-	near_point(moving, still, &x, &y, 100 * OFF); /* at the edge of a cone */
+	near_point(moving, still, &x, &y, 100 * OFF); /* the direction lies at the edge of a cone */
 	expect_close(per_area(moving, a, p), per_area(still, b, q), 1e-3);
 	expect_close(emitter_pdf_toward(a, in_world(moving, ref), &x), p, 1e-6);
 }
@@ -392,8 +394,9 @@ static double area_at(const struct world *w, uint32_t triangle, double t)
 	return 0.5 * vec3_length(vec3_cross(vec3_sub(p[1], p[0]), vec3_sub(p[2], p[0])));
 }
 
-/* A cube of which one side grows and another shrinks: as many points on each triangle as its density says at every
- * time, by Pearson's chi^2 with 11 degrees of freedom (50: level 6e-7), and uniform within. */
+/* A cube of which one dimension grows and another shrinks. The number of points on each triangle must match the
+ * stated density at every time, by Pearson's chi^2 with 11 degrees of freedom (limit 50: level 6e-7), and points must
+ * be uniform within each triangle. */
 static void test_stretched(void **state)
 {
 	(void)state;
@@ -429,14 +432,15 @@ static void test_stretched(void **state)
 		for (uint32_t i = 0; i < TRIANGLES; i++)
 			chi2 += pow((double)found[i] - share[i] * (double)n, 2) / (share[i] * (double)n);
 		assert_true(chi2 < 50);
-		/* A third, within six standard deviations: the variance of a barycentric is 1/18. */
+		/* The mean of a barycentric coordinate is 1/3, within six standard deviations; its variance is 1/18. */
 		for (int i = 0; i < 2; i++)
 			assert_true(fabs(middle[i] - 1.0 / 3) < 6 * sqrt(1.0 / 18 / (double)n));
 	}
 	world_free(w);
 }
 
-/* Emitters are chosen by their mean power: of one that grows from 1 to 2, the area of 1 times (1 + 2 + 4) / 3. */
+/* Emitters are chosen by their mean power: for a light that grows from scale 1 to 2, that of the area at scale 1
+ * times (1 + 2 + 4) / 3. */
 static void check_power(const char *shape, double area)
 {
 	struct world *w = world_of_text(
@@ -449,7 +453,7 @@ static void check_power(const char *shape, double area)
 	bool said = false;
 	for (size_t i = 0; i < w->effects.line_count; i++)
 		said |= strstr(w->effects.lines[i].why, "moves while the shutter is open") != NULL;
-	assert_true(said); /* one thing, not a shape and an emitter */
+	assert_true(said); /* exactly one note, not one for the shape and one for the emitter */
 	expect_close(em->power / (M_PI * em->brightest * w->scale * w->scale), area * 7 / 3, 1e-3);
 	world_free(w);
 }

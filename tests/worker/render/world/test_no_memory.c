@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Whichever allocation fails, building a world ends with -ENOMEM and leaves nothing behind. */
+/* Whichever allocation fails, building a world returns -ENOMEM and leaks no memory. */
 #include "tests/support/failing_memory.h"
 #include "tests/support/memory_assets.h"
 #include "tests/support/worlds.h"

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The table by which shapes find their BSDF: what is in it is found, what is not is not, and the work of a look-up does
- * not grow with the number of BSDFs. Counted, not timed. A scene with one BSDF a shape has as many as shapes.
+ * The table in which shapes look up their BSDF: entries are found, absent keys are not, and the work of a look-up
+ * does not grow with the number of BSDFs. The probes are counted, not timed. In a scene with one BSDF per shape, the
+ * table has as many entries as there are shapes.
  */
 #include "worker/render/world/node_table.h"
 #include "tests/support/worlds.h"
@@ -15,11 +16,11 @@
 
 #include <cmocka.h>
 
-enum { NODES = 20000, STRIDE = 96 }; /* bytes from one node to the next, as an arena hands them out */
+enum { NODES = 20000, STRIDE = 96 }; /* bytes from one node to the next, as in an arena */
 
 static char nodes[NODES * STRIDE], meshes[NODES * STRIDE];
 
-/* Entries looked at to add `count` nodes and to find each once. */
+/* Returns the number of entries probed to add `count` nodes and to find each once. */
 static uint64_t work_of(uint32_t count)
 {
 	struct arena arena = {0};
@@ -39,9 +40,9 @@ static uint64_t work_of(uint32_t count)
 }
 
 /*
- * Three look-ups a node. With addresses hashed well and half of the table free the expected number of entries is 2.5
- * where nothing is found and 1.5 else (Knuth, volume 3, section 6.4), 6.5 in all while the table is fullest; a walk
- * over all is count / 2.
+ * Three look-ups per node. With well-hashed addresses and half of the table free, the expected number of probes is
+ * 2.5 for an unsuccessful search and 1.5 for a successful one (Knuth, volume 3, section 6.4), 6.5 in all when the
+ * table is fullest; a linear search would need count / 2.
  */
 static void test_work(void **state)
 {
@@ -57,7 +58,7 @@ static void test_by_mesh(void **state)
 	struct node_table t;
 	uint32_t k;
 	assert_int_equal(node_table_init(&t, 2 * 1000 + 2, &arena), 0);
-	/* A node of all meshes, one of each mesh, and no node at all. */
+	/* A third of the meshes refers to one shared node, a third has a node each, and a third has none. */
 	for (uint32_t i = 0; i < 1000; i++) {
 		node_table_add(&t, &nodes[0], &meshes[i * STRIDE], i);
 		node_table_add(&t, &nodes[STRIDE], &meshes[i * STRIDE], 1000 + i);
@@ -103,8 +104,8 @@ static void test_one_each(void **state)
 					"<bsdf type='diffuse' id='both'/>", text);
 	free(text);
 	assert_int_equal(w->shape_count, SHAPES);
-	/* A third with one each, one more for those that share and for those that have none, and one that the world has
-	 * for what no path meets. */
+	/* One BSDF for each mesh of one third, one for all that share, one for all that have none, and possibly one
+	 * for surfaces that no path meets. */
 	assert_in_range(w->bsdf_count, SHAPES / 3 + 2, SHAPES / 3 + 3);
 	for (uint32_t i = 3; i < SHAPES; i++)
 		assert_true((w->parts[i].bsdf == w->parts[i - 3].bsdf) == (i % 3 != 0));

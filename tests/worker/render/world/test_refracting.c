@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Points on refracting surfaces: where they lie, and which come first, against lengths of paths computed in another
+ * Points on refracting surfaces: their positions, and their ranking, against optical path lengths computed in another
  * way. Deterministic.
  */
 #include "tests/support/dice.h"
@@ -28,7 +28,7 @@ static struct world *world_with(const char *shapes)
 	return world_of_text(8, 8, "%s%s%s%s", SENSOR("0,1,6", "0,0,0"), FLOOR, LAMP, shapes);
 }
 
-/* In the scene's lengths. */
+/* Returns the position of point i in scene units. */
 static vec3 place_of(const struct world *w, uint32_t i)
 {
 	return vec3_add(vec3_scale(1 / w->scale, w->refracting_points[i].p), w->center);
@@ -39,8 +39,8 @@ static vec3 in_world(const struct world *w, vec3 p)
 	return vec3_scale(w->scale, vec3_sub(p, w->center));
 }
 
-/* The water has an area of 32, the ball one of 4 pi; of 128 points each has its share, and so has each half of the
- * water and of the ball. */
+/* The water has an area of 32 and the ball one of 4 pi: each gets its share of 128 points, and so does each half of
+ * the water and of the ball. */
 static void test_spread(void **state)
 {
 	(void)state;
@@ -67,7 +67,7 @@ static void test_spread(void **state)
 	assert_true(fabs(on_water - share) <= 1);
 	assert_true(fabs(left - share / 2) <= 4 && fabs(behind - share / 2) <= 4);
 	assert_true(fabs(ball_low - (128 - share) / 2) <= 3);
-	/* In front of the ball, although its other side is turned away. */
+	/* A point in front of the ball counts as outside, although the ball's far side faces away from it. */
 	const struct refracting_point *by[REFRACTING_RANKED];
 	const struct refracting_end from = {{0, 1, 0}, true};
 	assert_int_equal(refracting_points_rank(w, in_world(w, (vec3){0, 2.5, 0}), &from, by), 0);
@@ -75,7 +75,7 @@ static void test_spread(void **state)
 	world_free(w);
 }
 
-/* Of two meshes, a fine one with a hundredth of the area has about a hundredth of the points. */
+/* Two meshes: the fine one, with a hundredth of the area, has about a hundredth of the points. */
 static void test_by_area(void **state)
 {
 	(void)state;
@@ -111,7 +111,7 @@ static double path_by(const struct refracting_point *q, vec3 z, vec3 from)
 	       vec3_length(vec3_sub(from, z));
 }
 
-/* An end at infinity is one so far away that the direction is the same from everywhere. */
+/* An end at infinity is represented by a point so far away that its direction is the same from everywhere. */
 static void check_soonest(const struct world *w, vec3 z, const struct refracting_end *from)
 {
 	const struct refracting_point *found[REFRACTING_RANKED];
@@ -131,7 +131,7 @@ static void test_soonest(void **state)
 	(void)state;
 	struct dice dice = dice_of("soonest");
 	const struct refracting_point *by[REFRACTING_RANKED];
-	/* The second has its normal downwards, and the water as its outside. */
+	/* The second surface has its normal downwards, with the water as its exterior. */
 	static const char *const water[] = {
 		SURFACE(WATER("1.33")),
 		"<shape type='rectangle'><transform name='to_world'><scale x='4' y='2'/><rotate x='1' angle='90'/>"

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Bump and normal maps in scenes. A bump map must look like the same height as real geometry, the y axis of a normal
- * map must point as the file's version says, and all integrators must agree on a room in which every surface has bent
- * normals.
+ * Bump and normal maps in scenes. A bump map must look like real geometry of the same height, the y axis of a normal
+ * map must point in the direction that the file's version says, and all integrators must agree on a room in which
+ * every surface has bent normals (tests/support/agree.h).
  */
 #include "worker/render/render.h"
 #include "tests/support/agree.h"
@@ -23,7 +23,7 @@ enum { SIDE = 32 };
 
 #define PICTURE "<string name='filename' value='h.png'/><boolean name='raw' value='true'/>"
 #define SUN "<emitter type='directional'><vector name='direction' x='-1' y='-1' z='-1.5'/></emitter>"
-/* Nothing of the outline is seen: that moves with real geometry. */
+/* The outline, which moves with real geometry, is out of view. */
 #define VIEW SENSOR("0.1,0.1,1.9", "0,0,0")
 
 static struct world *world_with_picture(const char *inside)
@@ -38,7 +38,7 @@ static struct world *world_with_picture(const char *inside)
 	return w;
 }
 
-/* The luminance of each pixel. */
+/* Stores the luminance of each pixel. */
 static void image_of(struct world *w, double mean[SIDE * SIDE])
 {
 	float *xyz = lease_image(w, SIDE, 64, 2);
@@ -47,7 +47,7 @@ static void image_of(struct world *w, double mean[SIDE * SIDE])
 	free(xyz);
 }
 
-/* Root of the mean square of the difference, over the root of the mean square of b. */
+/* Returns the root mean square of the difference, divided by the root mean square of b. */
 static double relative_difference(const double *a, const double *b)
 {
 	double d = 0, m = 0;
@@ -58,7 +58,7 @@ static double relative_difference(const double *a, const double *b)
 	return sqrt(d / m);
 }
 
-/* 256 x 256 cells of height 0.02 at most, under a sun: no shadow is long, and slopes are up to about 0.1. */
+/* 256 x 256 cells of height 0.02 at most, in sunlight: shadows are short, and slopes reach about 0.1. */
 static void test_bump_against_geometry(void **state)
 {
 	(void)state;
@@ -99,9 +99,9 @@ static void test_bump_against_geometry(void **state)
 	assert_true(relative_difference(back, real) > relative_difference(flat, real));
 }
 
-/* A square whose normals lean by 45 degrees along the map's y, in light that falls along that direction or across it:
- * it is as bright as a level one in light from the front, or black. obj: seen from outside, u runs to the right or the
- * left, and v up, or down where the file's is flipped. */
+/* A square whose normals lean by 45 degrees along the map's y, in light that falls along this direction or
+ * perpendicular to it: the square is as bright as a flat one lit from the front, or black. obj: seen from outside, u
+ * runs to the right or to the left, and v up, or down in files with flipped v. */
 static void test_y_of_normal_maps(void **state)
 {
 	(void)state;
@@ -152,7 +152,7 @@ static void test_y_of_normal_maps(void **state)
 		}
 }
 
-/* Glass, metal and a matt ground, all bent, in the light of a lamp and a sky. */
+/* Glass, metal and a matt ground, all with bent normals, in the light of a lamp and a sky. */
 static void test_integrators_agree(void **state)
 {
 	(void)state;

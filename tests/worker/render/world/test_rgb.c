@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The setting `colour=rgb`: the lanes of each kind of colour, against integrals with another quadrature; a closed
- * sphere that shines and reflects, whose light is known for each of R, G and B; nothing disperses; integrators that
- * meet glass, metal and a coat agree.
+ * The setting `colour=rgb`: the R, G and B values of each kind of colour, against integrals with another quadrature;
+ * a closed sphere that emits and reflects, whose radiance is known for each of R, G and B; no dispersion; and
+ * agreement of integrators on a scene with glass, metal and a coating.
  */
 #include "common/base/color.h"
 #include "tests/support/agree.h"
@@ -29,7 +29,7 @@ static void same_lanes(const struct color *c, const double rgb[3], double tolera
 	assert_true(s.v[3] == s.v[1]);
 }
 
-/* By the midpoint rule, and by the wavelengths' densities and weights of the film. */
+/* Integrates by the midpoint rule over the wavelengths, with the film's density and weights. */
 static void integrate(const struct color *c, bool under_d65, double rgb[3])
 {
 	enum { STEPS = 9400 };
@@ -82,7 +82,8 @@ static void test_lanes(void **state)
 	arena_fini(&arena);
 }
 
-/* A reflectance has at most 1, and no colour has less than 0, though red light of one wavelength has negative green. */
+/* A reflectance is at most 1, and no component of a colour is negative, although monochromatic red light has negative
+ * green. */
 static void test_beyond_the_gamut(void **state)
 {
 	(void)state;
@@ -103,7 +104,7 @@ static void test_beyond_the_gamut(void **state)
 	arena_fini(&arena);
 }
 
-/* L = E / (1 - rho) everywhere in a closed diffuse sphere of reflectance rho that emits E. */
+/* In a closed diffuse sphere of reflectance rho that emits E, the radiance is L = E / (1 - rho) everywhere. */
 static void test_closed_sphere(void **state)
 {
 	(void)state;

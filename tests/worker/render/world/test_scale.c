@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The same scene in other units and at other places. Factors of a power of two and moves that double can hold exactly
- * give the same rescaled world, so the same bits; others differ by roundings of the coordinates, 1e-16 of the distance
- * from the origin (1e-11 of the scene's size where it stands 1e5 sizes away), which a path near an edge can make as
- * large as itself: most pixels agree to 1e-5, and the mean to what few paths can change.
+ * The same scene in other units and at other positions. Scalings by a power of two and translations that are exact in
+ * double give the same rescaled world, and so the same bits. Others differ by roundings of the coordinates, 1e-16 of
+ * the distance from the origin (1e-11 of the size of a scene that lies 1e5 sizes away). A path near an edge can turn
+ * such a rounding into a change of its whole value; so most pixels must agree to 1e-5, and the mean to the amount
+ * that a few paths can change.
  */
 #include "worker/render/render.h"
 #include "tests/support/leases.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A sheet of `thindielectric` against a pane of `dielectric` with two real sides, between a bright lamp and a dim one.
- */
+/* A sheet of `thindielectric` against a pane of `dielectric` with two surfaces, between a bright lamp and a dim one.
+ * Statistics as in tests/support/agree.h. */
 #include "tests/support/agree.h"
 #include "tests/support/worlds.h"
 
@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-/* The camera sees the dim lamp through the glass and the bright one in it, at 40 to 80 degrees. */
+/* The camera sees the dim lamp through the glass and the bright one reflected in it, at angles of 40 to 80 degrees. */
 #define LAMP(turn, radiance)                                                                          \
 	"<shape type='rectangle'><transform name='to_world'><scale value='500'/>" turn "</transform>" \
 	"<bsdf type='diffuse'><float name='reflectance' value='0'/></bsdf><emitter type='area'>"      \

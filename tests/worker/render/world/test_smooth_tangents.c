@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Interpolated tangents: on the mesh of a sphere against the sphere's own dp/du, which they approach as the mesh gets
- * finer; how they are weighted; where texture coordinates are mirrored; where triangles have vertices of their own, or
- * no area in the texture; and that only materials which use them have them.
+ * Interpolated tangents: on the mesh of a sphere, against the sphere's own dp/du, which they approach as the mesh is
+ * refined; their weights; mirrored texture coordinates; triangles without shared vertices, or without area in the
+ * texture; and that only materials which use tangents get them.
  */
 #include "tests/support/dice.h"
 #include "tests/support/memory_assets.h"
@@ -31,7 +31,7 @@ static struct world *world_with(const char *obj, const char *bsdf)
 	return world_of_files(8, 8, files);
 }
 
-/* The unit sphere with n meridians and n / 2 circles; each triangle has vertices of its own. */
+/* Returns the unit sphere with n meridians and n / 2 circles; each triangle has its own vertices. */
 static const char *sphere_obj(int n)
 {
 	static char text[1 << 22];
@@ -41,7 +41,7 @@ static const char *sphere_obj(int n)
 		for (int i = 0; i < 6 * n; i++) {
 			static const int corner[6][2] = {{0, 0}, {0, 1}, {1, 0}, {1, 0}, {0, 1}, {1, 1}};
 			int k = i % 6, right = i / 6 + corner[k][0], down = j + corner[k][1];
-			if (j == (k < 3 ? 0 : n / 2 - 1)) /* no area at a pole */
+			if (j == (k < 3 ? 0 : n / 2 - 1)) /* this triangle has no area at the pole */
 				continue;
 			double u = (double)right / n, v = 2.0 * down / n, x = sin(M_PI * v) * cos(2 * M_PI * u),
 			       y = sin(M_PI * v) * sin(2 * M_PI * u), z = cos(M_PI * v);
@@ -58,8 +58,8 @@ static const char *sphere_obj(int n)
 	return text;
 }
 
-/* The largest angle between the frame's first axis and the sphere's dp/du, away from the poles and from the seam of u,
- * at which tangents know one side only. */
+/* Returns the largest angle between the frame's first axis and the sphere's dp/du, away from the poles and from the
+ * seam of u, where tangents average over one side only. */
 static double worst_turn(const struct world *w, bool smooth, int n)
 {
 	struct dice d = dice_of("points of a sphere");
@@ -88,7 +88,8 @@ static void test_sphere(void **state)
 		assert_non_null(w->shapes[0].tangent);
 		double smooth = worst_turn(w, true, n), flat = worst_turn(w, false, n);
 		print_message("%d meridians: frames are off by %.4f, without tangents by %.4f\n", n, smooth, flat);
-		/* One is of second order in the size of triangles, the other of first. */
+		/* The error with tangents is of second order in the size of the triangles, the error without them of
+		 * first order. */
 		assert_true(smooth < 0.2 * flat && flat > 0.4 * M_PI / n);
 		assert_true(n == 16 || smooth < 0.35 * before);
 		before = smooth;
@@ -125,8 +126,9 @@ static void test_only_for_those_that_use_them(void **state)
 	}
 }
 
-/* A strip along x from -1 to 1 with u = |x|, v = y: its halves share the vertices at 0, and run against each other. A
- * triangle further right has no area in the texture, and takes its neighbours'; one beyond has no neighbour. */
+/* A strip along x from -1 to 1 with u = |x|, v = y: its two halves share the vertices at 0 and have opposite dp/du. A
+ * triangle to the right has no area in the texture and takes its neighbours' tangents; another beyond it has no
+ * neighbour. */
 static void test_mirrored(void **state)
 {
 	(void)state;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Curves in scenes: which are traced as round cones and which are tubes of triangles; that both are the same body, in
- * the mean and where rays meet them; furnaces of curves with joints; that the integrators agree on them; and the
- * memory that is stated. Statistics of images as in tests/support/agree.h.
+ * Curves in scenes: which are traced as round cones and which as tubes of triangles; that both represent the same
+ * body, on average and where rays meet them; furnaces of curves with joints; agreement of the integrators; and the
+ * stated memory. Statistics of images as in tests/support/agree.h.
  */
 #include "tests/support/agree.h"
 #include "tests/support/dice.h"
@@ -19,7 +19,7 @@
 
 #include <cmocka.h>
 
-/* A chain that bends at each joint, by up to a right angle, and tapers; another, straight. */
+/* A tapered chain that bends by up to a right angle at each joint, and a straight one. */
 #define POINTS                                                                   \
 	"-1 -0.8 0 0.3\n-0.2 -0.7 0.3 0.25\n0.1 0.1 0.2 0.2\n0.9 0.2 -0.2 0.2\n" \
 	"0.8 0.9 0 0.15\n-0.1 1 -0.3 0.1\n\n-1 0.6 0 0.1\n-0.9 0.9 0 0.1\n-0.8 1.2 0 0.1\n-0.7 1.5 0 0.1\n"
@@ -92,14 +92,14 @@ static void test_kinds(void **state)
 		assert_true(begun == (cases[i].cones ? 2 : 0) && ended == begun);
 		world_free(w);
 	}
-	/* A bent piece of a spline has more than one, and fewer than a hundred. */
+	/* A bent piece of a spline is split into more than one segment, and into fewer than a hundred. */
 	struct world *w = world_of_curves(CURVES("bsplinecurve", "") SKY);
 	const struct curves *c = w->shapes[0].curves;
 	assert_true(c && c->open && c->tangent && c->count > 8 && c->count < 100);
 	world_free(w);
 }
 
-/* Points of a curve's surface, where rays meet it, by texture coordinates: those of the tubes. */
+/* The points of a curve's surface that rays meet, by texture coordinates, must lie on the tube as well. */
 static void test_places(void **state)
 {
 	(void)state;
@@ -135,8 +135,8 @@ static void test_places(void **state)
 		double p = (double)one[1] / (double)n, off = ((double)one[0] - (double)one[1]) / (double)one[1];
 		print_message("%s: %zu rays meet it, %+.4f against tubes; %.4f elsewhere, normals off by %.4f\n",
 			      types[k], one[0], off, (double)far_away / (double)both, turned / (double)both);
-		/* Tubes have the same width in the mean over directions, but for joints and bends: within 1 %, and
-		 * chance, of pairs that mostly agree (a standard error below 0.003; level below 1e-6). */
+		/* Averaged over directions, tubes have the same width, except for joints and bends: within 1 % plus
+		 * the noise of pairs that mostly agree (standard error below 0.003; level below 1e-6). */
 		assert_true(p > 0.05 && fabs(off) < 0.01 + (test_full() ? 0 : 0.005));
 		assert_true((double)far_away < 0.03 * (double)both && turned < 0.1 * (double)both);
 		world_free(w);
@@ -155,14 +155,14 @@ static void furnace(const char *test, const char *xml, uint64_t spp)
 	agree_render(w, test, "path", &side, &image);
 	for (uint32_t g = 0; g < image.groups; g++)
 		for (int c = 0; c <= AGREE_CELLS; c++)
-			if (fabs(image.mean[g][c] / sum - 1) < 1e-5) /* the rounding of tiles to float */
+			if (fabs(image.mean[g][c] / sum - 1) < 1e-5) /* tiles are rounded to float */
 				image.mean[g][c] = sum;
 	agree_expect(test, &image, sum);
 	world_free(w);
 }
 
-/* In constant light lossless curves cannot be seen. Glass that a ray enters and does not leave at a joint, or leaves
- * twice, would show. */
+/* In constant light, curves that absorb nothing are invisible. Glass that a ray enters and does not leave at a joint,
+ * or leaves twice, would become visible. */
 static void test_furnaces(void **state)
 {
 	(void)state;
@@ -180,7 +180,7 @@ static void test_furnaces(void **state)
 	furnace("strands of a null boundary", PATHS("16") CURVES("linearcurve", "<bsdf type='null'/>") SKY, 64);
 }
 
-/* Half vectors through glossy strands, with a lamp. */
+/* Half-vector mutations through glossy strands, with a lamp. */
 static void test_integrators_agree(void **state)
 {
 	(void)state;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Parts of a material with different bump and normal maps: at every point of a surface they scatter the sum of what
- * materials of one part scatter there, each with its own normal, and what is sampled has the density that is stated.
- * And the shadow that bumps cast on each other, against a material without it.
+ * Parts of a material with different bump and normal maps: at every point of a surface their scattering must be the
+ * sum of that of the materials of one part each, with their own normals, and samples must have the stated density.
+ * And the shadows that bumps cast on each other, against a material without them.
  */
 #include "tests/support/memory_assets.h"
 #include "tests/support/pictures.h"
@@ -47,7 +47,7 @@
 
 static const struct wavelengths white = {.nm = {450, 500, 550, 600}};
 
-/* shape: its type. */
+/* Makes a world with one shape of the type `shape`. */
 static struct world *world_of(const char *shape, const char *bsdf)
 {
 	static struct pictures pictures;
@@ -67,7 +67,7 @@ static struct world *world_of(const char *shape, const char *bsdf)
 	return world_of_files(8, 8, files);
 }
 
-/* The i-th point of the world's only shape. */
+/* Finds the i-th point of the world's only shape. */
 static void point_on(const struct world *w, uint64_t i, struct surface_point *x)
 {
 	double u[4];
@@ -78,8 +78,8 @@ static void point_on(const struct world *w, uint64_t i, struct surface_point *x)
 		surface_on_triangle(&w->shapes[0], (struct prim_ref){0, i % 2, 0}, u[0] * (1 - u[1]), u[1] * u[0], x);
 }
 
-/* f |cos| of light from wi that goes to wo, both in the world; *side: whether the shading normal sees both as the
- * geometric one does. */
+/* Returns f |cos| for light from wi scattered to wo, both in world space; *side: whether both directions lie on the
+ * same side of the shading normal as of the geometric one. */
 static spectrum scattered_at(const struct world *w, uint64_t i, vec3 wo, vec3 wi, enum transport t, bool *side)
 {
 	struct surface_point x;
@@ -91,7 +91,8 @@ static spectrum scattered_at(const struct world *w, uint64_t i, vec3 wo, vec3 wi
 	return spectrum_scale(fabs(t == TRANSPORT_RADIANCE ? in.z : o.z), b->ops->eval(b, &p, o, in));
 }
 
-/* via: a part that must see both directions, too, for any but the first to be lit; 0: none. */
+/* via: index of a part that must also have both directions on matching sides for any part but the first to be lit; 0:
+ * none. */
 static void compare(const char *shape, const char *whole, const char *const *bsdf, const double *share, int parts,
 		    int via)
 {
@@ -107,7 +108,7 @@ static void compare(const char *shape, const char *whole, const char *const *bsd
 		enum transport t = i % 2 ? TRANSPORT_RADIANCE : TRANSPORT_IMPORTANCE;
 		bool side, part_side, via_side = true;
 		spectrum got = scattered_at(all, i, wo, wi, t, &side), expected = spectrum_of(0);
-		if (!side) /* the integrators ask no further */
+		if (!side) /* here the integrators do not evaluate the BSDF */
 			continue;
 		if (via)
 			scattered_at(one[via], i, wo, wi, t, &via_side);
@@ -139,12 +140,12 @@ static void test_two_normals(void **state)
 	(void)state;
 	both_shapes(BLEND("0.3", DENTS(PLASTIC), SLOPE(METAL)), (const char *const[]){DENTS(PLASTIC), SLOPE(METAL)},
 		    (const double[]){0.7, 0.3}, 2, 0);
-	/* One is smooth. */
+	/* One of the parts is smooth. */
 	both_shapes(BLEND("0.3", METAL, DENTS(PAPER)), (const char *const[]){METAL, DENTS(PAPER)},
 		    (const double[]){0.7, 0.3}, 2, 0);
 }
 
-/* A part of a blend is itself a blend whose parts differ; the last gives it its normal. */
+/* One part of a blend is itself a blend with different parts, of which the last determines its normal. */
 static void test_nested(void **state)
 {
 	(void)state;
@@ -153,7 +154,7 @@ static void test_nested(void **state)
 		    2);
 }
 
-/* Its one side, and then its other: what is seen from the wrong side of one alone is black. */
+/* One side and then the other: a side seen from the wrong side of its own normal is black. */
 static void test_two_sides(void **state)
 {
 	(void)state;
@@ -162,9 +163,9 @@ static void test_two_sides(void **state)
 		    (const double[]){1, 1}, 2, 0);
 }
 
-/* Sampled directions against the density, in the moments 1, x, y, z, xy and z^2 over the sphere: 6 per case, two-sided,
- * at 1e-6 each; an error of 2 % of a moment of size 0.3 is found with a power of 99 %. And what comes with a sample is
- * what eval and pdf_solid say of it. */
+/* The distribution of sampled directions against the density, in the moments 1, x, y, z, xy and z^2 over the sphere:
+ * 6 two-sided tests per case, at level 1e-6 each; an error of 2 % in a moment of size 0.3 is found with a power of 99
+ * %. The values returned with a sample must equal those of eval and pdf_solid. */
 static void check_sampling(const char *whole)
 {
 	enum { SAMPLES = 60000, MOMENTS = 6 };
@@ -213,7 +214,7 @@ static void test_sampling(void **state)
 	check_sampling(TWOSIDED(SLOPE(METAL), DENTS(CHALK)));
 }
 
-/* Smith's masking of the light from a direction, by his function Lambda. */
+/* Smith's masking for the direction of the light, from the function Lambda. */
 static double smith(const struct surface_point *x, vec3 light)
 {
 	double bent = acos(fmin(vec3_dot(x->sh.n, x->ng), 1)), angle = acos(fabs(vec3_dot(x->ng, light))),
@@ -228,7 +229,7 @@ static void assert_scaled(const char *what, spectrum got, double k, spectrum pla
 			fail_msg("%s: %.12g is not %.12g of %.12g", what, got.v[l], k, plain.v[l]);
 }
 
-/* Returns the least that is left of the light. */
+/* Returns the smallest remaining share of the light. */
 static double check_shadow(const char *shape, const char *with, const char *without)
 {
 	enum { POINTS = 2000 };

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Cameras that see nothing, against rays: where the note stands, no ray of the camera's meets a shape; and of random
- * cameras that none of 4,096 rays leads from to a shape, it stands for most. Emitters of which none gives light that is
- * rendered.
+ * Notes about cameras that see nothing, against rays: where the note appears, none of the camera's rays meets a
+ * shape; and among random cameras none of whose 4,096 rays meets a shape, most get the note. Also scenes in which no
+ * emitter gives light that is rendered.
  */
 #include "tests/support/dice.h"
 #include "tests/support/worlds.h"
@@ -22,7 +22,7 @@
 	"<sensor type='perspective'><transform name='to_world'><lookat origin='0,0,5' target='" t \
 	"' up='0,1,0'/></transform>" more "</sensor>"
 
-/* What the world says of it; "": nothing. */
+/* Finds the world's note about `subject`; "": none. */
 static void note_of(const struct world *w, const char *subject, char note[1024])
 {
 	struct render_summary s;
@@ -34,7 +34,7 @@ static void note_of(const struct world *w, const char *subject, char note[1024])
 			strcpy(note, sentence);
 }
 
-/* "": there is no note. */
+/* why: the expected note; "": none. */
 static void assert_note(const char *text, const char *why)
 {
 	struct world *w = world_of_text(32, 32, "%s", text);
@@ -55,15 +55,15 @@ static void test_sentences(void **state)
 	assert_note(LOOK("0,0,0", "<float name='near_clip' value='7'/>") BALLS("0"), "nearer than its near plane");
 	assert_note(LOOK("0,0,0", "<float name='far_clip' value='4.5'/>") BALLS("0"), "");
 	assert_note(LOOK("0,0,0", "") "<emitter type='constant'/>", "");
-	/* One that it sees is enough, in any place of the list. */
+	/* One visible shape suffices, wherever it stands in the list. */
 	assert_note(LOOK("0,0,9", "") BALLS("0") "<shape type='sphere'><point name='center' z='9'/></shape>", "");
-	/* The film's edge: a ball that is at the left, seen by the whole film, not by a window at the right. */
+	/* The film's edge: a ball on the left is seen by the whole film, but not by a window on the right. */
 	assert_note(LOOK("0,0,0", "<film type='hdrfilm'/>") BALLS("-2"), "");
 	assert_note(LOOK("0,0,0", "<film type='hdrfilm'/>") BALLS("-9"), "beside");
 	assert_note(LOOK("0,0,0", "<film type='hdrfilm'/>") BALLS("9"), "beside");
 }
 
-/* One of n x n rays, from places all over the aperture, meets something. */
+/* Returns whether one of n x n rays, from points all over the aperture, meets a shape. */
 static bool meets_something(const struct world *w, uint32_t n)
 {
 	const struct camera *c = &w->camera;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What is large in a scene of mixed scales lies where the scene says: a floor that is turned about an axis of its own
- * and whose middle is elsewhere, so that each of its vertices is rounded in another way, under a cube of size 1. Where
- * rays meet it, and where light leaves it, is the plane that the scene describes, to as many digits as doubles have of
- * the floor's size; and a lamp that hangs over it does not coincide with it.
+ * Large shapes in a scene of mixed scales lie where the scene says: a floor that is turned about a skew axis and
+ * centred elsewhere, so that each of its vertices is rounded differently, under a cube of size 1. Hits of rays, and
+ * points at which light starts, must lie on the plane described in the scene, to double precision relative to the
+ * floor's size; and a lamp that hangs over the floor must not coincide with it.
  */
 #include "tests/support/dice.h"
 #include "tests/support/worlds.h"
@@ -26,23 +26,24 @@ static const char text[] =
 
 static const struct form {
 	const char *type;
-	double y; /* of its middle, so that its upper side is at 0 */
+	double y; /* height of its middle that puts the upper side at 0 */
 } forms[] = {{"rectangle", 0}, {"disk", 0}, {"cube", -1}};
 
-/* TURN of (0,1,0), by Rodrigues' formula. */
+/* Returns TURN applied to (0,1,0), by Rodrigues' formula. */
 static vec3 turned_up(void)
 {
 	double l = sqrt(1.09), c = cos(M_PI / 9), s = sin(M_PI / 9);
 	return (vec3){-s * 0.3 / l, c, s / l};
 }
 
-/* Over the plane, in the scene's lengths. */
+/* Returns the height over the plane in scene units. */
 static double height(const struct world *w, vec3 p)
 {
 	return vec3_dot(turned_up(), vec3_add(vec3_scale(1 / w->scale, p), w->center));
 }
 
-/* Largest distance from the plane of what n rays meet; from within a few units above the floor to all sides. */
+/* Returns the largest distance of n hits from the plane; the rays start within a few units above the floor and run in
+ * all directions. */
 static double rays(const struct world *w, struct dice *d, size_t n)
 {
 	double most = 0;
@@ -68,7 +69,7 @@ static double rays(const struct world *w, struct dice *d, size_t n)
 	return most;
 }
 
-/* Of where light begins. */
+/* Returns the largest distance from the plane of n points sampled on the light. */
 static double largest_extent(const struct world *w, struct dice *d, size_t n)
 {
 	const struct emitter *em = &w->emitters[1];

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The texture `wireframe` against distances to the edges as they are in the file, in scene units; the part of a
- * triangle that lines cover against its closed form; widths that the file does not state; shapes that are no meshes;
- * the range that materials see. What cannot be is refused by name.
+ * The texture `wireframe`, against distances to the edges in the file, in scene units; the part of a triangle covered
+ * by lines, against its closed form; default widths; shapes that are not meshes; and the range of values that
+ * materials see. Invalid uses are refused by name.
  */
 #include "tests/support/memory_assets.h"
 #include "tests/support/worlds.h"
@@ -43,7 +43,7 @@ static void write_mesh(char *text, size_t size)
 
 enum { FINE_SIDES = 20 };
 
-/* An uneven fan around a point above its rim. */
+/* Writes an uneven fan of triangles around a point above its rim. */
 static void write_fan(char *text, size_t size)
 {
 	int used = snprintf(
@@ -87,7 +87,7 @@ static double to_segment(vec3 p, vec3 a, vec3 b)
 	return vec3_length(vec3_madd(ap, -t, ab));
 }
 
-/* p: in the units of the file. */
+/* Returns the distance from p to the edges of face f, in units of the file. */
 static double distance_in(int f, vec3 p)
 {
 	double least = INFINITY;
@@ -103,13 +103,13 @@ static double expected(double d, double width, double step, double edge, double 
 	return edge + (interior - edge) * (3 * x * x - 2 * x * x * x);
 }
 
-/* How many of the points have only one of the colours, or a mixture. */
+/* Number of points with one of the two colours only, or with a mixture. */
 struct counted {
 	int edge, mixed, interior;
 };
 
-/* `scale`: scene units per unit of the file. The width is in scene units, and 1e-4 of the file's unit, which double
- * and float hold apart, is the tolerance. */
+/* scale: scene units per unit of the file. The width is in scene units. The tolerance is 1e-4 of the file's unit,
+ * because a point in double and vertices in float differ. */
 static struct counted compare(const struct world *w, uint32_t shape, mat4 from_file, double scale, double width,
 			      double step, double edge, double interior)
 {
@@ -121,7 +121,7 @@ static struct counted compare(const struct world *w, uint32_t shape, mat4 from_f
 			struct surface_point x;
 			surface_on_triangle(&w->shapes[shape], (struct prim_ref){shape, f, 0}, b1, b2, &x);
 			vec3 p = vec3_madd(w->center, 1 / w->scale, x.p), in_file = {0, 0, 0};
-			/* The transforms are orthogonal but for the scale. */
+			/* The transforms are orthogonal up to their scale. */
 			p = vec3_sub(p, (vec3){from_file.m[0][3], from_file.m[1][3], from_file.m[2][3]});
 			double *to[3] = {&in_file.x, &in_file.y, &in_file.z};
 			for (int k = 0; k < 3; k++)
@@ -157,8 +157,8 @@ static void test_distances(void **state)
 	world_free(w);
 }
 
-/* Without a width: a tenth of the mean over all sides of all triangles; and the other defaults. Two meshes with one
- * material have their own. */
+/* Without a width: one tenth of the mean over all edges of all triangles; and the other defaults. Two meshes that
+ * share a material have different widths. */
 static void test_defaults(void **state)
 {
 	(void)state;
@@ -175,7 +175,7 @@ static void test_defaults(void **state)
 	world_free(w);
 }
 
-/* Lines of an instance are those of its mesh, larger with it. */
+/* The lines of an instance are those of its mesh and scale with it. */
 static void test_instances(void **state)
 {
 	(void)state;
@@ -188,7 +188,8 @@ static void test_instances(void **state)
 	world_free(w);
 }
 
-/* What lines leave of a triangle is a similar one, smaller by 1 - width / (radius of the inscribed circle). */
+/* The part of a triangle without lines is similar to it, smaller by the factor 1 - width / (radius of the inscribed
+ * circle). */
 static void test_covered_part(void **state)
 {
 	(void)state;
@@ -198,7 +199,7 @@ static void test_covered_part(void **state)
 	double radius = 2 * 2 / (2 + 2 + sqrt(8)), covered = 0;
 	for (int i = 0; i < SIDE; i++)
 		for (int j = 0; i + j < SIDE; j++) {
-			/* Points are the middles of equal parts; those on the long side are cut in half. */
+			/* The points are centres of equal cells; cells at the long side are cut in half. */
 			struct surface_point x;
 			surface_on_triangle(&w->shapes[0], (struct prim_ref){0, 5, 0}, (i + 0.5) / SIDE,
 					    (j + 0.5) / SIDE, &x);
@@ -210,7 +211,7 @@ static void test_covered_part(void **state)
 	world_free(w);
 }
 
-/* What is no mesh in Mitsuba has no lines, whichever shape refers to the material first. */
+/* Shapes that are not meshes in Mitsuba have no lines, whichever shape refers to the material first. */
 static void test_other_shapes(void **state)
 {
 	(void)state;
@@ -228,7 +229,7 @@ static void test_other_shapes(void **state)
 	world_free(w);
 }
 
-/* Lines meet in the middle of every triangle but the largest, and leave it a little of the interior's colour. */
+/* The lines of every triangle but the largest meet in its middle and leave only a little of the interior's colour. */
 static void test_range(void **state)
 {
 	(void)state;
