@@ -13,13 +13,13 @@ struct dense {
 	unsigned n;
 	long double m[DENSE_MOST][DENSE_MOST], inverse[DENSE_MOST][DENSE_MOST];
 	long double log_det;
-	/* What an entry is measured by, 0 outside the blocks: the product of its row's and its column's scale, so that
-	 * the largest of each row and column is about that. Condition numbers refer to errors of this size: they do not
-	 * depend on units. */
+	/* The scale of an entry, 0 outside the blocks: the product of scales of its row and its column, so that the
+	 * largest entry of each row and column is about as large. Condition numbers refer to errors of this size and
+	 * so do not depend on units. */
 	long double size[DENSE_MOST][DENSE_MOST];
 };
 
-/* Of the vertices c+1..b-1, in that order. */
+/* Fills the dense matrix with the blocks of the vertices c+1..b-1, in this order. */
 static inline void dense_fill(struct dense *d, const struct constraint *k, unsigned b, unsigned c)
 {
 	memset(d, 0, sizeof *d);
@@ -57,7 +57,7 @@ static inline void dense_sizes(struct dense *d)
 			d->size[r][c] = r / 2 <= c / 2 + 1 && c / 2 <= r / 2 + 1 ? row[r] * column[c] : 0;
 }
 
-/* false: a pivot is 0. Gauss-Jordan; rows and columns are exchanged. */
+/* Inverts by Gauss-Jordan elimination, exchanging rows and columns. Returns false if a pivot is 0. */
 static inline bool dense_invert(struct dense *d)
 {
 	static long double a[DENSE_MOST][2 * DENSE_MOST];
@@ -112,7 +112,7 @@ static inline bool dense_invert(struct dense *d)
 	return true;
 }
 
-/* How much a change of all entries, relative to their sizes, can change log |det|. */
+/* Returns the largest change of log |det| for changes of all entries relative to their sizes. */
 static inline double dense_det_condition(const struct dense *d)
 {
 	long double sum = 0;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Whole paths built by hand for tests of their derivatives: every vertex on a shape of its own (one triangle or a
- * sphere), with a made-up material that has an index of refraction and a roughness. One at a time, on the caller's
- * stack or static.
+ * Full paths built by hand for tests of their derivatives: every vertex lies on a shape of its own (one triangle or a
+ * sphere), with an artificial material that has an index of refraction and a roughness. A struct hand holds one path,
+ * on the caller's stack or static.
  */
 #ifndef TESTS_WORKER_HALFVEC_HAND_H
 #define TESTS_WORKER_HALFVEC_HAND_H
@@ -51,15 +51,15 @@ static inline vec3 hand_across(struct dice *d, vec3 n)
 	return vec3_normalize(vec3_madd(r, -vec3_dot(r, n), n));
 }
 
-/* What to make of a triangle. */
+/* How to build a triangle. */
 struct hand_triangle {
-	double size, aspect; /* of its corners around p; aspect 1e-4: a sliver */
-	bool flat;	     /* no normals */
-	double bend;	     /* |d normal| per length, about */
+	double size, aspect; /* distance of the corners from p; aspect 1e-4: a sliver */
+	bool flat;	     /* without vertex normals */
+	double bend;	     /* approximate |d normal| per length */
 	enum hand_uv uv;
 };
 
-/* Around p, facing ng, with shading normal n there (about: floats). */
+/* A triangle around p, facing ng, with a shading normal at p of n up to the rounding to float. */
 static inline void hand_triangle(struct hand *h, unsigned j, vec3 p, vec3 ng, vec3 n, const struct hand_triangle *t,
 				 struct dice *d)
 {
@@ -91,7 +91,7 @@ static inline void hand_triangle(struct hand *h, unsigned j, vec3 p, vec3 ng, ve
 		.vertex_count = 3, .triangle_count = 1, .position = h->position[j], .index = h->index[j]};
 	s->normal = t->flat ? NULL : h->normal[j];
 	s->uv = t->uv == HAND_UV_NONE ? NULL : h->uv[j];
-	if (t->uv == HAND_TANGENTS) { /* that turn by up to a radian between corners */
+	if (t->uv == HAND_TANGENTS) { /* tangents that turn by up to a radian between corners */
 		vec3 along = hand_across(d, n);
 		for (int m = 0; m < 3; m++) {
 			vec3 q = vec3_normalize(vec3_madd(along, 0.5, dice_direction(d)));
@@ -103,7 +103,8 @@ static inline void hand_triangle(struct hand *h, unsigned j, vec3 p, vec3 ng, ve
 	h->x.v[j].kind = VERTEX_SURFACE;
 }
 
-/* A sphere through p where its normal is n; sign -1: the normal points inwards. The pole lies at `polar` from n. */
+/* A sphere through p with the normal n there; sign -1: the normal points inwards. The pole lies at the angle `polar`
+ * from n. */
 static inline void hand_sphere(struct hand *h, unsigned j, vec3 p, vec3 n, double radius, double sign, double polar,
 			       struct dice *d)
 {
@@ -129,7 +130,7 @@ static inline void hand_infinite(struct hand *h, vec3 direction)
 	h->x.v[0].x = (struct surface_point){.p = direction, .prim = PRIM_NONE};
 }
 
-/* ng 0: a point that shines. */
+/* An emitter at p with the normal ng; ng = 0: a point light. */
 static inline void hand_emitter(struct hand *h, vec3 p, vec3 ng)
 {
 	h->x.v[0].kind = VERTEX_EMITTER;
@@ -145,7 +146,7 @@ static inline void hand_join(struct hand *h)
 	}
 }
 
-/* How vertex j scatters: eta = n_o / n_i of what the path does there; 0 for reflection. Needs joined edges. */
+/* Sets how vertex j scatters: eta is n_o / n_i, or 0 for reflection. The edges must be joined already. */
 static inline void hand_scatters(struct hand *h, unsigned j, double eta)
 {
 	bool above = vec3_dot(h->x.v[j].x.sh.n, h->x.edge[j].w) > 0;
@@ -153,8 +154,8 @@ static inline void hand_scatters(struct hand *h, unsigned j, double eta)
 	h->bsdf[j].eta = eta == 0 ? 1.5 : above ? 1 / eta : eta;
 }
 
-/* A random chain of `edges` edges on spheres, or on triangles with n != ng where `bent`. false: it came too close to
- * grazing. */
+/* Makes a random chain of `edges` edges on spheres, or, if `bent`, on triangles with n != ng. Returns false if an
+ * edge came too close to grazing. */
 static inline bool hand_chain(struct hand *h, unsigned edges, double bent, struct dice *d)
 {
 	static const double etas[] = {1.5, 1 / 1.5, 1.33, 1.2};

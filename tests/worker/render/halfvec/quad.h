@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The half vector as a function of where three vertices lie, in 113 bits of mantissa, and its derivatives by
- * differences: an implementation of its own, that shares no formula of a derivative with the program.
+ * The half vector as a function of the positions of three vertices, with 113 bits of mantissa, and its derivatives by
+ * differences: an independent implementation, which shares no formula of a derivative with the program.
  */
 #ifndef TESTS_WORKER_HALFVEC_QUAD_H
 #define TESTS_WORKER_HALFVEC_QUAD_H
@@ -68,7 +68,7 @@ static inline qvec q_unit(qvec a)
 	return q_scale(1 / qroot(q_dot(a, a)), a);
 }
 
-/* The part of a across the unit vector n, made unit. */
+/* Returns the part of a perpendicular to the unit vector n, normalised. */
 static inline qvec q_across(qvec a, qvec n)
 {
 	return q_unit(q_madd(a, -q_dot(a, n), n));
@@ -76,22 +76,22 @@ static inline qvec q_across(qvec a, qvec n)
 
 enum quad_kind { QUAD_TRIANGLE, QUAD_SPHERE, QUAD_POINT, QUAD_DIRECTION };
 
-/* What a vertex is made of. */
+/* The shape on which a vertex lies, and its position. */
 struct quad_vertex {
 	enum quad_kind kind;
 	qvec p;
 	bool smooth;
-	qvec e1, e2, normal[3]; /* triangle */
+	qvec e1, e2, normal[3]; /* of a triangle */
 	quad b1, b2;
-	quad of_e1, of_e2; /* dp/du = of_e1 e1 + of_e2 e2, or carried by the normal, or between the corners' tangents */
+	quad of_e1, of_e2; /* dp/du = of_e1 e1 + of_e2 e2, unless carried by the normal or turning */
 	bool carried, turning;
 	qvec tangent[3];
-	qvec center, axis; /* sphere */
+	qvec center, axis; /* of a sphere */
 	quad radius, sign;
 	qvec du, dv; /* of points and directions */
 };
 
-/* Where it is after moving by (a, b) in its tangent plane, and its frame there. */
+/* Position and frame of a vertex after moving by (a, b) in its tangent plane. */
 struct quad_place {
 	qvec p, s, t, n;
 };
@@ -101,8 +101,8 @@ static inline qvec quad_between(const qvec corner[3], quad b1, quad b2)
 	return q_madd(q_madd(q_scale(1 - b1 - b2, corner[0]), b1, corner[1]), b2, corner[2]);
 }
 
-/* dp/du of a triangle. Without uv: (3, -6, 2) / 7 carried along by the shortest rotation from (2, 3, 6) / 7 to the
- * normal. With tangents: the one at the barycentrics (b1, b2). */
+/* Returns dp/du of a triangle. Without uv: (3, -6, 2) / 7, carried along by the shortest rotation from (2, 3, 6) / 7
+ * to the normal. With tangents: interpolated at the barycentric coordinates (b1, b2). */
 static inline qvec quad_along(const struct quad_vertex *v, quad b1, quad b2)
 {
 	if (v->turning)
@@ -166,7 +166,7 @@ static inline struct quad_place quad_at(const struct quad_vertex *v, quad a, qua
 }
 
 struct quad_problem {
-	struct quad_vertex v[3]; /* towards the light, itself, towards the camera */
+	struct quad_vertex v[3]; /* towards the light, the vertex itself, towards the camera */
 	quad eta;
 	bool matched;
 };
@@ -180,7 +180,8 @@ static inline void quad_half(const struct quad_problem *q, const struct quad_pla
 	h[1] = q_dot(sum, p[1].t) / along;
 }
 
-/* m[vertex][2 row + column], by central differences of steps s and s/2, extrapolated. */
+/* Computes the half vector h and m[vertex][2 row + column], by central differences with steps s and s/2,
+ * extrapolated. */
 static inline void quad_derivatives(const struct quad_problem *q, quad step, quad h[2], quad m[3][4])
 {
 	struct quad_place here[3];
@@ -271,7 +272,7 @@ static inline struct quad_problem quad_problem_of(const struct hand *h, unsigned
 	return q;
 }
 
-/* Shakes every number of the problem by a rounding of double, up or down. */
+/* Returns the number shaken by one rounding of double, up or down. */
 static inline quad quad_shaken(quad a, struct dice *d)
 {
 	return a * (1 + (dice_throw(d) < 0.5 ? -1 : 1) * (quad)0x1p-53);

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A, B, C and h against differences of the half vector in 113 bits (quad.h): error at most max(1e-12, 100 eps x
- * condition), the condition found by shaking every number of the problem by a rounding in extended precision; and at
- * most 1e-9 wherever the condition is below 1e4. Relative to the largest entry of each matrix. HSLT_TEST_ROWS=1 prints
- * one row a case.
+ * A, B, C and h against differences of the half vector with 113 bits (quad.h): the error is at most max(1e-12, 100
+ * eps x condition), with the condition found by shaking every number of the problem by a rounding in extended
+ * precision; and at most 1e-9 wherever the condition is below 1e4. Errors are relative to the largest entry of each
+ * matrix. HSLT_TEST_ROWS=1 prints one row per case.
  *
- * The chain identity ties all of them together: prod G / |det dh/dx| = G(x_0, x_1) |det dx_1/dx_k| prod |d omega_j / d
- * h_j|.
+ * The chain identity ties all of these together: prod G / |det dh/dx| = G(x_0, x_1) |det dx_1/dx_k| prod |d omega_j /
+ * d h_j|.
  */
 #include "tests/worker/render/halfvec/quad.h"
 #include "worker/render/halfvec/constraint_system.h"
@@ -20,14 +20,14 @@
 
 enum inner { FLAT, SMOOTH, CURVED, SLIVER, BALL, BALL_INVERTED, POLE };
 enum end { ON_TRIANGLE, ON_BALL, AT_INFINITY, ON_EMITTER, POINT_EMITTER, CAMERA };
-enum { MATCHED = -1 }; /* as eta */
+enum { MATCHED = -1 }; /* value of eta for matched indices */
 
 struct corner {
 	const char *name;
 	enum inner inner;
-	double eta[2];	 /* n_o / n_i, uniform between them; 0: reflection */
-	double slope[2]; /* of h, log-uniform between them */
-	double bent;	 /* shading from geometric normal, about */
+	double eta[2];	 /* n_o / n_i, drawn uniformly from this range; 0: reflection */
+	double slope[2]; /* |h|, drawn log-uniformly from this range */
+	double bent;	 /* approximate distance of the shading normal from the geometric one */
 	double bend;	 /* |dn| per length */
 	enum end light, camera;
 	enum hand_uv uv;
@@ -122,7 +122,8 @@ static double between_logs(struct dice *d, const double range[2])
 	return exp(dice_between(d, log(range[0]), log(range[1])));
 }
 
-/* Directions towards light and camera around the shading normal n with |h| as asked for. false: no such refraction. */
+/* Finds directions towards light and camera around the shading normal n with the requested |h|. Returns false if no
+ * such refraction exists. */
 static bool directions(const struct corner *c, double eta, vec3 n, struct dice *d, vec3 *i, vec3 *o)
 {
 	double slope = between_logs(d, c->slope);
@@ -205,7 +206,7 @@ static bool make_chain(const struct corner *c, struct hand *h, struct dice *d)
 	return true;
 }
 
-/* Relative to the largest of the expected. */
+/* Returns the largest difference, relative to the largest expected entry. */
 static double difference(const quad *expected, const double *actual, unsigned n)
 {
 	quad largest = 0, error = 0;
@@ -227,10 +228,11 @@ static double relative_difference(const quad *a, const quad *b, unsigned n)
 }
 
 struct worst {
-	double ratio, error, bound, condition, plain; /* plain: the worst where the condition is below 1e4 */
+	double ratio, error, bound, condition, plain; /* plain: the largest error where the condition is below 1e4 */
 };
 
-/* A step that is small for everything near: the differences are then exact to far below double. */
+/* Returns a step that is small compared with all distances nearby, so that the differences are exact far beyond
+ * double. */
 static double step_of(const struct hand *h)
 {
 	struct surface_change c;
@@ -305,8 +307,8 @@ static void test_corners(void **state)
 	assert_true(good);
 }
 
-/* |d omega_i / d h_par| |cosine at the shading normal| of the way light comes from (see the design of
- * bsdf_eval_halfvec): the solid angle of i per area of slopes. */
+/* Returns |d omega_i / d h_par| |cosine at the shading normal| for the direction i from which light comes (see the
+ * design of bsdf_eval_halfvec): solid angle of i per area of slopes. */
 static double solid_per_slopes(const struct hand *h, unsigned j)
 {
 	vec3 i = vec3_neg(h->x.edge[j - 1].w), o = h->x.edge[j].w, n = h->x.v[j].x.sh.n;
@@ -323,8 +325,8 @@ static double geometry(const struct hand *h, unsigned e)
 	return fabs(vec3_dot(h->x.v[e].x.ng, w) * vec3_dot(h->x.v[e + 1].x.ng, w)) / h->x.edge[e].distance2;
 }
 
-/* log of both sides; 1e-9 is what remains of double in the worst of some thousand random chains. The chain is followed
- * from the camera's end: x_start = x_k, first inner vertex x_{k-1}, far end x_0. */
+/* Compares the logarithms of both sides; 1e-9 bounds the rounding of double in the worst of some thousand random
+ * chains. The chain is followed from the camera's end: x_start = x_k, first inner vertex x_{k-1}, far end x_0. */
 static void test_identity(void **state)
 {
 	(void)state;
@@ -345,7 +347,7 @@ static void test_identity(void **state)
 			double left = -m.log_det, right = log(geometry(&h, edges - 1)) + m.log_transfer;
 			for (unsigned e = 0; e < edges; e++)
 				left += log(geometry(&h, e));
-			/* Cosines of G and of the projected solid angle are those of the geometric normal. */
+			/* The cosines in G and in the projected solid angle are those of the geometric normal. */
 			for (unsigned j = 1; j < edges; j++)
 				right +=
 					log(fabs(vec3_dot(h.x.v[j].x.ng, h.x.edge[j - 1].w)) * solid_per_slopes(&h, j));
@@ -356,7 +358,8 @@ static void test_identity(void **state)
 	assert_true(worst[0] < 1e-9 && worst[1] < 1e-9);
 }
 
-/* Whatever stands in the way of a derivative: no infinity, no invalid operation, and a system that says so. */
+/* Degenerate derivatives: the constraints contain no infinity besides h, no operation is invalid, and the system
+ * reports that it is singular. */
 static void test_degenerate(void **state)
 {
 	(void)state;
@@ -365,7 +368,7 @@ static void test_degenerate(void **state)
 	static struct constraint k[3];
 	static struct constraint_system m;
 	const struct hand_triangle t = {.size = 0.2, .aspect = 1, .bend = 1, .uv = HAND_UV};
-	/* The half vector lies in the plane: directions opposite to each other, reflected. */
+	/* The directions of a reflection are opposite to each other, so that the half vector lies in the plane. */
 	hand_begin(&h, 2);
 	hand_triangle(&h, 1, (vec3){0, 0, 0}, (vec3){0, 0, 1}, (vec3){0, 0, 1}, &t, &d);
 	hand_triangle(&h, 0, vec3_add(h.x.v[1].x.p, (vec3){0.5, 0, 0.25}), (vec3){0, 0, 1}, (vec3){0, 0, 1}, &t, &d);
@@ -378,7 +381,7 @@ static void test_degenerate(void **state)
 	assert_int_equal(constraint_double.factor(k, 2, 0, &m), CONSTRAINT_SINGULAR);
 	mat2 dj[3];
 	assert_int_equal(constraint_double.differentials(k, 2, 0, dj), CONSTRAINT_SINGULAR);
-	/* At the pole itself everything is finite. */
+	/* At the pole itself every value is finite. */
 	hand_sphere(&h, 1, (vec3){0, 0, 0}, (vec3){0, 0, 1}, 0.5, 1, 0, &d);
 	h.shape[1].sphere_axes = frame_around((vec3){0, 0, 1});
 	surface_on_sphere(&h.shape[1], (struct prim_ref){1, 0, 0}, (vec3){0, 0, 1}, &h.x.v[1].x);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Refracted connections against rays: each path that the walk finds is traced again from z by Snell's law alone, has to
- * arrive at the emitter, and T follows from where rays beside it arrive. Deterministic.
+ * Refracted connections against rays: each path that the walk finds is traced again from z by Snell's law alone and
+ * must arrive at the emitter, and T must follow from the arrival points of neighbouring rays. Deterministic.
  */
 #include "tests/support/dice.h"
 #include "tests/support/worlds.h"
@@ -32,7 +32,8 @@ static vec3 in_world(const struct world *w, vec3 p)
 	return vec3_scale(w->scale, vec3_sub(p, w->center));
 }
 
-/* Snell's law for d, which comes from the side where the index is the larger by `eta`. */
+/* Refracts d by Snell's law; the index on the side of the incident ray is larger by the factor `eta`. Returns false
+ * for total reflection. */
 static bool snell(vec3 d, vec3 n, double eta, vec3 *out)
 {
 	if (vec3_dot(d, n) > 0)
@@ -44,7 +45,7 @@ static bool snell(vec3 d, vec3 n, double eta, vec3 *out)
 	return true;
 }
 
-/* From z along d through `count` surfaces: the ray behind the last. */
+/* Traces a ray from z along d through `count` surfaces: *p and *out are the ray behind the last one. */
 static bool trace_through(const struct path_vertex *z, vec3 d, unsigned count, vec3 *p, vec3 *out)
 {
 	struct path_vertex v[2];
@@ -63,8 +64,8 @@ static bool trace_through(const struct path_vertex *z, vec3 d, unsigned count, v
 	return true;
 }
 
-/* Where the ray meets the plane through y across its own direction `axis`, or, if y is at infinity, where it points:
- * two coordinates. */
+/* Stores two coordinates of the ray's intersection with the plane through y perpendicular to the frame's normal or,
+ * if y is at infinity, of the ray's direction. */
 static bool arrival_of(const struct path_vertex *z, vec3 d, unsigned count, const struct path_vertex *y,
 		       const struct frame *f, double at[2])
 {
@@ -84,7 +85,8 @@ struct tally {
 	double miss, transfer;
 };
 
-/* Solid angle at z over area (or solid angle) at y, by central differences; then T by that of x_m. */
+/* The ratio of solid angle at z to area (or solid angle) at y, by central differences, and from it T relative to the
+ * solid angle of x_m. */
 static void check_one(const struct path_vertex *z, const struct path_vertex *y, const struct path_refraction *r,
 		      struct tally *t)
 {
@@ -112,7 +114,7 @@ static void check_one(const struct path_vertex *z, const struct path_vertex *y, 
 	t->several += r->count > 2;
 }
 
-/* From points of the floor to points of each emitter. */
+/* Checks connections from points of the floor to points of each emitter. */
 static struct tally check(const char *name, struct world *w, unsigned tries)
 {
 	struct tally t = {0};
@@ -194,8 +196,8 @@ static void test_lamps(void **state)
 	assert_true(t.found > 200);
 }
 
-/* Under water beside a wall, straight lines to a low sun meet the wall, and refracted ones to the
- * left of -.5 do not: about a quarter of the points. */
+/* Under water beside a wall, straight lines to a low sun meet the wall, and refracted ones to the left of x = -.5 do
+ * not: about a quarter of the points. */
 static void test_around_a_wall(void **state)
 {
 	(void)state;
@@ -205,15 +207,15 @@ static void test_around_a_wall(void **state)
 			check("a pool under a low sun", world_of_text(8, 8, "%s%s%s", FLOOR, between[i], SUN), 400);
 		assert_true(t.found > 80);
 	}
-	/* A point in the air beside a ball of glass, behind a wall. */
+	/* Points in the air beside a glass ball, in the shadow of a wall, have no refracted connection. */
 	struct tally t =
 		check("a ball in the air",
 		      world_of_text(8, 8, "%s", FLOOR WALL BALL("x='0' y='-1.5' z='0'", ".4", GLASS) SUN), 400);
 	assert_int_equal(t.found, 0);
 }
 
-/* Light through a ball of glass that brings it to a focus above the floor: points there are joined to the lamp by more
- * than one refracted path, of which technique 1 makes that where the walk ends. */
+/* Light through a glass ball with a focus above the floor: several refracted paths connect points beyond the focus
+ * with the lamp, and technique 1 makes the one at which the walk ends. */
 static void test_one_of_several(void **state)
 {
 	(void)state;
@@ -258,7 +260,8 @@ static void test_one_of_several(void **state)
 	world_free(w);
 }
 
-/* Whether the floor's point below the origin is joined to a point light at a height of 3 by way of so many surfaces. */
+/* Returns the number of surfaces through which the floor's point below the origin is connected to a point light at a
+ * height of 3; 0: not connected by refraction. */
 static unsigned joined_by(const char *between)
 {
 	struct world *w = world_of_text(8, 8, "%s%s%s", FLOOR, between,
@@ -290,9 +293,9 @@ static enum sight sight_of(const struct path_vertex *z, const struct path_vertex
 	return bsdf_is_passed(first.bsdf) ? THROUGH_SHEET : BLOCKED;
 }
 
-/* A connection between points that see each other is straight, perhaps through holes of a sheet, and no other is to be
- * made as well. Points of the floor under a bubble in glass, and a point light above it: beside the bubble's shadow,
- * light arrives both straight and bent by its rim. */
+/* A connection between points that see each other is straight, possibly through the holes of a sheet, and must not be
+ * made a second time by refraction. Points of the floor under a bubble in glass, with a point light above: beside the
+ * bubble's shadow, light arrives both straight and refracted by the bubble's rim. */
 static void test_not_where_straight(void **state)
 {
 	(void)state;

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Step sizes: the singular values against one-sided Jacobi rotations in long double, ray differentials against rays
- * through neighbouring film points, the density against samples, and that nothing makes them infinite or 0.
+ * Step sizes: singular values against one-sided Jacobi rotations in long double, ray differentials against rays
+ * through neighbouring film points, the density against samples; and extreme constraints, which never make a step
+ * infinite or 0.
  */
 #include "tests/support/stats.h"
 #include "tests/worker/render/halfvec/dense.h"
@@ -20,7 +21,7 @@ static struct constraint k[FULL_PATH_MAX_VERTICES];
 static struct halfvec_step step[FULL_PATH_MAX_VERTICES];
 static struct hand h;
 
-/* With that many pixels as the film's step. */
+/* Computes the steps with a film step of `pixels` pixels. */
 static void steps(unsigned b, double pixels)
 {
 	const struct path_context c = {.w = &h.w};
@@ -36,7 +37,8 @@ static bool is_good(const struct halfvec_step *s, double limit)
 	       isfinite(halfvec_step_log_pdf(s, (vec2){0.1 * limit, -0.2 * limit}));
 }
 
-/* Singular values and the left vector of the larger one: columns of e^T made orthogonal by one rotation. */
+/* Returns the singular values and the left singular vector of the larger one: one rotation makes the columns of e^T
+ * orthogonal. */
 static void jacobi(mat2 e, long double s[2], long double left[2])
 {
 	long double a[2] = {e.xx, e.xy}, b[2] = {e.yx, e.yy}; /* rows */
@@ -57,7 +59,8 @@ static void jacobi(mat2 e, long double s[2], long double left[2])
 	left[1] = first ? -n : c;
 }
 
-/* Larger: a few roundings. Smaller, and the direction: those times what the ratio of both magnifies. */
+/* The larger singular value errs by a few roundings; the smaller one and the direction by a few roundings times the
+ * factor by which the ratio of the two magnifies them. */
 static void test_singular_values(void **state)
 {
 	(void)state;
@@ -82,14 +85,14 @@ static void test_singular_values(void **state)
 	print_message("larger %.1e, smaller %.1e / (ratio), direction %.1e / (1 - ratio^2)\n", worst[0], worst[1],
 		      worst[2]);
 	assert_true(worst[0] < 1e-15 && worst[1] < 2e-15 && worst[2] < 2e-15);
-	/* Clipped after that, each by itself, at both ends. */
+	/* Afterwards each is clipped separately, at both ends. */
 	struct halfvec_step r = halfvec_step_of((mat2){3, 0, 0, 0.25}, 2, 1);
 	assert_true(r.sigma[0] == 1 && r.sigma[1] == 0.5);
 	r = halfvec_step_of((mat2){1, 1, 1, 1}, 0.1, 1);
 	assert_true(fabs(r.sigma[0] - 0.2) < 1e-15 && r.sigma[1] > 0 && r.sigma[1] < 1e-5);
 }
 
-/* A reflection seen by the camera, from the triangle that the tests below turn and bend. */
+/* A reflection seen by the camera, on a triangle with turned and bent normals. */
 static bool make_seen(struct dice *d)
 {
 	hand_begin(&h, 2);
@@ -106,7 +109,7 @@ static bool make_seen(struct dice *d)
 	       fabs(vec3_dot(h.x.v[1].x.sh.n, h.x.edge[1].w)) > 0.1;
 }
 
-/* The half vector at x_1 when the film point moves by (x, y) pixels and x_1 with it. */
+/* Returns the half vector at x_1 after the film point, and x_1 with it, has moved by (x, y) pixels. */
 static vec2 seen_half(double x, double y)
 {
 	const struct camera *c = &h.w.camera;
@@ -128,8 +131,8 @@ static vec2 seen_half(double x, double y)
 	return halfvec_of(&moved.x, 1);
 }
 
-/* Central differences of a tenth of a pixel, extrapolated once: 1e-6 of the largest entry is far above what they leave.
- */
+/* Central differences of a tenth of a pixel, extrapolated once: their error is far below the tolerance of 1e-6 of the
+ * largest entry. */
 static void test_differentials(void **state)
 {
 	(void)state;
@@ -151,7 +154,7 @@ static void test_differentials(void **state)
 		}
 		mat2 e = mat2_of_columns(column[0], column[1]);
 		constraints_of(&h.w, &h.x, 2, 0, k);
-		/* Pixels for which no limit applies, from above or below: then sigma and U say what e e^T is. */
+		/* a film step for which neither limit applies: then sigma and U describe e e^T */
 		const double pixels = 0.25 / mat2_largest(e);
 		steps(2, pixels);
 		double s0 = step[1].sigma[0] / pixels, s1 = step[1].sigma[1] / pixels;
@@ -164,7 +167,8 @@ static void test_differentials(void **state)
 	assert_true(worst < 1e-6);
 }
 
-/* Several vertices, some specular: shares of the pixels by roughness, E from the inverse of the whole matrix. */
+/* Several vertices, some of them specular: shares of the pixels by roughness, with E from the inverse of the whole
+ * matrix. */
 static void test_shares(void **state)
 {
 	(void)state;
@@ -193,7 +197,7 @@ static void test_shares(void **state)
 		memset(step, 0, sizeof step);
 		const double pixels = 1e-5;
 		steps(edges, pixels);
-		/* |det|: of J by the solid angle of a pixel, of D from the inverse. */
+		/* |det|: of J from the solid angle of a pixel, of D from the inverse. */
 		double j = h.x.edge[edges - 1].distance2 /
 			   fabs(vec3_dot(h.x.v[edges - 1].x.ng, h.x.edge[edges - 1].w)) /
 			   camera_jac_film_from_solid(&h.w.camera, vec3_neg(h.x.edge[edges - 1].w));
@@ -211,7 +215,7 @@ static void test_shares(void **state)
 			if (step[v].sigma[0] < limit && step[v].sigma[1] > 1e-6 * limit)
 				worst = fmax(worst, fabs(step[v].sigma[0] * step[v].sigma[1] / expected - 1));
 		}
-		/* From the middle of the path on: the roughness alone. */
+		/* For a sub-path that begins in the middle of the path, the roughness alone decides. */
 		steps(edges - 1, pixels);
 		for (unsigned v = 1; v + 1 < edges; v++)
 			if (!h.x.v[v].delta)
@@ -223,7 +227,7 @@ static void test_shares(void **state)
 	assert_true(worst < 1e-9);
 }
 
-/* Whatever the constraints are; and no invalid operation on the way. */
+/* Extreme constraints: all steps are valid, and no operation is invalid. */
 static void test_extremes(void **state)
 {
 	(void)state;
@@ -262,8 +266,8 @@ static void test_extremes(void **state)
 	}
 }
 
-/* Pearson's test of where steps fall, 200,000 over 18 x 18 cells and what lies beyond; level 1e-6. A sigma that is off
- * by 2 % is found with a probability above 99.9 % (noncentrality 4 N 0.02^2 = 320 at 324 degrees). */
+/* Pearson's test of the positions of 200,000 steps over 18 x 18 cells and the region beyond; level 1e-6. A sigma that
+ * is off by 2 % is found with a probability above 99.9 % (noncentrality 4 N 0.02^2 = 320 at 324 degrees of freedom). */
 static void test_density(void **state)
 {
 	(void)state;
@@ -278,7 +282,7 @@ static void test_density(void **state)
 		double reach = 3 * s.sigma[0], cell[2];
 		memset(observed, 0, sizeof observed);
 		memset(expected, 0, sizeof expected);
-		/* Cells along U, so that they fit both sigmas: 3 of each to either side. */
+		/* Cells along U, sized by the two sigmas: 3 sigmas to either side. */
 		cell[0] = 2 * reach / SIDE;
 		cell[1] = 6 * s.sigma[1] / SIDE;
 		expected[CELLS - 1] = (double)count;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The block tridiagonal system against dense elimination in long double, and against the paths themselves: ends and
- * half vectors moved by a little, the path solved again in 113 bits. Error at most max(1e-12, 100 eps x condition),
- * each condition in long double; in float 100 times its eps x condition, where that is below 0.1. HSLT_TEST_ROWS=1
- * prints one row a case.
+ * half vectors are moved slightly, and the path is solved again with 113 bits. The error is at most max(1e-12, 100
+ * eps x condition), with each condition in long double; in float, 100 times its eps x condition, where that is below
+ * 0.1. HSLT_TEST_ROWS=1 prints one row per case.
  */
 #include "tests/worker/render/halfvec/dense.h"
 #include "tests/worker/render/halfvec/quad.h"
@@ -20,7 +20,7 @@
 static struct constraint k[FULL_PATH_MAX_VERTICES];
 static struct constraint_system system_;
 static struct dense dense;
-/* Which of the two is looked at, and what it rounds by. */
+/* The solver under test, and the size of its rounding errors. */
 static const struct constraint_solver *solver = &constraint_double;
 static double rounding = 0x1p-53;
 
@@ -56,7 +56,7 @@ static void focus(struct dice *d, unsigned b, unsigned c)
 	k[b - 2].b = mat2_scale(1 / mat2_det(l), mat2_mul(mat2_mul(k[b - 2].c, adjugate), k[b - 1].a));
 }
 
-/* A vector that the matrix sends to 0. */
+/* A singular matrix: some vector is mapped to 0. */
 static void singular(struct dice *d, unsigned b, unsigned c)
 {
 	random_system(d, b, c, 1);
@@ -74,7 +74,8 @@ static void singular(struct dice *d, unsigned b, unsigned c)
 	}
 }
 
-/* Rows in units of their own, columns in theirs, as slopes at different vertices and lengths at different distances. */
+/* Scales rows and columns, as if slopes at different vertices and lengths at different distances had different units.
+ */
 static void rescale(struct dice *d, unsigned b, unsigned c, int most)
 {
 	double row[FULL_PATH_MAX_VERTICES][2], column[FULL_PATH_MAX_VERTICES + 1][2];
@@ -97,7 +98,7 @@ enum make { RANDOM, HEAVY_CENTRE, WEAK_CENTRE, FIRST_SINGULAR, FOCUS, SCALED, SC
 struct kind {
 	const char *name;
 	enum make make;
-	unsigned least, most; /* vertices inside */
+	unsigned least, most; /* range of the number of inner vertices */
 };
 static const struct kind kinds[] = {
 	{"one vertex", RANDOM, 1, 1},
@@ -143,14 +144,14 @@ struct worst {
 static void note(struct worst *w, double error, double condition)
 {
 	double bound = fmax(1e-12, 100 * rounding * condition);
-	/* Errors in float can be too large to add up: then all is lost, and nothing is to be said. */
+	/* In float, the error bound can exceed the first-order analysis; then nothing can be tested. */
 	if (solver == &constraint_single && bound > 0.1)
 		return;
 	if (!(error / bound <= w->ratio))
 		*w = (struct worst){error / bound, error, bound};
 }
 
-/* Unknown by unknown, relative to itself: by what errors of the size of the entries do to it. */
+/* Compares each unknown relative to itself, with the condition for errors of the size of the entries. */
 static void compare_solution(const vec2 *dh, const vec2 *dx, unsigned c, struct worst *w)
 {
 	long double x[DENSE_MOST] = {0};
@@ -167,7 +168,7 @@ static void compare_solution(const vec2 *dh, const vec2 *dx, unsigned c, struct 
 	}
 }
 
-/* D_j is a block of the inverse: entry by entry in the same way. */
+/* D_j is a block of the inverse: compared entry by entry in the same way. */
 static void compare_differentials(const mat2 *dj, unsigned b, unsigned c, struct worst *w)
 {
 	unsigned row = dense.n - 2;
@@ -202,7 +203,7 @@ static double long_log_transfer(unsigned b, unsigned c, double *condition)
 	return (double)sum;
 }
 
-/* refused: counts systems that float takes for singular. */
+/* Returns whether the system was pivoted; counts in *refused the systems that are singular in float. */
 static unsigned compare_system(struct dice *d, unsigned b, unsigned c, struct worst *w, size_t *refused)
 {
 	vec2 dh[FULL_PATH_MAX_VERTICES], dx[FULL_PATH_MAX_VERTICES];
@@ -297,7 +298,7 @@ static void test_singular(void **state)
 			rescale(&d, b, c, 8);
 		assert_int_equal(constraint_double.factor(k, b, c, &system_), CONSTRAINT_SINGULAR);
 		assert_int_equal(constraint_double.differentials(k, b, c, dj), CONSTRAINT_SINGULAR);
-		/* A little off it is not. */
+		/* A slightly perturbed system is not singular. */
 		for (unsigned j = c + 1; j < b; j++)
 			k[j].b =
 				(mat2){k[j].b.xx * (1 + 1e-6 * dice_throw(&d)), k[j].b.xy * (1 - 1e-6 * dice_throw(&d)),
@@ -306,7 +307,7 @@ static void test_singular(void **state)
 	}
 }
 
-/* Entries of any size, some equal: nothing invalid is computed, and what is accepted is finite. */
+/* Entries of any size, some of them equal: no operation is invalid, and accepted results are finite. */
 static void extremes_of(const struct constraint_solver *solver_, const double *values)
 {
 	struct dice d = dice_of("extreme systems");
@@ -352,7 +353,8 @@ static void test_extremes(void **state)
 	extremes_of(&constraint_single, in_float);
 }
 
-/* The decisions and the results do not depend on the units: powers of two change no digit. */
+/* Decisions and results do not depend on the units: scaling by a power of two does not change the choice of pivots or
+ * the transfer. */
 static void test_units(void **state)
 {
 	(void)state;
@@ -376,7 +378,7 @@ static void test_units(void **state)
 	}
 }
 
-/* Half vectors of a chain of triangles whose vertices were moved by `offset`. */
+/* Computes the half vectors of a chain of triangles whose vertices were moved by `offset`. */
 static void chain_halves(const struct quad_vertex *v, const struct quad_problem *q, const quad offset[][2],
 			 unsigned edges, quad h[][2])
 {
@@ -387,7 +389,7 @@ static void chain_halves(const struct quad_vertex *v, const struct quad_problem 
 		quad_half(&q[j], &p[j - 1], h[j]);
 }
 
-/* Newton's iteration with the matrix that stays: so little off it gains ten digits a turn. */
+/* Newton's iteration with a constant matrix: so close to the solution it gains ten digits per iteration. */
 static void solve_chain(const struct quad_vertex *v, const struct quad_problem *q, const quad target[][2],
 			quad offset[][2], unsigned edges)
 {
@@ -412,7 +414,8 @@ static void solve_chain(const struct quad_vertex *v, const struct quad_problem *
 	}
 }
 
-/* Change of x_{b-1} (b the camera's end) as coordinate i of the end x_0 (what 0) or of h_what moves. */
+/* Returns the derivative of x_{b-1} (b: the camera's end) with respect to coordinate i of the end x_0 (what = 0) or
+ * of h_what. */
 static vec2 change_by_quad(const struct hand *h, unsigned what, int i)
 {
 	unsigned edges = h->x.edges;
@@ -442,7 +445,8 @@ static vec2 change_by_quad(const struct hand *h, unsigned what, int i)
 		      (double)((result[0][1] - result[1][1]) / (2 * (quad)step))};
 }
 
-/* The differences are exact to 1e-20 and the paths' condition is below 1e4: 100 eps x that. */
+/* The differences are exact to 1e-20, and the condition of the paths is below 1e4: the tolerance is 100 eps times
+ * this condition. */
 static void test_solved_again(void **state)
 {
 	(void)state;

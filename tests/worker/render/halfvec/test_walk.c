@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Walks to random half vectors in worlds that are hard in different ways. Where a walk says that it arrived, that is
- * checked from the outside: half vectors are worked out here in long double from the shapes' own vertices, positions
- * must lie on the primitives they name, no edge may be occluded, both ends must be as they were bit by bit. From there
- * a second walk to the old half vectors must find the old vertices, a walk to where the path already is must stay
- * there, and half the tolerance must lead to the same place. Deterministic: seeds are the names of the cases.
- * HSLT_TEST_ROWS=1 prints the rates.
+ * Walks to random half vectors in worlds that are hard in different ways. If a walk reports its arrival, independent
+ * checks follow: half vectors are computed here in long double from the shapes' own vertices, positions must lie on
+ * the primitives that they name, no edge may be occluded, and both ends must be unchanged bit by bit. From the new
+ * path, a second walk to the old half vectors must find the old vertices; a walk to the path's own half vectors must
+ * stay; and a walk with half the tolerance must reach the same position. Deterministic: seeds are the names of the
+ * cases. HSLT_TEST_ROWS=1 prints the rates.
  */
 #include "tests/support/dice.h"
 #include "tests/support/memory_assets.h"
@@ -54,14 +54,14 @@ static wide wide_cross(wide a, wide b)
 	return (wide){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-/* Of an instance: in the world. */
+/* Returns a point of the shape in world space; only instances have a transform. */
 static wide placed(const struct geom_shape *g, wide p)
 {
 	const struct placement *m = g->place;
 	return m ? wide_add(wide_add(wide_add(widen(m->at), p.x, widen(m->x)), p.y, widen(m->y)), p.z, widen(m->z)) : p;
 }
 
-/* By cofactors: no inverse is asked. */
+/* Transforms a normal by cofactors, without inverting the matrix. */
 static wide placed_normal(const struct geom_shape *g, wide n)
 {
 	const struct placement *m = g->place;
@@ -72,7 +72,8 @@ static wide placed_normal(const struct geom_shape *g, wide n)
 	return wide_unit(wide_dot(a, x) < 0 ? wide_add(zero, -1, r) : r);
 }
 
-/* Position, shading normal and first tangent of a vertex from its shape; where on the shape is the vertex's word. */
+/* Computes the position, shading normal and first tangent of a vertex from its shape, with the vertex's own
+ * coordinates on the primitive. */
 static void shape_says(const struct world *w, const struct path_vertex *v, wide *p, wide *n, wide *s)
 {
 	const struct geom_shape *g = &w->shapes[v->x.prim.shape];
@@ -113,7 +114,7 @@ static wide direction(const struct path_vertex *a, const struct path_vertex *b)
 	return wide_unit(wide_add(widen(b->x.p), -1, widen(a->x.p)));
 }
 
-/* The half vector at vertex j; also whether the vertex lies on its shape and scatters in its mode. */
+/* Computes the half vector at vertex j; fails unless the vertex lies on its shape and scatters in its mode. */
 static void measure(const struct world *w, const struct full_path *y, unsigned j, long double h[2])
 {
 	const struct path_vertex *v = &y->v[j];
@@ -141,13 +142,14 @@ static struct ray_end end_of(const struct path_vertex *v)
 	return (struct ray_end){v->x.p, v->kind == VERTEX_CAMERA ? (vec3){0, 0, 0} : v->x.ng, v->x.prim};
 }
 
-/* What a run over one world found. */
+/* Results of a run over one world. */
 struct tally {
 	size_t walks, arrived, strict, returned, ends[WALK_ITERATIONS + 1], back_ends[WALK_ITERATIONS + 1];
-	size_t stays, left, again, elsewhere; /* walks to where the path is; walks repeated with half the tolerance */
+	size_t stays, left, again,
+		elsewhere; /* walks to the path's own half vectors; walks repeated with half the tolerance */
 	uint64_t iterations, rays, occluded, seams;
-	double worst;	   /* residual over tolerance */
-	double worst_stay; /* how far a walk to where the path is went */
+	double worst;	   /* residual in tolerances */
+	double worst_stay; /* largest move of a walk to the path's own half vectors */
 };
 
 static struct path_context context_of(const struct world *w, uint64_t *counters)
@@ -159,7 +161,7 @@ static struct path_context context_of(const struct world *w, uint64_t *counters)
 				     .counters = counters};
 }
 
-/* The camera's sub-path as a whole path. false: too short to have inner vertices. */
+/* Draws a camera sub-path as a full path. Returns false if it is too short to have inner vertices. */
 static bool draw_path(struct path_context *c, uint64_t seed, uint64_t i, struct full_path *x)
 {
 	struct sampler_random s;
@@ -185,7 +187,7 @@ static double gauss(struct dice *d)
 	return sqrt(-2 * log(1 - dice_throw(d))) * cos(2 * M_PI * dice_throw(d));
 }
 
-/* Moves x_b where the ray from the vertex before it, turned a little, meets the same material. */
+/* Moves x_b to the hit of a slightly turned ray from the vertex before it, if that hit has the same material. */
 static void move_end(struct path_context *c, struct dice *d, struct full_path *y, unsigned b)
 {
 	if (b == y->edges)
@@ -203,7 +205,8 @@ static void move_end(struct path_context *c, struct dice *d, struct full_path *y
 	surface_from_hit(&c->w->shapes[hit.prim.shape], from->x.p, w, &hit, &at->x);
 }
 
-/* Steps as mutations make them: the width of the lobe, or what moves the vertex by some hundredth of its distance. */
+/* Returns a step like those of mutations: the width of the lobe, or the step that moves the vertex by about one
+ * hundredth of its distance. */
 static double step_of(const struct full_path *x, const struct constraint *k, unsigned j)
 {
 	if (x->v[j].delta)
@@ -219,7 +222,8 @@ static void check_residuals(const struct world *w, const struct full_path *y, un
 		long double h[2];
 		measure(w, y, j, h);
 		double off = (double)hypotl(h[0] - (long double)target[j].h.x, h[1] - (long double)target[j].h.y);
-		/* What double loses of directions that nearly cancel, next to an index of 1, no walk can see. */
+		/* Next to an index of 1 the directions nearly cancel; a walk cannot see the digits that double loses.
+		 */
 		vec3 half = vec3_sub(vec3_scale(full_path_eta(y, j), y->edge[j].w), y->edge[j - 1].w);
 		double rounding = 0x1p-52 / fabs(vec3_dot(half, y->v[j].x.sh.n));
 		t->worst = fmax(t->worst, (off - rounding) / (scale * target[j].tolerance));
@@ -248,7 +252,7 @@ static void check_arrival(struct path_context *c, const struct full_path *x, str
 static struct walk_scratch s;
 static struct accuracy_settings accuracy;
 
-/* Back from y to x: x_b and the half vectors of x. */
+/* Walks back from y to x: to x_b and the half vectors of x. */
 static void walk_back(struct path_context *c, const struct full_path *x, struct full_path *y, unsigned b, unsigned end,
 		      struct walk_target *target, const struct constraint *k, struct tally *t)
 {
@@ -275,7 +279,7 @@ static void walk_back(struct path_context *c, const struct full_path *x, struct 
 	t->strict += each;
 }
 
-/* Largest distance between the inner vertices. */
+/* Returns the largest distance between corresponding inner vertices. */
 static double largest_distance(const struct full_path *x, const struct full_path *y, unsigned b, unsigned end)
 {
 	double most = 0;
@@ -284,7 +288,7 @@ static double largest_distance(const struct full_path *x, const struct full_path
 	return most;
 }
 
-/* To where it is: one iteration, which moves it by rounding alone. */
+/* Walks to the path's own half vectors: one iteration, which moves the path by rounding alone. */
 static void walk_nowhere(struct path_context *c, const struct full_path *x, unsigned b, unsigned end,
 			 struct walk_target *target, const struct constraint *k, struct tally *t)
 {
@@ -300,8 +304,8 @@ static void walk_nowhere(struct path_context *c, const struct full_path *x, unsi
 		t->worst_stay = fmax(t->worst_stay, largest_distance(x, &y, b, end));
 }
 
-/* From the same start with half the tolerance: to the same place y, as far as the whole tolerance says where that is.
- */
+/* Walks from the same start with half the tolerance: to the same position y within what the whole tolerance
+ * determines. */
 static void walk_again(struct path_context *c, const struct full_path *start, const struct full_path *y, unsigned b,
 		       unsigned end, const struct walk_target *target, struct tally *t)
 {
@@ -352,7 +356,7 @@ static void walk_once(struct path_context *c, struct dice *d, const struct full_
 	assert_memory_equal(&first, &y.v[b], sizeof first);
 	assert_memory_equal(&last.x, &y.v[end].x, sizeof last.x);
 	check_arrival(c, x, &y, b, end, target, limits.scale, t);
-	for (unsigned j = end + 1; j < b; j++) { /* the caller gets the constraints of where it is now */
+	for (unsigned j = end + 1; j < b; j++) { /* the caller gets the constraints at the new path */
 		vec2 h = halfvec_of(&y, j);
 		assert_memory_equal(&h, &s.k[j].h, sizeof h);
 	}
@@ -361,7 +365,7 @@ static void walk_once(struct path_context *c, struct dice *d, const struct full_
 	walk_nowhere(c, x, b, end, target, k, t);
 }
 
-/* As rows of make test-numerics have it: topic, case, what was measured, what it must be, verdict. */
+/* Prints a row in the format of make test-numerics: topic, case, measured, required, verdict. */
 static void print_row(const char *name, const struct tally *t, double arrive, double come_back)
 {
 	const char *rows = getenv("HSLT_TEST_ROWS");
@@ -380,8 +384,9 @@ static void print_row(const char *name, const struct tally *t, double arrive, do
 	fflush(stdout);
 }
 
-/* Not below what was measured when this was written by more than five standard errors and 0.3 %. A walk that goes on
- * from a refused trial's residual loses 0.4 to 2 % of its arrivals, and up to 3 % of its ways back. */
+/* The rate may fall below the one measured when this test was written by at most five standard errors and 0.3 %. A
+ * walk that continues from the residual of a refused trial loses 0.4 to 2 % of its arrivals, and up to 3 % of its
+ * walks back. */
 static void check_rate(size_t hits, size_t of, double expected)
 {
 	double n = (double)of;
@@ -474,7 +479,8 @@ static void test_sky(void **state)
 		0.909, 0.993);
 }
 
-/* Half vectors of smooth glass of nearly the index around it carry the rounding of directions a million times. */
+/* At smooth glass in a medium of nearly the same index, half vectors magnify the rounding of directions a million
+ * times. */
 static void test_nearly_matched(void **state)
 {
 	(void)state;
@@ -507,7 +513,7 @@ static void test_poles(void **state)
 		0.839, 0.989);
 }
 
-/* Bumps with interpolated normals, n x n squares, over [-2,2]^2. */
+/* Bumps with interpolated normals, n x n squares over [-2,2]^2. */
 static struct world *bumpy_world(int n, const char *bsdf, const char *instances)
 {
 	static char obj[1 << 21], scene[4096];
@@ -544,7 +550,7 @@ static void test_meshes(void **state)
 	struct tally t = walk_in("fine bumps", bumpy_world(60, METAL(".1"), ""), 0.771, 0.952);
 	assert_true(t.seams > t.arrived / 10);
 	walk_in("bumpy water", bumpy_world(40, "<bsdf type='dielectric'/>", ""), 0.975, 0.993);
-	/* Mirrored and squeezed, over the bottom that another is. */
+	/* Two instances: the bottom, and a mirrored and squeezed one over it. */
 	struct world *w =
 		bumpy_world(40, "<bsdf type='dielectric'/>",
 			    "</shape><shape type='instance'><ref id='g'/><transform name='to_world'>"
@@ -554,14 +560,15 @@ static void test_meshes(void **state)
 	walk_in("instances of water", w, 0.99, 0.998);
 }
 
-/* Steps are shortened more often than by default, so that the search has something to do; two points more arrive. */
+/* Steps are shortened more often than by default, so that the search is exercised; the arrival rate is two percentage
+ * points higher. */
 static void as_measured(void)
 {
 	accuracy = accuracy_settings_default;
 	accuracy.least_step = 0.03;
 }
 
-/* The same walks by matrices in float: as many arrive, as near their targets, and come back. */
+/* The same walks with matrices in float: as many arrive, as close to their targets, and as many come back. */
 static void test_in_float(void **state)
 {
 	accuracy.precision = SETTING_SINGLE;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Walks whose end is known beforehand: every failure by its name, an occluder of the same material that a walk which
- * looked only where its last ray ends would mistake for the light, foci where a pivot block or the whole matrix is
- * singular. And limits of iterations that hold for both directions alike. Paths are laid by rays through given points
- * of the scene. Deterministic.
+ * Walks with a known end: every kind of failure by its name; an occluder of the same material, which a walk that only
+ * checks the end of its last ray would mistake for the target; and foci at which a pivot block or the whole matrix is
+ * singular. Also limits of iterations, which apply equally in both directions. Paths are made of rays through given
+ * points of the scene. Deterministic.
  */
 #include "tests/support/dice.h"
 #include "tests/support/worlds.h"
@@ -28,7 +28,8 @@ static vec3 in_world(const struct world *w, vec3 p)
 	return vec3_scale(w->scale, vec3_sub(p, w->center));
 }
 
-/* x: from p[0] (the camera) by rays towards p[1], p[2] .. each reflected; the last is a free point that shines. */
+/* Makes the path x from p[0] (the camera) by rays towards p[1], p[2] .. that are reflected at each hit; the last
+ * point is a free point that emits light. */
 static void lay_path(const struct world *w, const vec3 *p, unsigned n)
 {
 	memset(counters, 0, sizeof counters);
@@ -55,7 +56,7 @@ static void lay_path(const struct world *w, const vec3 *p, unsigned n)
 	memset(counters, 0, sizeof counters);
 }
 
-/* Walks x to half vectors h from its own, to 1e-9. */
+/* Walks from x to half vectors that differ by h from its own, to 1e-9. */
 static enum walk_end walk_by(const vec2 *h, bool visible, struct walk_limits limits)
 {
 	struct walk_target target[FULL_PATH_MAX_VERTICES];
@@ -66,7 +67,7 @@ static enum walk_end walk_by(const vec2 *h, bool visible, struct walk_limits lim
 	return halfvec_walk(&c, &y, y.edges, 0, target, visible, &limits, WALK_STALE, &s);
 }
 
-/* What to ask for so that vertex 1 moves by about d (scene's units) and no other. */
+/* Computes the differences h that move vertex 1 by about d (scene units) and no other vertex. */
 static void ask_move(const struct world *w, vec3 d, vec2 *h)
 {
 	constraints_of(w, &x, x.edges, 0, k);
@@ -92,7 +93,7 @@ static void ask_move(const struct world *w, vec3 d, vec2 *h)
 
 static struct walk_limits normal;
 
-/* From the vertex where the walk ends the light is hidden by a ball: of the floor's own material or not. */
+/* At the end of the walk a ball hides the light; the ball has the floor's own material or another one. */
 static void test_occluder(void **state)
 {
 	(void)state;
@@ -105,7 +106,7 @@ static void test_occluder(void **state)
 							       FLOOR BLOCK("0.1", "0.5", "-0.5", ".1", "other"));
 		lay_path(w, (vec3[]){{0, 1, 1}, {0.5, 0, 0}, {0, 1, -1}}, 3);
 		vec2 h[3];
-		/* To (0.2, 0, 0): the middle of the way to the light lies at the ball's centre. */
+		/* vertex 1 moves to (0.2, 0, 0), where the middle of the edge to the light lies at the ball's centre */
 		ask_move(w, (vec3){-0.3, 0, 0}, h);
 		struct path_vertex light = x.v[0];
 		assert_int_equal(walk_by(h, true, normal), WALK_OK);
@@ -130,17 +131,17 @@ static void test_names(void **state)
 	vec2 h[3];
 	struct walk_limits once = normal;
 	once.iterations = 1;
-	/* Off the floor's border, into the void; and where its own rays cannot get to. */
+	/* Beyond the border of the floor; the walk's own rays cannot reach this position. */
 	ask_move(w, (vec3){40, 0, 0}, h);
 	assert_int_equal(walk_by(h, false, once), WALK_MISSED);
 	assert_int_equal(counters[COUNT_RAYS_CLOSEST], 1);
-	/* Far, but on the floor: one iteration is not enough. */
+	/* Far away, but on the floor: one iteration is not enough. */
 	ask_move(w, (vec3){0.3, 0, 0.4}, h);
 	assert_int_equal(walk_by(h, false, once), WALK_ITERATIONS);
 	assert_int_equal(s.iterations, 1);
 	assert_int_equal(walk_by(h, false, normal), WALK_OK);
 	assert_in_range(s.iterations, 2, 8);
-	/* The camera went below the floor: what was a reflection would be none. */
+	/* The camera moves below the floor, so that the reflection becomes impossible. */
 	struct path_vertex camera = x.v[2];
 	vec3 mirrored = in_world(w, (vec3){0, -1, 1});
 	ask_move(w, (vec3){0, 0, 0}, h);
@@ -151,14 +152,14 @@ static void test_names(void **state)
 	assert_int_equal(halfvec_walk(&c, &y, 2, 0, target, false, &normal, WALK_STALE, &s), WALK_MODE);
 	y.v[2] = camera;
 	assert_int_equal(halfvec_walk(&c, &y, 2, 0, target, false, &normal, WALK_STALE, &s), WALK_OK);
-	/* A vertex at the end that stays. */
+	/* The fixed end coincides with a vertex. */
 	y.v[2].x.p = y.v[1].x.p;
 	assert_int_equal(halfvec_walk(&c, &y, 2, 0, target, false, &normal, WALK_STALE, &s), WALK_SINGULAR);
 	world_free(w);
 }
 
-/* What a forward walk can propose must be found by the reverse walk of the other direction, which starts at the same
- * place, with the same limit of iterations, though its tolerances take more of them; and nothing else. */
+/* The reverse walk, from the same start and with the same limit of iterations, must find every path that a forward
+ * walk can propose, although its tolerances need more iterations; and no other path. */
 static void test_few_iterations(void **state)
 {
 	(void)state;
@@ -185,7 +186,7 @@ static void test_few_iterations(void **state)
 	world_free(w);
 }
 
-/* Beyond the silhouette of a ball there is another material. */
+/* Beyond the silhouette of a ball lies another material. */
 static void test_other_material(void **state)
 {
 	(void)state;
@@ -194,22 +195,22 @@ static void test_other_material(void **state)
 		SENSOR("0,1,3", "0,0,0") MATERIAL("metal") MATERIAL("other") BLOCK(
 			"0", "0", "0", ".5",
 			"metal") "<shape type='rectangle'><transform name='to_world'><scale value='9'/><translate z='-2'/></transform>"
-				 "<ref id='other'/></shape><emitter type='constant'/>"); /* in the dark all are black */
+				 "<ref id='other'/></shape><emitter type='constant'/>"); /* dark materials are black */
 	lay_path(w, (vec3[]){{0.2, 0, 3}, {0.2, 0, 0}, {2, 0, 3}}, 3);
 	vec2 h[3];
 	struct walk_limits once = normal;
 	once.iterations = 1;
 	ask_move(w, (vec3){-2, 0, 0}, h);
 	assert_int_equal(walk_by(h, false, once), WALK_BLOCKED);
-	/* No point of the ball has such a half vector: the residual stops shrinking before the silhouette. */
+	/* No point of the ball has this half vector: the residual stops shrinking before the silhouette. */
 	h[1] = (vec2){50, 30};
 	assert_int_not_equal(walk_by(h, false, normal), WALK_OK);
 	world_free(w);
 }
 
-/* A concave mirror of radius 1 around the origin, met at (0,-1,0) (far from its poles, where frames spin) under angle
- * `a`, from the camera at distance `away`: in the plane of incidence it makes an image at 1 / (2 / cos a - 1 / away).
- * There, a small mirror leads on. */
+/* A concave mirror of radius 1 around the origin, hit at (0,-1,0) (far from its poles, where frames spin) at the
+ * angle `a`, from the camera at distance `away`: in the plane of incidence its image lies at the distance 1 / (2 /
+ * cos a - 1 / away). A small mirror at the image continues the path. */
 static vec3 image_point(double a, double away, double *distance)
 {
 	*distance = 1 / (2 / cos(a) - 1 / away);
@@ -218,8 +219,8 @@ static vec3 image_point(double a, double away, double *distance)
 
 #define BOWL "<shape type='sphere'><float name='radius' value='1'/><ref id='metal'/></shape>"
 
-/* Half vector of the first mirror does not change as the vertex there moves: its block is singular, the matrix is not.
- */
+/* The half vector at the first mirror does not change as the vertex there moves: its block is singular, the matrix is
+ * not. */
 static void test_focus(void **state)
 {
 	(void)state;
@@ -260,7 +261,8 @@ static void test_focus(void **state)
 	world_free(w);
 }
 
-/* The camera's image falls on the light: nothing moves the half vector within the plane, and no step is to be had. */
+/* The camera's image falls on the light: moving the vertex does not change the half vector within the plane, so there
+ * is no step. */
 static void test_singular(void **state)
 {
 	(void)state;
@@ -272,7 +274,7 @@ static void test_singular(void **state)
 	constraints_of(w, &x, 2, 0, k);
 	assert_true(fabs(mat2_det(k[1].b)) < 1e-12 * mat2_norm2(k[1].b));
 	vec2 h[3] = {{0, 0}, {0.01, 0.01}, {0, 0}};
-	/* Rounding may leave a pivot, and then a step beyond all bounds that leads nowhere. */
+	/* Rounding may leave a nonzero pivot, and then a huge step that leads nowhere. */
 	enum walk_end e = walk_by(h, false, normal);
 	assert_true(e == WALK_SINGULAR || e == WALK_DIVERGED);
 	world_free(w);
