@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * log T(x -> y) of breakups, multiplied out per area of every vertex that moves, by section 5 and 4 of the paper and
- * nothing of worker/render/mutation: to hold against the products that leave out what cancels. In the measure of
- * path.h; delta distributions are dropped from both f and T.
+ * log T(x -> y) of breakups, multiplied out per area of every vertex that moves, by sections 4 and 5 of the paper. Of
+ * worker/render/mutation only the weights of the heuristic are used. Tests compare the result with the program's
+ * products, in which common factors cancel. In the measure of path.h; delta distributions are dropped from both f and
+ * T.
  */
 #ifndef TESTS_WORKER_MUTATION_EXPLICIT_H
 #define TESTS_WORKER_MUTATION_EXPLICIT_H
@@ -13,18 +14,19 @@
 
 #include <string.h>
 
-/* As published: sec. 4; deviations of the film step in parts of its smaller side, of half vectors in lobe widths. */
+/* As published in sec. 4: standard deviation of the film step as a share of the film's smaller side, and of half
+ * vectors in lobe widths. */
 #define EXPLICIT_FILM 0.02
 #define EXPLICIT_HALFVEC 0.01
-/* In media: of the logarithm of distances, and of slopes from a direction. */
+/* In media: standard deviations of the logarithm of distances, and of slopes relative to a direction. */
 #define EXPLICIT_DISTANCE 0.02
 #define EXPLICIT_DIRECTION 0.02
 
-/* log |n.i| |d omega_i / d h_par| at vertex j by the cosine `n_i`. */
+/* Returns log |n.i| |d omega_i / d h_par| at vertex j, with the cosine `n_i` for |n.i|. */
 static inline double explicit_log_turn(const struct full_path *x, unsigned j, double n_i)
 {
 	vec2 h = halfvec_of(x, j);
-	if (full_path_eta(x, j) == 1 && (x->v[j].mode & BSDF_TRANSMIT)) /* h is (i + o)_xy: its area is |n.i| d omega */
+	if (full_path_eta(x, j) == 1 && (x->v[j].mode & BSDF_TRANSMIT)) /* h is (i + o)_xy, of area |n.i| d omega */
 		return log(fabs(n_i) / fabs(frame_to_local(&x->v[j].x.sh, x->edge[j - 1].w).z));
 	double length2 = 1 + vec2_dot(h, h), eta = full_path_eta(x, j);
 	vec3 n = vec3_scale(1 / sqrt(length2), (vec3){h.x, h.y, 1});
@@ -39,7 +41,7 @@ static inline double explicit_log_gauss(double dx, double dy, double sigma)
 	return -0.5 * (dx * dx + dy * dy) / (sigma * sigma) - log(2 * M_PI * sigma * sigma);
 }
 
-/* The half vector of x_j as it is in the frame of y_j (sec. 4), by angles. */
+/* Returns the half vector of x_j turned into the frame of y_j (sec. 4), by angles. */
 static inline vec2 explicit_turned(const struct full_path *x, const struct full_path *y, unsigned j)
 {
 	vec2 h = halfvec_of(x, j);
@@ -52,14 +54,14 @@ static inline vec2 explicit_turned(const struct full_path *x, const struct full_
 	return (vec2){cos(turn) * h.x - sin(turn) * h.y, sin(turn) * h.x + cos(turn) * h.y};
 }
 
-/* Arriving at y_j from y_{j+1}: per solid angle to per area. */
+/* Returns the logarithm of the factor from density per solid angle, at y_{j+1}, to density per area at y_j. */
 static inline double explicit_log_arrive(const struct full_path *y, unsigned j)
 {
 	return log(path_cosine(&y->v[j], y->edge[j].w) / y->edge[j].distance2);
 }
 
-/* The further factor of a vertex in a medium: the density of its distance; *choice: the density of the logarithm of the
- * distance. */
+/* Returns the logarithm of the further factor of a vertex in a medium, from the density of the distance; adds to
+ * *choice the logarithm of the density of the distance's logarithm. */
 static inline double explicit_log_event(const struct full_path *x, const struct full_path *y, unsigned j,
 					double *choice)
 {
@@ -71,7 +73,7 @@ static inline double explicit_log_event(const struct full_path *x, const struct 
 	return -to;
 }
 
-/* The density per solid angle of the direction in which y leaves an event. */
+/* Returns the logarithm of the density per solid angle of the direction in which y leaves a scattering event. */
 static inline double explicit_log_leave(const struct full_path *x, const struct full_path *y, unsigned j)
 {
 	struct frame a = frame_around(x->edge[j].w), b = frame_around(y->edge[j].w);
@@ -80,7 +82,8 @@ static inline double explicit_log_leave(const struct full_path *x, const struct 
 	return explicit_log_gauss(slope, 0, EXPLICIT_DIRECTION) - 3 * log(cosine);
 }
 
-/* log_choices: of all symmetric choices, those of the film and the traced half vectors. */
+/* The part of the path traced from the camera. *log_choices: the symmetric choices alone, of the film point and of
+ * the half vectors. */
 static inline double explicit_log_traced(const struct path_context *c, const struct full_path *x,
 					 const struct full_path *y, unsigned b, double *log_choices)
 {
@@ -99,7 +102,7 @@ static inline double explicit_log_traced(const struct path_context *c, const str
 		if (v->kind == VERTEX_MEDIUM) {
 			*log_choices += explicit_log_leave(x, y, j);
 		} else if (v->delta) {
-			/* 1 per solid angle projected on the geometric normal. */
+			/* the density is 1 per solid angle projected on the geometric normal */
 			sum += log(fabs(vec3_dot(v->x.ng, y->edge[j - 1].w)));
 		} else {
 			vec2 h = halfvec_of(y, j), from = explicit_turned(x, y, j);
@@ -113,7 +116,7 @@ static inline double explicit_log_traced(const struct path_context *c, const str
 	return sum + *log_choices;
 }
 
-/* Between the ends, at y; steps drawn at x, dh from x to y, or none. */
+/* The part between the ends b and c, at y, with steps dh drawn at x; dh NULL: no steps. */
 static inline double explicit_log_between(const struct path_context *c, const struct full_path *x,
 					  const struct full_path *y, unsigned b, unsigned c_end, const vec2 *dh,
 					  double sign)
@@ -139,7 +142,7 @@ static inline double explicit_log_between(const struct path_context *c, const st
 	return sum;
 }
 
-/* Choice of b and c, where the strategy draws them by the heuristic. */
+/* Probability of b and c, where the strategy draws them by the heuristic. */
 static inline double explicit_log_choice(const struct path_context *c, const char *strategy,
 					 const struct mutation_setting *how, const struct full_path *x, unsigned b,
 					 unsigned c_end)
@@ -148,22 +151,22 @@ static inline double explicit_log_choice(const struct path_context *c, const cha
 	bool hslt = strcmp(strategy, "hslt") == 0 && how->b < 0, light = strcmp(strategy, "light") == 0;
 	if (hslt || light) {
 		heuristic_roughness.weigh_b(c, x, weight);
-		/* With c = 0 forced b is above it. */
+		/* c = 0 is fixed, so b lies above it. */
 		if (light)
 			weight[0] = 0;
 		p *= heuristic_probability(weight, x->edges + 1, b);
 	}
 	if (hslt && b > 0) {
 		heuristic_roughness.weigh_c(c, x, b, weight);
-		for (unsigned i = b; i-- > 1;) /* no half vectors beyond the first event */
+		for (unsigned i = b; i-- > 1;) /* no half vectors beyond the first scattering event */
 			if (x->v[i].kind == VERTEX_MEDIUM)
 				for (unsigned beyond = 0; beyond < i; beyond++)
 					weight[beyond] = 0;
 		p *= heuristic_probability(weight, b, c_end);
 	}
 	if (strcmp(strategy, "rejoin") == 0) {
-		/* 1 for each inner vertex that can be joined to the one before it, 0.1 for an emitter that can be hit.
-		 */
+		/* 1 for each inner vertex that can be connected to the one before it, 0.1 for an emitter that can be
+		 * hit. */
 		double found = c->w->emitters[x->v[0].emitter].delta ? 0 : 0.1, all = found;
 		for (unsigned i = 1; i < x->edges; i++)
 			all += !x->v[i].delta && (i == 1 || !x->v[i - 1].delta);
@@ -172,7 +175,7 @@ static inline double explicit_log_choice(const struct path_context *c, const cha
 	return log(p);
 }
 
-/* The strategy also moves x_0 by the numbers that make it. */
+/* Returns whether the strategy also moves x_0, in the random numbers that produce it. */
 static inline bool explicit_moves_emitter(const char *strategy, unsigned b, unsigned c_end)
 {
 	return strcmp(strategy, "light") == 0 || (strcmp(strategy, "rejoin") == 0 && b > 0 && c_end == 0);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Small closed scenes for tests of mutations, each with something of its own. The caller frees the world. */
+/* Small closed scenes for tests of mutations, one for each feature. The caller frees the world. */
 #ifndef TESTS_WORKER_MUTATION_SCENES_H
 #define TESTS_WORKER_MUTATION_SCENES_H
 
@@ -46,7 +46,7 @@
 
 struct test_scene {
 	const char *name, *text;
-	bool mesh; /* files in memory hold ball.obj */
+	bool mesh; /* the scene uses ball.obj, a file in memory */
 };
 
 static const struct test_scene test_scenes[] = {
@@ -102,7 +102,7 @@ static const struct test_scene test_scenes[] = {
 };
 enum { TEST_SCENES = sizeof test_scenes / sizeof *test_scenes };
 
-/* A ball of 8 by 4 faces with the normals of the sphere. */
+/* Writes a ball of 8 by 4 faces with the normals of a sphere; returns the size. */
 static inline size_t ball_obj(char *text, size_t size)
 {
 	enum { AROUND = 8, UP = 4 };

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Detailed balance of every strategy of the registry, and of the breakup with each b and c forced, in worlds that
- * between them have what paths can meet. How it is tested, level and power: tests/support/balance.h. A fault of 2 % in
- * the ratio of a strategy that is used by default is found by all rooms together; with FULL=1 by each room.
+ * together contain every kind of vertex. Method, level and power: tests/support/balance.h. A fault of 2 % in the
+ * ratio of a strategy in default use is found by all rooms together; with FULL=1 by each room.
  */
 #include "tests/support/balance.h"
 #include "tests/support/dice.h"
@@ -20,14 +20,14 @@
 
 enum { TRIALS = 64 };
 
-/* Proposals from a start. Strategies that choose for themselves get more than forced ones; those that the room has by
- * default so many that all rooms together find a fault of 2 %. */
+/* Proposals from each start. Strategies that choose b and c for themselves get more than forced ones; strategies that
+ * the room uses by default get so many that all rooms together find a fault of 2 %. */
 enum { REPEAT = 2, REPEAT_DEFAULT = 8, REPEAT_MORE = 14, REPEAT_RARE = 25, MOST_STARTS = 256 };
-/* Paths that proposals start from: in each room, and in the one for what a single room has. */
+/* Starting paths of the proposals: in each room, and for a strategy that only a single room uses. */
 enum { STARTS = 32, STARTS_RARE = 240 };
 #define MUST_FIND 0.02
 
-/* Of the strategies that rooms have by default, over all rooms. */
+/* Results of the strategies in default use, pooled over all rooms. */
 static struct balance_pool pool[BATCH_STRATEGIES * 2];
 
 static bool is_default(const struct world *w, const struct mutation_ops *ops)
@@ -41,12 +41,12 @@ static unsigned repeats_of(const struct world *w, const struct mutation_ops *ops
 {
 	if (!is_default(w, ops))
 		return REPEAT;
-	bool noisy =
-		ops->independent || strcmp(ops->name, "light") == 0; /* fewer rooms have a lamp that can be moved on */
+	bool noisy = ops->independent || strcmp(ops->name, "light") == 0; /* few rooms have a lamp that can be moved */
 	return noisy ? REPEAT_MORE : REPEAT_DEFAULT;
 }
 
-/* So many more starts that the room by itself finds 2 %, by what it finds with few: a minute each. */
+/* Repeats the trial with so many more starts that the room alone finds a fault of 2 %, estimated from the power of a
+ * short trial; takes a minute per room. */
 static void check_alone(const struct world *w, const struct room *room, const struct balance_trial *few)
 {
 	static struct balance_trial t;
@@ -63,7 +63,7 @@ static void check_alone(const struct world *w, const struct room *room, const st
 	assert_true(v.balanced && (v.power <= MUST_FIND || dice_count(STARTS) < STARTS));
 }
 
-/* One room has an aperture: it must find alone what the others find together. */
+/* Only one room has an aperture: it must find alone what for other strategies all rooms find together. */
 static void pool_rare(const struct world *w, const struct room *room, const struct mutation_ops *ops,
 		      struct balance_pool *p)
 {
@@ -73,7 +73,7 @@ static void pool_rare(const struct world *w, const struct room *room, const stru
 	balance_pool_add(p, &t);
 }
 
-/* Each b and c in three rooms; in all with FULL=1, and where a room is asked for. */
+/* Each b and c is forced in three rooms; with FULL=1 in all, and in a room selected by ROOM. */
 static bool is_forced_here(const char *room)
 {
 	return test_full() || getenv("ROOM") || strcmp(room, "rough glass") == 0 || strcmp(room, "bent normals") == 0 ||
@@ -134,7 +134,7 @@ static void test_room(void **state)
 	check_room(*state);
 }
 
-/* A fault that a strategy has wherever it is used. */
+/* Finds a fault that a strategy has in every room. */
 static void test_all_rooms(void **state)
 {
 	(void)state;

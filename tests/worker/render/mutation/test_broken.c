@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Strategies broken on purpose, made of the real ones: the test of detailed balance must catch each, and must pass the
- * real one from the same starts. Level and power: tests/support/balance.h.
+ * Strategies broken on purpose, built from the real ones: the test of detailed balance must catch each of them, and
+ * must pass the real strategy from the same starts. Level and power: tests/support/balance.h.
  */
 #include "tests/support/balance.h"
 #include "tests/support/dice.h"
@@ -18,7 +18,7 @@
 #include <cmocka.h>
 
 static const struct mutation_ops *real;
-static struct full_path *from; /* x of the proposal at hand */
+static struct full_path *from; /* x of the current proposal */
 
 static enum proposal_end propose(const struct mutation_ops *self, struct mutation_ctx *m,
 				 const struct mutation_setting *how, struct full_path *x, struct full_path *y,
@@ -35,7 +35,7 @@ static double log_weight(struct mutation_ctx *m, struct full_path *into, const s
 	return real->log_weight(m, into, move, direction);
 }
 
-/* log P(b) P(c | b) by the heuristic. */
+/* Returns log P(b) P(c | b) by the heuristic. */
 static double log_selection(struct mutation_ctx *m, const struct full_path *x, unsigned b, unsigned c)
 {
 	double weight[FULL_PATH_MAX_VERTICES], p;
@@ -48,7 +48,8 @@ static double log_selection(struct mutation_ctx *m, const struct full_path *x, u
 	return log(p);
 }
 
-/* The choice of b and c left out: into y it is x's, and the other way round. */
+/* Leaves out the probability of choosing b and c: adds that of x for the direction to y, and that of y for the
+ * direction to x. */
 static double no_selection(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			   enum mutation_direction direction)
 {
@@ -66,7 +67,7 @@ static double denser_upwards(struct mutation_ctx *m, struct full_path *into, con
 	return log_weight(m, into, move, direction) - (up ? log(1.03) : 0);
 }
 
-/* As a function of the state: 10 % where the wavelength lies in the upper half. */
+/* A fault that is a function of the state: 10 % where the wavelength lies in the upper half. */
 static double denser_above(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			   enum mutation_direction direction)
 {
@@ -120,7 +121,7 @@ static double no_transfer(struct mutation_ctx *m, struct full_path *into, const 
 	return log_weight(m, into, move, direction) - move->log_transfer[direction];
 }
 
-/* Steps of x back from y, too. */
+/* Uses the step sizes of x for the reverse direction from y as well. */
 static enum proposal_end one_sigma(const struct mutation_ops *self, struct mutation_ctx *m,
 				   const struct mutation_setting *how, struct full_path *x, struct full_path *y,
 				   struct move *move)
@@ -135,7 +136,7 @@ static enum proposal_end one_sigma(const struct mutation_ops *self, struct mutat
 	return end;
 }
 
-/* What the way back refused is proposed all the same; forced b and c only, whose choice has no density. */
+/* Proposes y even if the walk back was refused; only with forced b and c, whose choice has no density. */
 static enum proposal_end no_way_back(const struct mutation_ops *self, struct mutation_ctx *m,
 				     const struct mutation_setting *how, struct full_path *x, struct full_path *y,
 				     struct move *move)
@@ -155,7 +156,7 @@ static enum proposal_end no_way_back(const struct mutation_ops *self, struct mut
 	return move->b < y->edges || full_path_project(m->path, y) ? PROPOSAL_MADE : PROPOSAL_OUTSIDE;
 }
 
-/* The emitter's point as if all points were as likely. */
+/* Treats the point on the emitter as if all points had the same density. */
 static double flat_emitter(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			   enum mutation_direction direction)
 {

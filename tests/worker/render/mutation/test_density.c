@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The ratio of f and T that mutations say, against both multiplied out per area
- * (tests/worker/render/mutation/explicit.h): to rounding.
+ * The ratio of f and T stated by mutations, against both multiplied out per area
+ * (tests/worker/render/mutation/explicit.h). They agree to rounding.
  */
 #include "tests/support/dice.h"
 #include "tests/support/rooms.h"
@@ -20,9 +20,10 @@
 
 enum { EDGES = 8, TRIALS = 48 };
 
-/* Of logarithms, relative where they are large. Seen: 2e-11. */
+/* Tolerance of logarithms, relative where they are large. Measured: 2e-11. */
 #define TOLERANCE 1e-9
-/* Steps found again from the half vectors of y: worse where those are long. Seen: 7e-7 once, else 3e-10. */
+/* Tolerance of steps recomputed from the half vectors of y; the error grows with their length. Measured: 7e-7 once,
+ * else 3e-10. */
 #define STEP_TOLERANCE 1e-4
 
 struct trial {
@@ -126,7 +127,7 @@ static void test_ratio(void **state)
 	assert_true(bad == 0);
 }
 
-/* Light passes between equal indices, by a narrow lobe and by a wide one. */
+/* Light passes between equal indices, through a narrow lobe and a wide one. */
 static struct world *thin_sheet(void)
 {
 	return world_of_text(

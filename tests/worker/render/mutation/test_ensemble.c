@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What bidirectional proposals are made of, each against what it must be, number by number: a candidate's contribution
- * does not depend on whether its pair was drawn afresh or around the path itself, lengths and the chance of them belong
- * together, the two pairs of a proposal have random numbers of their own, and a point that leaves the aperture is
- * refused.
+ * The parts of bidirectional proposals, each against an independent computation: a candidate's contribution does not
+ * depend on whether its pair of sub-paths was drawn afresh or around the path itself, lengths match their
+ * probabilities, the two pairs of a proposal have random numbers of their own, and a point that leaves the aperture
+ * is refused.
  */
 #include "tests/support/rooms.h"
 #include "tests/support/starts.h"
@@ -36,13 +36,13 @@ static void begin(const struct world *w)
 	c.max_depth = EDGES;
 }
 
-/* A sub-path may have n > 5 vertices or more with probability (5/n)^2. */
+/* Returns the probability that a sub-path may have `vertices` vertices or more: (5/n)^2 for n > 5, else 1. */
 static double chance_of(unsigned vertices)
 {
 	return vertices > 5 ? 25.0 / (vertices * vertices) : 1;
 }
 
-/* The path of candidate k of the pair at hand is in x. false: it lies just outside the film. */
+/* Stores the path of candidate k of the current pair in x. Returns false if it lies just outside the film. */
 static bool choose_candidate(unsigned k)
 {
 	double before = 0;
@@ -58,7 +58,8 @@ static void draw(uint64_t seed, uint64_t i, const struct ensemble_lengths *n, st
 	ensemble_draw(&c, &s.base, n, out);
 }
 
-/* Where x is refracted at x_1, its joint by technique 1 has vertices. */
+/* Returns whether the ensemble has a candidate of this length and intensity. If x is refracted at x_1, its candidate
+ * by technique 1 is skipped: the refracted connection has vertices of its own. */
 static bool has_candidate(const struct ensemble *e, unsigned edges, double intensity, bool whole)
 {
 	for (unsigned i = 0; i < e->count; i++) {
@@ -73,7 +74,8 @@ static bool has_candidate(const struct ensemble *e, unsigned edges, double inten
 	return false;
 }
 
-/* Each candidate of a pair around a path contributes what its own path says of itself. */
+/* Each candidate of a pair around a path contributes the value computed from its own full path. Returns the number of
+ * candidates checked. */
 static unsigned check_candidates(const char *name)
 {
 	unsigned checked = 0;
@@ -81,7 +83,7 @@ static unsigned check_candidates(const char *name)
 	for (unsigned k = 0; k < around.count; before += around.of[k++].intensity) {
 		const struct candidate *a = &around.of[k];
 		double log_pdf[FULL_PATH_MAX_VERTICES];
-		/* The path's own point on the emitter is not the one that the random numbers draw. */
+		/* The path's own point on the emitter differs from the one that the random numbers draw. */
 		bool own = a->s == 1 && a->edges == x.edges;
 		if (own || a->intensity < 1e-6 * around.total ||
 		    !ensemble_choose(&c, &around, (before + 0.5 * a->intensity) / around.total, &y))
@@ -99,8 +101,8 @@ static unsigned check_candidates(const char *name)
 	return checked;
 }
 
-/* The path's own candidate, in a pair around it, contributes what it did where it was found, over the chance of the
- * lengths. */
+/* The path's own candidate, in a pair around the path, contributes the same as when it was found, divided by the
+ * probability of the lengths. */
 static void check_own_candidate(const char *name)
 {
 	struct world *w = room_of(name);
@@ -116,11 +118,11 @@ static void check_own_candidate(const char *name)
 		const struct candidate own = drawn.of[k];
 		const double u[3] = {(double)i / TRIALS, 0.5, 0.5};
 		struct sampler_random s;
-		/* Far out in a lobe's tail its two evaluations share no digits. */
+		/* Far out in the tail of a lobe, its two evaluations share no digits. */
 		if (own.intensity < 1e-6 * drawn.total || !choose_candidate(k))
 			continue;
 		sampler_random_init(&s, seed, RNG_TEST, i, 1);
-		c.time = (double)i / TRIALS; /* of whatever was drawn last */
+		c.time = (double)i / TRIALS; /* any time, as left by the previous draw */
 		ensemble_around(&c, &s.base, &x, u, &around);
 		if (!has_candidate(&around, own.edges, own.intensity, false))
 			fail_msg("%s: pair %llu: a path of %u edges found by technique %u with %.9g is not there", name,
@@ -147,8 +149,8 @@ static void test_own_candidate(void **state)
 	check_own_candidate("moving");
 }
 
-/* Where lengths are drawn, the weight of a candidate is one over the probability that both sub-paths are long enough
- * for it. */
+/* Where lengths are drawn, the weight of a candidate is the reciprocal of the probability that both sub-paths are
+ * long enough for it. */
 static void test_drawn_lengths(void **state)
 {
 	(void)state;
@@ -200,8 +202,8 @@ static void test_chance_of_lengths(void **state)
 	}
 }
 
-/* Totals of both pairs as the proposal at hand must have drawn them, and of the one around x with the other one's
- * numbers. */
+/* The totals of both pairs against pairs drawn with the proposal's own random numbers; the pair around x must not use
+ * the numbers of the other pair. */
 static void test_streams_of_a_proposal(void **state)
 {
 	(void)state;
@@ -249,7 +251,8 @@ static void test_streams_of_a_proposal(void **state)
 	world_free(w);
 }
 
-/* A sample of hslt's bootstrap is worth what the candidates for its seed are: a chain starts at one of them. */
+/* The intensity of a sample of hslt's bootstrap is the total of the candidates for its seed: a chain starts at one of
+ * them. */
 static void test_bootstrap_is_of_candidates(void **state)
 {
 	(void)state;
@@ -277,8 +280,9 @@ static void test_bootstrap_is_of_candidates(void **state)
 	world_free(w);
 }
 
-/* From a point next to the aperture's rim half of the steps lead out, and these are refused: clamped to the rim they
- * would gather there. 1,000 steps; outside 0.42 to 0.58 with probability below 1e-6. */
+/* From a point next to the aperture's rim, half of the steps lead out of the aperture and are refused: if they were
+ * clamped to the rim, points would gather there. 1,000 steps; a share outside 0.42 to 0.58 has a probability below
+ * 1e-6. */
 static void test_aperture_is_left(void **state)
 {
 	(void)state;

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Independent proposals estimate what all light is that reaches the film: E[f / T] over them is the integral of f that
- * bdpt finds, for each number of edges and for all. What chains are scaled by hangs on this.
+ * Independent proposals estimate all light that reaches the film: the mean of f / T over them is the integral of f
+ * that bdpt finds, for each number of edges and for all together. Chains are scaled by this estimate.
  *
- * Level: 1e-6 for all comparisons, t between 32 groups of each; power, with 95 %: printed, and of what chains use by
- * default no more than 2 % over all rooms, with FULL=1 in each room.
+ * Level: 1e-6 for all comparisons together, by t between 32 groups on each side. Power: the bias found with 95 %
+ * probability is printed; for the strategy that chains use by default it is at most 2 % over all rooms, with FULL=1
+ * in each room.
  */
 #include "tests/support/dice.h"
 #include "tests/support/length.h"
@@ -25,10 +26,10 @@
 enum { GROUPS = 32, EDGES = 5 };
 #define COMPARISONS 256
 #define LEVEL (1e-6 / COMPARISONS)
-/* |t| of that level with 31 degrees of freedom, and what makes it 95 % likely. */
+/* |t| at this level with 31 degrees of freedom, plus the margin for a power of 95 %. */
 #define FINDS (8.5 + 1.7)
 
-/* Means of f / T by number of edges. */
+/* Adds to `mean` the means of f / T by number of edges. */
 static void estimate(struct mutation_ctx *m, const struct mutation_ops *ops, size_t n, double *mean)
 {
 	static struct full_path x, y;
@@ -43,19 +44,19 @@ static void estimate(struct mutation_ctx *m, const struct mutation_ops *ops, siz
 	}
 }
 
-/* Relative differences of all light, over rooms, weighted by their certainty: 1 / error^2. */
+/* Relative differences of all light, pooled over rooms with the weights 1 / error^2. */
 static struct pooled {
 	double certainty, weighted;
 } pool;
 static size_t rooms_pooled;
 
-/* What a room needs to find 2 % by itself, in units of what all rooms together do. */
+/* Factor by which the samples grow so that a room alone finds 2 %. */
 static size_t more_paths(void)
 {
 	return test_full() ? 8 : 1;
 }
 
-/* Of each number of edges, and of all together. */
+/* Compares each number of edges, and all together; returns the number of faults. */
 static unsigned compare(const char *room, const char *strategy, double a[GROUPS][EDGES + 1],
 			double b[GROUPS][EDGES + 1])
 {

@@ -1,18 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Each mutation alone and each forced (b, c) leaves bdpt's distribution of paths as it is, on paths of exactly k edges
- * (tests/support/stationary.h: what is compared, and why it is so much sharper than two images).
+ * Each mutation alone, and each forced (b, c), leaves bdpt's distribution of paths unchanged, on paths of exactly k
+ * edges (tests/support/stationary.h says what is compared, and why this is so much sharper than comparing two
+ * images).
  *
- * Level: 1e-6 a case. Power: the smallest bias of a soft quarter of the image that is found with 95 % probability is
- * printed and is 2 % at most; colours and what is looked at besides images have theirs printed. Of the whole image's
- * mean there is nothing to find: a mutation keeps the number of edges, and how much all paths of that length bring is
+ * Level: 1e-6 per case. Power: the smallest bias of a soft quarter of the image that is found with 95 % probability
+ * is printed and is at most 2 %; for colours and the functions other than images it is printed only. The mean of the
+ * whole image cannot change: a mutation keeps the number of edges, and the total light of all paths of one length is
  * b, which independent proposals alone estimate (tests/worker/render/path/test_full_path.c compares their densities
- * path by path, test_integrators.c images of mixtures). They go anywhere on the film, so that nothing cancels: 2 % by
- * FULL=1 only, with k = 3, 10 % else. Of the accepted moves at least 10 % are the forced choice's, the starts counting
- * as accepted independent proposals.
+ * path by path, test_integrators.c images of mixtures). Independent proposals go anywhere on the film, so that no
+ * noise cancels: they find 2 % with FULL=1 and k = 3 only, 10 % otherwise. At least 10 % of the accepted moves must
+ * be those of the forced choice; the starts count as accepted independent proposals.
  *
  * About 70 s of CPU time; FULL=1: every (b, c) and every mutation, k = 2..4 and 6 on every scene, k = 8 on two.
- * SCENE="rough glass" runs one alone; HSLT_TEST_ROWS=1 prints reasons of failure as well.
+ * SCENE="rough glass" runs one scene alone; HSLT_TEST_ROWS=1 prints reasons of failure as well.
  */
 #include "tests/support/length.h"
 #include "tests/support/stationary.h"
@@ -28,7 +29,7 @@
 
 enum { STARTS = 120, BOOTSTRAP = 1024 };
 
-/* A list of mutations for paths of that many edges. */
+/* Mutations to test on paths with this number of edges. */
 struct forced {
 	unsigned edges;
 	const char *mutations;
@@ -82,12 +83,13 @@ struct tally {
 	uint64_t mutations;
 };
 
-/* from: what all mutations on paths of that length start from. */
+/* from: the starts shared by all mutations on paths of this length. chosen: the mutation was listed for this scene,
+ * so that it must be able to move. */
 static void check(const struct world *w, const char *scene, unsigned edges, const char *mutation, bool chosen,
 		  struct stationary_starts *from, struct tally *t)
 {
 	static struct stationary_result r;
-	/* Fresh paths lie anywhere on the film: far less of the noise cancels. */
+	/* Independent proposals lie anywhere on the film, so far less of the noise cancels. */
 	const struct mutation_ops *ops = mutation_find(mutation, strcspn(mutation, "@"));
 	bool fresh = ops && ops->independent, weak;
 	uint32_t enough = edges == 2 ? 2 : 1, more = fresh && test_full() && edges == 3 ? 16 : enough;
@@ -101,7 +103,7 @@ static void check(const struct world *w, const char *scene, unsigned edges, cons
 		how.bootstrap *= 2;
 		stationary_run(w, scene, &how, &r);
 	}
-	/* What the scene has not got cannot be moved: only what was chosen for a scene must be. */
+	/* A mutation cannot move what a scene lacks, so only mutations listed for the scene must move. */
 	bool idle = chosen && !test_scaled() && r.share < 0.1;
 	const char *verdict = !stationary_holds(&r) ? "FAILED" : weak ? "TOO WEAK" : idle ? "HARDLY MOVES" : "ok";
 	print(scene, &how, &r, verdict);
@@ -165,7 +167,7 @@ static void test_scene(void **state)
 	assert_int_equal(t.failed, 0);
 }
 
-/* Faults in the acceptance must show. */
+/* Planted faults in the acceptance probability must be found. */
 static void test_planted(void **state)
 {
 	(void)state;

@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * T(x -> y) against sampling. From one x, whose proposals all arrive, the positions of all vertices that move are
- * whitened by a pilot; inside an ellipsoid of known volume E[1{y in bin} / T(x -> y)] is the bin's volume, whatever T's
- * shape: of the eight parts that the signs of three coordinates make, and of the whole. T is multiplied out
- * (tests/worker/render/mutation/explicit.h), film, steps, choice of b and c, aperture and emitter included, constants
- * too. Failures are counted as mass of their own.
+ * T(x -> y) against sampling. From one x, from which all proposals arrive, a pilot run determines the mean and the
+ * covariance of all moving vertices, which whiten their positions. Inside an ellipsoid of known volume, E[1{y in bin}
+ * / T(x -> y)] is the volume of the bin, whatever the shape of T: for the eight bins given by the signs of three
+ * coordinates, and for the whole ellipsoid. T is multiplied out with all constants
+ * (tests/worker/render/mutation/explicit.h): film, steps, choice of b and c, aperture and emitter. Failed proposals
+ * are counted and must be rare.
  *
- * Level: 1e-6 for all bins of all cases. Power, with 95 %: printed, 2 to 4 % on the whole.
+ * Level: 1e-6 for all bins of all cases together. Power: the error found with 95 % probability is printed, 2 to 4 %
+ * on the whole ellipsoid.
  */
 #include "tests/support/dice.h"
 #include "tests/support/rooms.h"
@@ -25,14 +27,13 @@
 enum { MOST = 6, BITS = 3, BINS = 1 << BITS, PILOT = 4000, LOOK = 256, STARTS = 2400 };
 #define COMPARISONS 256
 #define LEVEL (1e-6 / COMPARISONS)
-/* Derivatives with respect to the numbers in [0,1) that make points of the emitter and of the aperture, to both sides.
- */
+/* Largest step, to both sides, of the numbers in [0,1) that give the points on the emitter and on the aperture. */
 #define END_STEP 0.1
 
 struct example {
 	const char *room, *strategy;
 	struct mutation_setting how;
-	unsigned edges, b, c; /* that are looked at, where b and c are drawn */
+	unsigned edges, b, c; /* the case that is tested, if b and c are drawn */
 };
 
 static const struct example examples[] = {
@@ -67,8 +68,9 @@ struct sampling {
 	const struct example *example;
 	const struct mutation_ops *ops;
 	struct full_path *x, *y;
-	unsigned vertex[FULL_PATH_MAX_VERTICES], count, ends; /* that move; of these ends of the path */
-	double mean[MOST], factor[MOST][MOST];		      /* Cholesky's of the covariance */
+	unsigned vertex[FULL_PATH_MAX_VERTICES], count,
+		ends;			       /* vertices that move; ends: how many of them are ends of the path */
+	double mean[MOST], factor[MOST][MOST]; /* factor: Cholesky's, of the covariance */
 	unsigned long failures;
 };
 
@@ -92,18 +94,19 @@ static void list_vertices(struct sampling *s)
 	s->count += s->ends;
 }
 
-/* In the plane that it moves in. */
+/* Position in the plane in which the point on the aperture moves. */
 static void on_aperture(const struct sampling *s, double *z, double *log_plane)
 {
 	const struct camera *camera = &c.w->camera;
 	vec3 d = frame_to_local(&camera->axes, vec3_sub(s->y->v[s->y->edges].x.p, s->x->v[s->x->edges].x.p));
 	z[0] = d.x;
 	z[1] = d.y;
-	/* Its area counts as 1. */
+	/* The density counts the aperture's area as 1. */
 	*log_plane += log(M_PI * camera->aperture * camera->aperture);
 }
 
-/* Positions in the tangent planes of x, and log of plane per area. false: not on the same plane or sphere. */
+/* Stores positions in the tangent planes of x, and the logarithm of the area in these planes per area of the
+ * surfaces. Returns false if a vertex left its plane or sphere. */
 static bool coordinates(const struct sampling *s, double *z, double *log_plane)
 {
 	*log_plane = 0;
@@ -158,15 +161,16 @@ static enum outcome propose(struct sampling *s, double *z, double *log_density)
 
 static int bin_of(const struct sampling *s, const double *z, double radius);
 
-/* Within these many deviations is looked. Ends move uniformly, within 1.7 deviations. */
+/* Returns the radius of the ellipsoid in standard deviations. Ends of the path move uniformly, within 1.7 deviations.
+ */
 static double radius_of(const struct sampling *s)
 {
 	static const double radii[] = {0, 1.2, 1.6, 2};
 	return s->ends ? 1.5 : radii[s->count];
 }
 
-/* A start from which proposals fill the ellipsoid as a normal distribution does, each part of it: not one whose cloud
- * is bent, as at a sphere's limb. Asked of places alone, not of densities. */
+/* Returns whether the proposals from this start fill the ellipsoid, and each part of it, like a normal distribution:
+ * not if they lie on a curve, as at the limb of a sphere. Judged by positions alone, not by densities. */
 static bool fills_ellipsoid(const struct sampling *s, const double z[][MOST], unsigned n)
 {
 	unsigned d = 2 * s->count, bins = d < BITS ? 1u << d : BINS, in[BINS] = {0}, all = 0;
@@ -189,7 +193,8 @@ static bool fills_ellipsoid(const struct sampling *s, const double z[][MOST], un
 	return ok;
 }
 
-/* Mean and covariance; false: some fail or leave their surface, or they lie otherwise than the ellipsoid says. */
+/* Finds the mean and the covariance. Returns false if proposals fail or leave their surface, or if they do not fill
+ * the ellipsoid. */
 static bool run_pilot(struct sampling *s)
 {
 	static double z[PILOT][MOST];
@@ -233,7 +238,7 @@ static bool all_smooth(const struct full_path *x)
 	return true;
 }
 
-/* Which bin, of whitened coordinates; -1: outside the ellipsoid. */
+/* Returns the bin of the whitened coordinates, or -1 outside the ellipsoid. */
 static int bin_of(const struct sampling *s, const double *z, double radius)
 {
 	unsigned d = 2 * s->count;
@@ -284,7 +289,7 @@ static void sample(struct sampling *s, const char *name)
 		whole = mean;
 		full_path_error = sigma;
 	}
-	/* 6.8 standard errors for the level, 1.645 for 95 % to find. */
+	/* 6.8 standard errors for the level, plus 1.645 for a power of 95 %. */
 	printf("%-42s %u vertices, whole %.4f, worst t %+.2f, finds %.1f %% on it and %.1f %% on a bin, failed %.2g\n",
 	       name, s->count, whole, worst, 845 * full_path_error, 845 * error, (double)failures / (double)n);
 	assert_true(right);

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Halving the tolerances of the walks, there and back, changes no image: the same states, the same random numbers, one
- * proposal each with the tolerances as they are and with half of them. What the chain would put on the film, expected
- * values and all, is compared block by block; differences of pairs leave hardly any noise, so that with 95 %
- * probability 0.4 % on a block is found. t between 16 groups, level 1e-6 a comparison. Where both arrive, the film
- * points are the same to a fiftieth of a pixel.
+ * Halving the tolerances of the walks, in both directions, changes no image. From the same states and random numbers,
+ * one proposal is made with the default tolerances and one with half of them. The expected contributions of the chain
+ * to the film are compared block by block; differences of pairs leave hardly any noise, so that 0.4 % on a block is
+ * found with 95 % probability. t between 16 groups, level 1e-6 per comparison. If both proposals arrive, their film
+ * points agree to a fiftieth of a pixel.
  */
 #include "tests/support/dice.h"
 #include "tests/support/rooms.h"
@@ -31,7 +31,7 @@ static struct full_path x, y[2];
 
 struct tally {
 	uint64_t proposals, one_only, both;
-	double farthest; /* pixels between the two proposals, where both arrived */
+	double farthest; /* pixels between the two proposals, if both arrived */
 	double film[2][BLOCKS + 1][GROUPS];
 };
 
@@ -74,7 +74,7 @@ static void compare_one(const struct mutation_ops *ops, int group, struct tally 
 enum { STRATEGIES = 2 };
 static const char *const names[STRATEGIES] = {"hslt", "halfvec"};
 
-/* Both from the same starts: finding them takes a third of the time. */
+/* Runs both strategies from the same starts, whose search takes a third of the time. */
 static void run_group(const struct room *room, int group, struct tally t[STRATEGIES])
 {
 	struct starts s;
@@ -119,7 +119,8 @@ static void judge_bias(const struct room *room, const char *name, const struct t
 		"%.3f %%, finds %.3f %%\n",
 		test, (unsigned long long)t->proposals, 100 * (double)t->one_only / (double)t->proposals, t->farthest,
 		100 * worst, 100 * 9.4 * error);
-	/* In fog few paths have no event between the camera and the light, which half vectors do not pass. */
+	/* In fog, few paths have no scattering event between the camera and the light, and half-vector walks do not
+	 * pass such events. */
 	bool fog = strcmp(room->name, "fog") == 0 || strcmp(room->name, "misfit") == 0;
 	unsigned rare = fog ? 50 : 5;
 	assert_true(t->both * rare > t->proposals && t->farthest < 0.02);
