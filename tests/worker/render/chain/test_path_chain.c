@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * States of chains of whole paths: what is saved comes back as the same path, two that resume from the same bytes go on
- * bit by bit alike, and bytes that somebody has changed are refused, or so little changed that the path is as good as
- * the same. Where things of size 1 stand in a scene of size 1e8, too.
+ * States of chains of full paths: a saved state is read back as the same path; two chains that resume from the same
+ * bytes continue with equal bits; and changed bytes are refused, or the change is so small that the path is
+ * practically the same. This also holds for objects of size 1 in a scene of size 1e8.
  */
 #include "common/base/mem.h"
 #include "tests/support/dice.h"
@@ -38,7 +38,7 @@ static void begin(struct chain *c, struct film_sums *film)
 		.context = &context, .film = film, .mixture = mixture, .strategy = strategies, .seed = 7, .id = 3};
 }
 
-/* The first sample of the bootstrap that carries light. */
+/* Starts the chain at the first bootstrap sample that carries light. */
 static void start(struct chain *c)
 {
 	uint64_t index = 0;
@@ -92,7 +92,7 @@ static void check_resume(struct chain *c, struct chain *d)
 	mem_free(s.bytes);
 }
 
-/* Numbers that a hostile or damaged state may hold. */
+/* Returns a number that a hostile or damaged state may hold. */
 static double bad_number(struct dice *dice)
 {
 	static const double bad[] = {__builtin_nans(""),
@@ -126,7 +126,7 @@ static void damage_state(struct chain_state *s, struct dice *dice, int i)
 			s->bytes[head + dice_below(dice, left)] ^= (uint8_t)(1u << dice_below(dice, 8));
 }
 
-/* Every byte may be anything: refused, unless it is the last bits of a number that moved. */
+/* Every byte may have any value: the state is refused, unless only the last bits of a number changed. */
 static size_t check_changed(struct chain *c, struct chain *d, struct dice *dice)
 {
 	static struct full_path x;
@@ -144,7 +144,8 @@ static size_t check_changed(struct chain *c, struct chain *d, struct dice *dice)
 			refused++;
 		} else if (path_read(&context, changed.bytes + CHAIN_STATE_HEAD, changed.size - CHAIN_STATE_HEAD, &x) &&
 			   x.edges) {
-			/* What it may break: occlusion and exactly specular directions are not asked again. */
+			/* The path may break two rules, because reading a state checks neither occlusion nor exactly
+			 * specular directions. */
 			if (!path_check(&context, &x, text, sizeof text) && !strstr(text, "occluded") &&
 			    !strstr(text, "specular"))
 				fail_msg("changed: %s", text);
@@ -203,7 +204,7 @@ static void test_states(void **state)
 		check_room(r);
 }
 
-/* Nothing to start from: the chain looks for light, and its state is as small as can be. */
+/* A chain without a start: it searches for light, and its state has the minimal size. */
 static void test_black(void **state)
 {
 	(void)state;
@@ -223,7 +224,7 @@ static void test_black(void **state)
 	mem_free(s.bytes);
 	steps(c, 200);
 	assert_int_equal(chain_path.save(c, &s), 0);
-	/* A wavelength and a point of the aperture only where the scene has them. */
+	/* A wavelength and a point on the aperture only if the scene has them. */
 	uint32_t without = CHAIN_STATE_HEAD + 16 + (w->effects.colour ? 8u : 0) + (w->effects.aperture ? 40u : 0);
 	assert_true(s.size > without && (s.size - without) % 40 == 0);
 	mem_free(s.bytes);
@@ -232,7 +233,7 @@ static void test_black(void **state)
 	world_free(w);
 }
 
-/* Glass of size 1 on a floor of half-size `floor`. */
+/* Glass of size 1 on a floor with half side `floor`. */
 static struct world *on_floor(double floor)
 {
 	/* clang-format off */
@@ -272,7 +273,7 @@ static struct world *on_floor(double floor)
 	/* clang-format on */
 }
 
-/* Read back: the same path, point for point. */
+/* Fails unless a path read back is the same path, point by point. */
 static void check_same_path(const struct full_path *x, const struct full_path *y)
 {
 	assert_int_equal(x->edges, y->edges);
@@ -286,8 +287,8 @@ static void check_same_path(const struct full_path *x, const struct full_path *y
 	}
 }
 
-/* Wherever a path of the bootstrap can be written it is read back as it was, and a chain that goes on epoch after epoch
- * resumes from what it saved. */
+/* Each bootstrap path that can be written is read back unchanged, and a chain resumes from its saved state epoch
+ * after epoch. */
 static void check_scale(double floor)
 {
 	static struct full_path x, y;
@@ -323,7 +324,7 @@ static void check_scale(double floor)
 	print_message("floor %g: %u of %u paths of the bootstrap, %u of 200 states cannot be read back\n", floor,
 		      unwritten, paths, (unsigned)counters[COUNT_STATES_LOST]);
 	assert_true(paths > 100);
-	/* Now and then a path that was drawn lies outside the film when it is computed again. */
+	/* Occasionally, a path that was drawn lies outside the film when its film point is recomputed. */
 	assert_true(unwritten * 500 <= paths && counters[COUNT_STATES_LOST] == 0);
 	film_sums_fini(&film);
 	test_free(c);

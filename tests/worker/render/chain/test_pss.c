@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Primary sample space: small steps are symmetric, states survive bytes, and a chain does what Metropolis says: on
- * targets known in closed form the histogram of its splats is the target. Level 1e-6 each; seeds are the hash of the
- * test's name.
+ * Primary sample space: small steps are symmetric, states survive saving, and chains obey Metropolis: on targets
+ * known in closed form, the histogram of a chain's splats is the target. Level 1e-6 for each test; seeds are the hash
+ * of the test's name.
  */
 #include "tests/support/dice.h"
 #include "tests/support/stats.h"
@@ -24,7 +24,8 @@
 
 #define LEVEL 1e-6
 
-/* From u to u +- s, s between 1/1024 and 1/64 with density 1/s: the same on both sides, wrapped round. */
+/* A small step goes from u to u +- s, with s between 1/1024 and 1/64 at a density proportional to 1/s: the same on
+ * both sides, wrapped around. */
 static void test_small_step(void **state)
 {
 	(void)state;
@@ -55,7 +56,7 @@ static void test_small_step(void **state)
 	}
 }
 
-/* There and back: as many go from one cell to another as return, from uniform points. */
+/* Steps in both directions: from uniform points, as many go from one cell to another as return. */
 static void test_both_ways(void **state)
 {
 	(void)state;
@@ -107,7 +108,7 @@ static void test_bytes(void **state)
 		memset(&q, 0, sizeof q);
 		assert_int_equal(pss_read(&q, bytes, n), n);
 		assert_memory_equal(&p, &q, sizeof p);
-		/* Cut anywhere, it is refused. */
+		/* Truncated anywhere, the state is refused. */
 		uint8_t *cut = malloc(n);
 		size_t keep = dice_below(&d, (uint32_t)n);
 		memcpy(cut, bytes, keep);
@@ -121,7 +122,7 @@ static void test_bytes(void **state)
 		size_t n = pss_write(&p, bytes, sizeof bytes);
 		assert_int_equal(pss_read(&q, bytes, n), 0);
 	}
-	/* Counts beyond the arrays, and those that overflow when multiplied. */
+	/* Counts beyond the arrays, and counts whose product overflows. */
 	const uint32_t counts[] = {PSS_MAX_VERTICES + 1, 1000, 1u << 26, 1u << 31, UINT32_MAX};
 	for (size_t i = 0; i < sizeof counts / sizeof counts[0]; i++)
 		for (int side = 0; side < 2; side++) {
@@ -146,7 +147,8 @@ static void test_bytes(void **state)
 	}
 }
 
-/* One vertex of the camera, none of a light: the same bytes on any machine, as long as there are farms. */
+/* The state with one vertex of the camera and none of a light: its bytes are the same on every machine, and must
+ * never change. */
 static void test_bytes_stay(void **state)
 {
 	(void)state;
@@ -166,8 +168,9 @@ static void test_bytes_stay(void **state)
 	assert_memory_equal(&p, &q, sizeof p);
 }
 
-/* Targets on a film of 16 x 16. In the first the density is a function of two numbers; in the second the path's length
- * is drawn, too, and longer ones use more blocks; the third has two splats a point, one of them dark, and holes. */
+/* Targets on a film of 16 x 16. In the first, the density is a function of two numbers; in the second, the path
+ * length is drawn as well, and longer paths use more blocks; the third has two splats per sample, one of them dark,
+ * and regions of value 0. */
 enum { SIDE = 16 };
 
 static double profile(double x, double y)
@@ -204,7 +207,7 @@ static void evaluate_lengths(struct path_context *c, struct sampler *s, struct p
 		u = s->block(s, v % 3 ? SIDE_CAMERA : SIDE_LIGHT, v % 3 ? v : v / 3 - 1);
 		if (u[2] < 0.3)
 			break;
-		/* On average 1. */
+		/* The factor has the mean 1. */
 		value *= 0.5 + u[3];
 	}
 	add_splat(out, x, y, value);
@@ -225,8 +228,9 @@ static void evaluate_holes(struct path_context *c, struct sampler *s, struct pat
 	add_splat(out, l[0], l[1], profile(l[0], l[1]) / 0.6);
 }
 
-/* Groups of chains; each its own b from its large steps, as a job's groups have. Mean of each cell's sum over the exact
- * one is tested by t between 16 groups; power: with 95 % a cell that is off by 12 % or a mean by 2 %, at most. */
+/* Runs groups of chains; each group estimates its own b from its large steps, like the groups of a job. The mean of
+ * each cell's sum is compared with the exact one by t between 16 groups; power: a cell that is off by at most 12 %,
+ * or a mean by 2 %, is found with 95 % probability. */
 static void check_target(const char *name,
 			 void (*evaluate)(struct path_context *, struct sampler *, struct path_sample *), double times)
 {
@@ -259,7 +263,7 @@ static void check_target(const char *name,
 				    .film = &film,
 				    .seed = stats_seed(name),
 				    .id = (uint64_t)g};
-		/* Any start will do: chains this long forget it. */
+		/* Any start is good enough: chains of this length forget it. */
 		assert_true(chain_pss.start(c, UINT64_MAX));
 		for (size_t i = 0; i < steps; i++)
 			chain_pss.step(c, &sums);
@@ -290,7 +294,7 @@ static void check_target(const char *name,
 	print_message("%s: mean %.5f +- %.5f of %.5f; worst cell +- %.2f %%\n", name, m.mean, m.error, whole,
 		      100 * worst);
 	assert_true(m.p > LEVEL);
-	/* t at 1e-6 and 15 degrees is 7.7: what is found with 95 %. */
+	/* t at level 1e-6 with 15 degrees of freedom is 7.7, and 9.4 with the margin for a power of 95 %. */
 	if (steps >= 400000)
 		assert_true(9.4 * worst < 0.12 && 9.4 * m.error / whole < 0.02);
 	test_free(c);
@@ -304,7 +308,8 @@ static void test_targets(void **state)
 	check_target("target with holes", evaluate_holes, 2);
 }
 
-/* Intensities where doubles end: most points are of one of two magnitudes, so that a chain stays there for a while. */
+/* Intensities at the limits of double: most points have one of two magnitudes, so that a chain stays at each for a
+ * while. */
 static double magnitudes[2];
 
 static void evaluate_extremes(struct path_context *c, struct sampler *s, struct path_sample *out)
@@ -336,7 +341,7 @@ static void check_finite(const struct film_sums *film, double weight)
 	assert_true(fabs(classes[0] / weight - 1) < 1e-9);
 }
 
-/* No intensity makes a film, a moment or a sum infinite. Each mutation gives the film a weight of 1, whatever the
+/* No intensity makes a film, a moment or a sum infinite. Each mutation adds a weight of 1 to the film, whatever the
  * intensity. */
 static void test_extreme_intensities(void **state)
 {
@@ -373,7 +378,7 @@ static void test_extreme_intensities(void **state)
 	test_free(c);
 }
 
-/* Saved and resumed between epochs, a chain goes on bit for bit. */
+/* A chain that is saved and resumed between epochs continues with the same bits. */
 static void test_resume(void **state)
 {
 	(void)state;
@@ -414,7 +419,7 @@ static void test_resume(void **state)
 			assert_int_equal(s.size, t.size);
 			assert_memory_equal(s.bytes, t.bytes, s.size);
 			assert_true(s.size <= CHAIN_STATE_MAX);
-			/* Another chain's, or a piece of it, is refused. */
+			/* A truncated state, or that of another chain, is refused. */
 			struct chain_state piece = {s.bytes, s.size - 1};
 			assert_false(chain_pss.resume(parts, &piece));
 			piece.size = 10;
@@ -422,7 +427,7 @@ static void test_resume(void **state)
 			parts->id++;
 			assert_false(chain_pss.resume(parts, &s));
 			parts->id--;
-			if (s.size > CHAIN_STATE_HEAD + 8) { /* a signalling NaN: refused, and nobody's fault */
+			if (s.size > CHAIN_STATE_HEAD + 8) { /* a signalling NaN: refused without a trap */
 				const uint64_t nan = UINT64_C(0x7ff4000000000000);
 				struct chain_state bad = {mem_alloc(s.size, 1), s.size};
 				memcpy(bad.bytes, s.bytes, s.size);

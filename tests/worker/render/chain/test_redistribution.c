@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Energy redistribution. The image stays that of bdpt, whatever the share that chains spread: all of it, or what is
- * above a threshold. Both images are made of the same samples, so that only the noise of the chains is left between
- * them; that bdpt is right, and erpt with it, test_integrators shows against path.
+ * Energy redistribution. The image remains that of bdpt, whatever the share of light that chains spread: all of it,
+ * or the part above a threshold. Both images are made of the same samples, so that they differ only by the noise of
+ * the chains; test_integrators.c shows against `path` that bdpt, and with it erpt, is right. Statistics as in
+ * tests/support/agree.h.
  */
 #include "worker/render/chain/redistribution.h"
 #include "worker/render/film/sums.h"
@@ -46,7 +47,7 @@ static struct world *room_of_balls(void)
 				     BALL("0.8,-1.3,0", "0.6", METAL("0.2")));
 }
 
-/* Dark places beside bright ones: light that flew only one way between them would show at once. */
+/* Dark regions beside bright ones: light that moved between them in one direction only would be visible at once. */
 static struct world *lamp_over_ground(void)
 {
 	return world_of_text(
@@ -66,7 +67,7 @@ struct trial {
 	struct film_sums film, unspread;
 	struct redistribution *r;
 	uint64_t counters[BATCH_COUNTERS];
-	double intensity; /* of all samples, with what was taken */
+	double intensity; /* of all samples, including the part taken for chains */
 	double taken, classes[PATH_CLASSES];
 };
 
@@ -121,14 +122,14 @@ static void trial_sample(struct trial *t, uint64_t seed, uint64_t index)
 	t->taken += redistribution_taken(t->r);
 }
 
-/* The same sample as bdpt has it. Its intensity. */
+/* Evaluates the same sample as bdpt does, and returns its intensity. */
 static double unspread_sample(struct trial *t, uint64_t seed, uint64_t index)
 {
 	evaluate(t, seed, index, NULL, &t->unspread);
 	return t->sample.intensity;
 }
 
-/* Blocks of the film and the whole, each as its mean. */
+/* Stores the means of the blocks of the film and of the whole film. */
 static void take_means(const struct film_sums *f, uint64_t spp, double mean[AGREE_CELLS + 1])
 {
 	double sum[AGREE_CELLS + 1] = {0};
@@ -143,7 +144,8 @@ static void take_means(const struct film_sums *f, uint64_t spp, double mean[AGRE
 		mean[c] = sum[c] / (double)spp / (SIDE * SIDE) * (c < AGREE_CELLS ? AGREE_CELLS : 1);
 }
 
-/* By group and cell 1 + the difference of the two images over bdpt's mean there. Returns mutations a sample. */
+/* Stores for each group and cell 1 + the difference of the two images, divided by bdpt's mean in the cell. Returns
+ * the number of mutations per sample. */
 static double compare(const char *test, const struct world *w, const struct redistribution_rule *rule,
 		      uint32_t light_every, uint64_t spp, struct agree_image *out)
 {
@@ -189,22 +191,22 @@ static void all_light_by_chains_is_the_same_image(void **state)
 
 static const struct redistribution_rule some = {.threshold = 0.5, .mutations = 8, .length = 2};
 
-/* Most paths near the threshold, where a changes. */
+/* Most paths lie near the threshold, where the number of chains varies. */
 static void some_light_by_chains_is_the_same_image(void **state)
 {
 	(void)state;
 	expect_the_same(__func__, room_of_balls(), &some, 1, 8);
 }
 
-/* What needs a light sub-path counts four times: more of it is above the threshold. */
+/* Contributions that need a light sub-path are weighted by four, so more of them lie above the threshold. */
 static void a_light_sub_path_in_one_of_four_samples_is_the_same_image(void **state)
 {
 	(void)state;
 	expect_the_same(__func__, room_of_balls(), &some, 4, 12);
 }
 
-/* Without roulette, what a light sub-path brings to the film is at most T times as bright as its place, to rounding,
- * however seldom there is one. */
+/* Without roulette, the contribution of a light sub-path to the film is at most T times the brightness at its
+ * position, to rounding, however rare light sub-paths are. */
 static void no_splat_is_brighter_than_the_threshold(void **state)
 {
 	(void)state;
@@ -230,7 +232,7 @@ static void no_splat_is_brighter_than_the_threshold(void **state)
 	world_free(w);
 }
 
-/* Chains are as long at a bright path as at any other; only their number grows, up to a bound. */
+/* Chains from a bright path are as long as any others; only their number grows, up to a bound. */
 static void the_brightest_begin_no_more_than_so_many_chains(void **state)
 {
 	(void)state;
@@ -246,8 +248,9 @@ static void the_brightest_begin_no_more_than_so_many_chains(void **state)
 	world_free(w);
 }
 
-/* The sum that b is estimated from is that of bdpt with the same random numbers. What was taken of it has classes,
- * found from full paths, none of which has more than bdpt's samples have of it, found from their sub-paths. */
+/* The sum from which b is estimated is that of bdpt with the same random numbers. The part of it taken for chains is
+ * divided into classes, from full paths; no class may have more than in bdpt's samples, where classes are found from
+ * sub-paths. */
 static void nothing_is_lost_of_the_sum(void **state)
 {
 	(void)state;
@@ -277,7 +280,8 @@ static void nothing_is_lost_of_the_sum(void **state)
 	world_free(w);
 }
 
-/* All samples of a lamp in view are alike, and of one that mirrors and glass show. */
+/* A lamp in view is the same in all samples, also when seen by way of mirrors and glass, so chains need not spread
+ * it. */
 static void what_is_seen_directly_is_not_spread(void **state)
 {
 	(void)state;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The film of one lease: reconstruction filters are normalised, and a splat keeps its energy. */
+/* The film of one lease: reconstruction filters are normalised, and a splat keeps its energy. Checked by quadrature,
+ * and against values from Mitsuba 3's tests. */
 #include "worker/render/film/sums.h"
 
 #include <math.h>
@@ -9,7 +10,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 
-/* Every kernel that the reader lets through has integral 1, and splats all of it. */
+/* Every kernel that the reader accepts has integral 1, and splats distribute all of their energy. */
 static void kernels_have_integral_1(void **state)
 {
 	(void)state;
@@ -39,7 +40,7 @@ static void kernels_have_integral_1(void **state)
 			sum += film_kernel(&f, 1.01 * r * (2 * (i + 0.5) / N - 1)) * 2.02 * r / N;
 		assert_true(fabs(sum - 1) < 1e-4);
 		assert_true(film_kernel(&f, 1.001 * r) == 0 && film_kernel(&f, -1.001 * r) == 0);
-		/* Splats at all places within a pixel bring their energy in the mean. */
+		/* Averaged over all positions within a pixel, splats keep their energy. */
 		double energy = 0, value[3] = {1, 2, 3};
 		enum { PLACES = 40 };
 		for (int i = 0; i < PLACES * PLACES; i++) {
@@ -56,7 +57,8 @@ static void kernels_have_integral_1(void **state)
 	}
 }
 
-/* Values of Mitsuba 3's tests, whose kernels are 1 in the middle, or like Mitchell and Netravali's have integral 1. */
+/* Values from Mitsuba 3's tests, whose kernels are 1 in the middle or, like that of Mitchell and Netravali, have
+ * integral 1. */
 static void kernels_have_their_shapes(void **state)
 {
 	(void)state;
@@ -85,7 +87,8 @@ static void kernels_have_their_shapes(void **state)
 	}
 }
 
-/* A panorama's kernel reaches around: nothing of a splat is lost, and what is beyond an edge is where that place is. */
+/* The kernel of a panorama wraps around: a splat loses no energy, and the part beyond an edge arrives at the opposite
+ * position. */
 static void kernels_reach_around(void **state)
 {
 	(void)state;
@@ -101,7 +104,7 @@ static void kernels_reach_around(void **state)
 	struct error e;
 	static const struct {
 		double x, y;
-		uint32_t column, row; /* a pixel on the other side, at the distance 1 to the splat in one dimension */
+		uint32_t column, row; /* a pixel on the other side, at the distance 1 from the splat in one dimension */
 	} cases[] = {{0.5, 10.5, WIDTH - 1, 10},
 		     {WIDTH - 0.5, 10.5, 0, 10},
 		     {3.5, 0.5, 23, 0},
@@ -116,7 +119,8 @@ static void kernels_reach_around(void **state)
 			fail_msg("%zu: %g in all, %g there", i, sum, there);
 		film_sums_fini(&f);
 	}
-	/* A window may lie inside, or go round; otherwise some of the light would be missing. */
+	/* A window may lie inside the panorama or go all the way round; otherwise some of the light would be missing.
+	 */
 	static const struct {
 		uint32_t x, y, width, height;
 		bool valid;

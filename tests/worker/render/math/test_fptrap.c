@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* An invalid operation of ours ends the program, or goes to where it is caught; one of a library's does neither. */
+/* An invalid operation of the program's own code ends the program, or control returns to the catch point; one inside
+ * a library does neither. Checked in child processes by their exit signals. */
 #include "worker/render/math/fptrap.h"
 
 #include <math.h>
@@ -54,7 +55,7 @@ static void not_watched(void)
 	fptrap_unwatch(fptrap_watch());
 }
 
-/* The signal that ends a child running f; 0: none. */
+/* Returns the signal that ends a child running f, or 0. */
 static int signal_of(void (*f)(void))
 {
 	pid_t child = fork();
@@ -80,7 +81,7 @@ static void test_signals(void **state)
 	assert_int_equal(signal_of(not_watched), 0);
 }
 
-/* Whether f comes back by the catch. */
+/* Returns whether f ends at the catch point. */
 static bool is_caught(void (*f)(void))
 {
 	jmp_buf back;
@@ -106,7 +107,7 @@ static void test_caught(void **state)
 #if defined(__x86_64__)
 	assert_true(is_caught(ours_within_the_watch));
 	assert_true(is_caught(ours_seen_at_the_end));
-	assert_null(fptrap_catch(NULL)); /* once: the next one is a signal again */
+	assert_null(fptrap_catch(NULL)); /* once only: the next invalid operation raises a signal again */
 	assert_int_equal(signal_of(ours_within_the_watch), SIGFPE);
 #endif
 	assert_false(is_caught(a_librarys));

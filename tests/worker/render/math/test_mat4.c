@@ -84,7 +84,7 @@ static void test_normals_stay_perpendicular(void **state)
 		double scale = vec3_length(nt) * (vec3_length(at) + vec3_length(bt));
 		assert_near(vec3_dot(nt, at), 0, 1e-12 * scale);
 		assert_near(vec3_dot(nt, bt), 0, 1e-12 * scale);
-		/* The cross product follows the determinant's sign, the normal does not. */
+		/* The cross product changes sign with the determinant, the normal does not. */
 		assert_true(vec3_dot(vec3_cross(at, bt), nt) * mat4_det3(m) > 0);
 	}
 }
@@ -95,7 +95,8 @@ static void test_look_at(void **state)
 	mat4 m = mat4_look_at((vec3){0, -9, 3.5}, (vec3){0, 0, 3.5}, (vec3){0, 0, 1});
 	assert_vec3(mat4_vector(&m, (vec3){0, 0, 1}), 0, 1, 0, 1e-15);
 	assert_vec3(mat4_vector(&m, (vec3){0, 1, 0}), 0, 0, 1, 1e-15);
-	assert_vec3(mat4_vector(&m, (vec3){1, 0, 0}), -1, 0, 0, 1e-15); /* left of one who looks along +y with z up */
+	assert_vec3(mat4_vector(&m, (vec3){1, 0, 0}), -1, 0, 0,
+		    1e-15); /* to the left of a viewer who looks along +y with z up */
 	assert_vec3(mat4_point(&m, (vec3){0, 0, 0}), 0, -9, 3.5, 0);
 	assert_near(mat4_det3(m), 1, 1e-15);
 }

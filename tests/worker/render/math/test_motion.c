@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Motion between keyframes, against rotations about an axis by a share of an angle: R(s angle) A ((1 - s) S0 + s S1)
- * and a point on a line, S0 and S1 made of their eigenvectors, so that neither quaternions nor a decomposition is used
- * to say what is right. Bounds hold every point at any time, and are not much larger than what is reached.
+ * and a point on a line, with S0 and S1 made of their eigenvectors, so that the expected values use neither
+ * quaternions nor a decomposition. Bounds contain every point at any time, and are not much larger than necessary.
  */
 #include "tests/support/dice.h"
 #include "worker/render/math/motion.h"
@@ -27,7 +27,7 @@ static mat4 transposed(mat4 a)
 	return r;
 }
 
-/* Symmetric, with lengths from 1/8 to 8. */
+/* Returns a symmetric stretch with factors from 1/8 to 8. */
 static mat4 stretch(struct dice *d)
 {
 	mat4 v = rotation(d);
@@ -43,7 +43,7 @@ static mat4 mixed(mat4 a, mat4 b, double s)
 	return a;
 }
 
-/* From one keyframe to another. */
+/* A motion from one keyframe to another. */
 struct passage {
 	mat4 turn, from, to;
 	vec3 axis, begin, end;
@@ -96,7 +96,7 @@ static void test_between_two(void **state)
 	}
 }
 
-/* The keyframes of one passage and of another that begins where it ends; before and after them nothing moves. */
+/* Nine keyframes of one motion; before the first and after the last, nothing moves. */
 static void test_many(void **state)
 {
 	(void)state;
@@ -104,7 +104,7 @@ static void test_many(void **state)
 	for (size_t n = dice_count(500); n > 0; n--) {
 		const struct passage p = passage_of(&d);
 		struct keyframe key[9];
-		for (int i = 0; i < 9; i++) /* not at equal distances */
+		for (int i = 0; i < 9; i++) /* at unequal distances */
 			key[i] = (struct keyframe){i * (i + 1) / 72.0, expected(&p, i * (i + 1) / 72.0)};
 		const struct animation a = {9, key};
 		struct motion_key room[9];
@@ -118,7 +118,7 @@ static void test_many(void **state)
 	}
 }
 
-/* Only what happens while the shutter is open counts, and an open shutter is one that is open for some time. */
+/* Only motion while the shutter is open counts, and a shutter counts as open only if it is open for some time. */
 static void test_when_it_moves(void **state)
 {
 	(void)state;

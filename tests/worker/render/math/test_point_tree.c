@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Points within a distance, against looking at every one of them. */
+/* Points within a distance, against a search through all points. */
 #include "worker/render/math/point_tree.h"
 #include "worker/render/math/rng.h"
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The colour matching functions and the wavelengths drawn by them: published sums, the density against the shares of
- * wavelengths that fall below given ones, XYZ without bias for 4 and for fewer wavelengths, means and weights against
- * sums written down once more. The draws are seeded.
+ * The colour matching functions and the wavelengths sampled from them: published sums, the density against the shares
+ * of wavelengths below given ones, unbiased XYZ for four wavelengths and fewer, and means and weights against sums
+ * computed independently. The draws are seeded.
  */
 #include "common/base/color.h"
 #include "worker/render/math/cie.h"
@@ -17,7 +17,7 @@
 
 #include <cmocka.h>
 
-/* The sums that the publishers give for checking. */
+/* The sums that the publishers give as a check. */
 static void test_published_sums(void **state)
 {
 	(void)state;
@@ -36,8 +36,8 @@ static void test_published_sums(void **state)
 	assert_true(cie_d65[560 - CIE_FIRST_NM] == 100);
 }
 
-/* The density's shape at a tabulated wavelength: the sum of the magnitudes of the matching functions of linear Rec.
- * 709. */
+/* Returns the unnormalised density at a tabulated wavelength: the sum of the magnitudes of the matching functions of
+ * linear Rec. 709. */
 static double curve(int i)
 {
 	double rgb[3];
@@ -45,7 +45,8 @@ static double curve(int i)
 	return fabs(rgb[0]) + fabs(rgb[1]) + fabs(rgb[2]);
 }
 
-/* What share of wavelengths lies below nm: the density over whole cells of 1 nm, each by the trapezoid rule. */
+/* Returns the share of wavelengths below nm: the integral of the density over whole cells of 1 nm, by the trapezoid
+ * rule. */
 static double share_below(double nm)
 {
 	double total = 0, below = 0;
@@ -60,7 +61,7 @@ static double share_below(double nm)
 static const double hard_us[] = {0, 0x1p-53, 1e-4, 0.1, 0.25, 0.5 - 0x1p-54, 0.5, 0.75, 0.9, 1 - 0x1p-53};
 enum { HARD_US = sizeof hard_us / sizeof *hard_us };
 
-/* Each lane lies where the shares below are a quarter apart, and the hero where the share is u. */
+/* The shares below the four wavelengths are a quarter apart, and the share below the hero wavelength is u. */
 static void test_wavelengths_in_range_and_apart(void **state)
 {
 	(void)state;
@@ -93,8 +94,8 @@ static void test_density_of_wavelengths(void **state)
 	assert_true(wavelength_pdf(WAVELENGTH_MAX) > 0.05 / (CIE_COUNT - 1));
 }
 
-/* What the density is for: the relative variance of the three channels of one white splat. Uniform wavelengths would
- * have 0.61, 0.17, 0.67. */
+/* The purpose of the density: the relative variance of the three channels of one white splat is small. Uniform
+ * wavelengths would have 0.61, 0.17, 0.67. */
 static void test_white_has_little_colour_noise(void **state)
 {
 	(void)state;
@@ -144,7 +145,7 @@ static void test_few_wavelengths(void **state)
 	}
 }
 
-/* The mean over u by the midpoint rule. */
+/* The mean over u, by the midpoint rule, is the colour itself. */
 static void unbiased_of(unsigned count)
 {
 	enum { N = 40000 };
@@ -176,7 +177,8 @@ static void test_xyz_is_unbiased(void **state)
 	unbiased_of(1);
 }
 
-/* X + Y + Z in one step, for lanes that are wavelengths and for R, G and B, whose fourth lane does not count. */
+/* X + Y + Z in one step, for lanes that are wavelengths and for lanes that are R, G and B, where the fourth lane does
+ * not count. */
 static void test_intensity_weights(void **state)
 {
 	(void)state;
@@ -195,8 +197,8 @@ static void test_intensity_weights(void **state)
 	}
 }
 
-/* Of lanes whose sum is beyond the largest double, too; and to the bit what the sum's quarter is, where that is finite.
- */
+/* The mean of lanes, also if their sum exceeds the largest double; where the sum is finite, the mean is a quarter of
+ * it, bit by bit. */
 static void test_mean(void **state)
 {
 	(void)state;

@@ -44,7 +44,7 @@ static void test_counts(void **state)
 	assert_true(stats_counts_p((const uint64_t[]){100, 1}, (const double[]){101, 0}, 2) == 0);
 }
 
-/* p-values of a true hypothesis are uniform: 2,000 of them in tenths, at level 1e-6. */
+/* p-values under a true hypothesis are uniform: 2,000 of them in ten bins, at level 1e-6. */
 static void test_p_values_are_uniform(void **state)
 {
 	(void)state;
