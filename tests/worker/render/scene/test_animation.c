@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* <animation>: what it is read as, and what is refused. */
+/* <animation>: the transform or motion that the reader makes of it, and invalid animations, which are refused with a
+ * message. */
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_tables.h"
 #include "worker/render/scene/scene.h"
@@ -38,7 +39,8 @@ static void refuses(const char *xml, const char *sentence)
 		fail_msg("%s\n  gave %d: %s\n  not: %s", xml, rc, e.text, sentence);
 }
 
-/* What does not move is where it stands; what does is there for the lenient, at its first place. */
+/* An animation without motion becomes a transform; unsupported motion is reduced to its first transform with
+ * `lenient`. */
 static void test_animations(void **state)
 {
 	(void)state;
@@ -85,7 +87,7 @@ static void test_animations(void **state)
 
 #define S "<scene version='3.0.0'>"
 #define END "</scene>"
-/* A shape that moves on from where it is at time 0. */
+/* A shape that moves from its position at time 0. */
 #define MOVING(type, later, inside) \
 	"<shape type='" type "'><animation name='to_world'><transform time='0'/>" later "</animation>" inside "</shape>"
 #define LATER(time, scale) "<transform time='" time "'><scale value='" scale "'/></transform>"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Every bad input is answered with an error that names the place, and what would be right where that is known. */
+/* Every bad input gives an error that names the place and, where it is known, the correct input. */
 #include "common/base/mem.h"
 #include "tests/support/failing_memory.h"
 #include "tests/support/memory_assets.h"
@@ -79,7 +79,7 @@ static void test_entity_bomb(void **state)
 	refuses("<!DOCTYPE scene SYSTEM 'file:///etc/passwd' []><scene version='3.0.0'/>", "<!DOCTYPE>");
 }
 
-/* The same with parameters: each twice the one before. */
+/* Like the entity bomb, but with parameters: each value contains the one before it twice. */
 static void test_parameter_bomb(void **state)
 {
 	(void)state;
@@ -106,7 +106,7 @@ static void test_deep_nesting(void **state)
 	for (int i = 4999; i >= 0; i--)
 		p += sprintf(p, "<bsdf type='twosided' id='m%d'><ref id='m%d'/></bsdf>", i, i + 1);
 	sprintf(p, END);
-	assert_int_equal(read_text(xml, NULL), 0); /* each is made when those it refers to are there */
+	assert_int_equal(read_text(xml, NULL), 0); /* each object is built after the one that it refers to */
 	p = xml;
 	p += sprintf(p, S);
 	for (int i = 0; i < 100000; i++)
@@ -115,7 +115,7 @@ static void test_deep_nesting(void **state)
 	refuses(xml, "objects refer to each other more than 64 deep");
 }
 
-/* Files that objects include count on. */
+/* The limit on nesting counts across included files, from the object that includes them. */
 static void test_deep_nesting_by_files(void **state)
 {
 	(void)state;
@@ -204,11 +204,11 @@ static void test_unknown_names(void **state)
 	refuses(BSDF("<string name='distribution' value='beckman'/>"),
 		"did you mean `beckmann`? (supported: beckmann, ggx)");
 	refuses(BSDF("<flaot name='alpha' value='1'/>"), "did you mean `float`?");
-	/* what is quoted and cut stays UTF-8: 63 letters and half of one */
+	/* text that is quoted and truncated stays UTF-8: 63 letters and half of one */
 	refuses(S "<bsdf type='" SIXTY "xxx\xc3\xa4'/>" END, "<bsdf type=\"" SIXTY "xxx?\">: there is no bsdf");
 }
 
-/* A file outside the scene's folder is called as its author calls it. */
+/* A file outside the scene's folder is named as the scene's author wrote it. */
 static void test_places_outside(void **state)
 {
 	(void)state;
@@ -292,7 +292,7 @@ static void test_bad_transforms(void **state)
 	refuses(SHAPE("<lookat origin='1e154 0 0' target='0 0 0' up='0 1 0'/>"), "origin=1e+154 is outside");
 }
 
-/* Named where it stands: an instance of a good shape is the one that is at fault. */
+/* The error names the shape that is flat: for an instance of a good shape, the instance. */
 static void test_flat_shapes(void **state)
 {
 	(void)state;
@@ -338,7 +338,7 @@ static void test_bad_references(void **state)
 	refuses(S "<bsdf type='diffuse'><bsdf type='diffuse' name='nested'/></bsdf>" END, "has no `nested`");
 }
 
-/* Every name without a value is said, where it is met first. */
+/* Every name without a value is reported once, where it appears first. */
 static void test_names_without_values(void **state)
 {
 	(void)state;
@@ -363,7 +363,7 @@ static void test_names_without_values(void **state)
 	scene_fini(&s);
 }
 
-/* A medium is complained of where it is made, not wherever it is used. */
+/* An error in a medium is reported where the medium is defined, not wherever it is used. */
 static void test_media_are_told_once(void **state)
 {
 	(void)state;
@@ -381,7 +381,7 @@ static void test_media_are_told_once(void **state)
 	scene_fini(&s);
 }
 
-/* A shape has one on each side, a camera may be in one, and an emitter need not say. */
+/* A shape may have a medium on each side, a camera may be in one, and an emitter need not state one. */
 static void test_media(void **state)
 {
 	(void)state;
@@ -413,7 +413,7 @@ static void test_media(void **state)
 		"a second phase in <medium type=\"homogeneous\">, which may have one");
 }
 
-/* What a fork's parameter is taken for is in test_scene.c. */
+/* test_scene.c tests which parameters count as those of a fork. */
 static void test_misplaced_parameters(void **state)
 {
 	(void)state;
@@ -496,7 +496,7 @@ static void test_bad_films(void **state)
 #undef FILM
 }
 
-/* Every allocation fails once; nothing may leak (the sanitizers see it), crash, or pass for a success. */
+/* Each allocation fails once; nothing may leak (the sanitizers would see it), crash, or look like success. */
 static void test_memory_runs_out(void **state)
 {
 	(void)state;
@@ -523,7 +523,7 @@ static void test_memory_runs_out(void **state)
 	assert_true(n > 5);
 }
 
-/* Files that are not there count, each once; those that are do not. */
+/* Each missing file counts as a problem, once; existing files do not. */
 static void test_missing_files_count(void **state)
 {
 	(void)state;

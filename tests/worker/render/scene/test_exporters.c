@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Scenes as exporters write them, with the parameters that they write by default (tests/scenes/exporters): each is read
- * without a problem. By the exporters' sources; tests/corpus/README.md.
+ * Scenes in the form in which exporters write them, with the parameters that they write by default
+ * (tests/scenes/exporters): each is read without a problem. Taken from the exporters' sources; see
+ * tests/corpus/README.md.
  */
 #include "tests/support/memory_assets.h"
 #include "worker/render/render.h"
@@ -33,7 +34,8 @@ static void test_are_read(void **state)
 	}
 }
 
-/* What Mitsuba allows in <scene> beside the version, and what editors of XML add there; also in included files. */
+/* Attributes of <scene> besides the version: those that Mitsuba allows and those that XML editors add, also in
+ * included files. */
 static void test_roots(void **state)
 {
 	(void)state;
@@ -61,7 +63,7 @@ static void test_roots(void **state)
 	}
 }
 
-/* What Mitsuba 3's reader of XML lets pass, and a letter too many, which gets a note. */
+/* Malformed XML that Mitsuba 3's reader accepts; a stray letter gets a note. */
 static void test_loose_xml(void **state)
 {
 	(void)state;
@@ -94,7 +96,7 @@ static void test_loose_xml(void **state)
 	}
 }
 
-/* The note names the file, which may be an included one, once. */
+/* The note about several root elements names the file, which may be an included one, once. */
 static void test_more_than_one_element(void **state)
 {
 	(void)state;

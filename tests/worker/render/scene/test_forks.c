@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Parameters that nobody knows: those that forks of Mitsuba add are ignored with a note, and mistakes are refused. */
+/* Unknown parameters: those that forks of Mitsuba add are ignored with a note, and mistakes are refused. */
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_parts.h"
 #include "worker/render/render.h"
@@ -22,7 +22,7 @@ static int read_scene(const char *body, struct scene *s, struct error *e)
 	return scene_read(s, &assets, "s.xml", render_plugins(), NULL, 0, e);
 }
 
-/* In objects of all classes, and directly in <scene>. */
+/* Parameters of forks in objects of all classes, and directly in <scene>. */
 static void test_ignored_everywhere(void **state)
 {
 	(void)state;
@@ -53,7 +53,8 @@ static void test_ignored_everywhere(void **state)
 #undef GUIDED
 }
 
-/* A name that may be meant for something, of the plug-in or of another one, and objects, which are visible. */
+/* Mistakes: a name that resembles a parameter of this plug-in or of another one; and objects, which affect the image.
+ */
 static void test_mistakes(void **state)
 {
 	(void)state;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What leniency puts in the place of what is not supported: every stand-in is a plug-in of its class that there is. */
+/* The stand-ins of lenient reading: every unsupported plug-in is replaced by one of its class that exists, and its
+ * values by those that the stand-in has. Expected results are written out by hand. */
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_parts.h"
 #include "tests/worker/render/bsdf/bsdf_cases.h"
@@ -53,7 +54,7 @@ static void test_stand_ins(void **state)
 		assert_non_null(d);
 		assert_string_equal(d->type, stand_in);
 		assert_null(plugin_find(render_plugins(), expected[i].cls,
-					expected[i].type)); /* or no stand-in is needed */
+					expected[i].type)); /* or the type needs no stand-in */
 	}
 }
 
@@ -79,7 +80,7 @@ static struct scene read_leniently(const char *xml)
 	return s;
 }
 
-/* OpenPBR's shares by the names that `principled` has for them; what it has no name for goes. */
+/* OpenPBR's weights become the parameters of `principled` with the same meaning; others are dropped. */
 static void test_openpbr(void **state)
 {
 	(void)state;
@@ -106,7 +107,8 @@ static void test_openpbr(void **state)
 	scene_fini(&s);
 }
 
-/* By what the element says: the format of a shape's file, the camera in a sensor's name, a material's parameters. */
+/* The stand-in follows from the element: the format of a shape's file, the camera in a sensor's name, a material's
+ * parameters. */
 static void test_likely_stand_ins(void **state)
 {
 	(void)state;
@@ -155,7 +157,7 @@ static void test_likely_stand_ins(void **state)
 	scene_fini(&s);
 }
 
-/* What refers to a subsurface or a field that is left out goes without it. */
+/* Objects that refer to a subsurface or a field that is left out do without it. */
 static void test_absent_by_reference(void **state)
 {
 	(void)state;
@@ -171,7 +173,8 @@ static void test_absent_by_reference(void **state)
 	scene_fini(&s);
 }
 
-/* Textures around others give way to the first inside; without one they are left out, as fields are. */
+/* Unsupported textures around others are replaced by the first texture inside; without one they are left out, as
+ * fields are. */
 static void test_textures_around_others(void **state)
 {
 	(void)state;
@@ -206,7 +209,7 @@ static void test_textures_around_others(void **state)
 	scene_fini(&strict);
 }
 
-/* A portal is no emitter that the scene has, and nobody needs to be lenient. */
+/* A portal is not an emitter of the scene, and is ignored even without `lenient`. */
 static void test_portals(void **state)
 {
 	(void)state;
@@ -224,7 +227,8 @@ static void test_portals(void **state)
 	scene_fini(&s);
 }
 
-/* Covers go where they are not supported, and only there: what bsdf_create says of the same node. */
+/* Unsupported coverings of materials are removed, and supported ones are kept: in agreement with bsdf_create() for
+ * the same node. */
 static void test_covers(void **state)
 {
 	(void)state;
@@ -283,7 +287,8 @@ static void test_lost_measurements(void **state)
 	scene_fini(&s);
 }
 
-/* Textures whose file is missing, or whose plug-in is unknown: what holds one and is nothing without it goes, too. */
+/* Textures with a missing file or an unknown plug-in: an object that is useless without its texture is removed as
+ * well. */
 static void test_lost_textures(void **state)
 {
 	(void)state;
@@ -303,7 +308,7 @@ static void test_lost_textures(void **state)
 	const struct asset_source assets = memory_assets(files);
 	struct scene s;
 	struct error e;
-	/* Whoever is strict keeps it, and its maker reports that there is no file. */
+	/* Strict reading keeps the texture; building it reports the missing file. */
 	assert_int_equal(scene_read_all(&s, &assets, "s.xml", render_plugins(), NULL, 0, false, &e), 0);
 	assert_int_equal(s.problem_count, 1); /* `nowhere` */
 	assert_string_equal(scene_named(&s, "lost")->type, "bitmap");
@@ -320,8 +325,8 @@ static void test_lost_textures(void **state)
 		textures += strcmp(type, "bitmap") == 0;
 		emitters += strcmp(type, "envmap") == 0;
 	}
-	/* The bump's conductor; `plain` three times, and `scaled`; what has its file. An environment has no
-	 * replacement. */
+	/* The conductor of the bump map; `plain` three times, and `scaled`; the mask and the texture whose file
+	 * exists. An environment map has no stand-in. */
 	assert_int_equal(conductors, 1);
 	assert_int_equal(diffuse, 4);
 	assert_int_equal(masks, 1);
@@ -338,7 +343,7 @@ static void test_lost_textures(void **state)
 	scene_fini(&s);
 }
 
-/* A light of another kind in a shape shines with its radiance; elsewhere it is left out. */
+/* An unsupported light in a shape becomes an area light with the same radiance; elsewhere it is left out. */
 static void test_lights_in_shapes(void **state)
 {
 	(void)state;
@@ -367,8 +372,8 @@ static void test_lights_in_shapes(void **state)
 	scene_fini(&s);
 }
 
-/* A volume that names its value otherwise has none: it goes, and the medium that needs it. In 3.x there is a default.
- */
+/* A volume whose value has a wrong name has no value: the volume is left out, and the medium that needs it. In 3.x
+ * the value has a default. */
 static void test_volumes_without_a_value(void **state)
 {
 	(void)state;
@@ -381,10 +386,10 @@ static void test_volumes_without_a_value(void **state)
 	const struct asset_source assets = memory_assets(files);
 	struct scene s;
 	struct error e;
-	assert_int_equal(scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e), 0); /* its maker refuses it */
+	assert_int_equal(scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e), 0); /* building it fails */
 	scene_fini(&s);
 	assert_int_equal(scene_read_lenient(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e), 0);
-	assert_int_equal(s.object_count, 2); /* and the sky */
+	assert_int_equal(s.object_count, 2); /* the sphere and the default sky */
 	assert_null(node_ref(s.objects[0], "interior"));
 	assert_true(scene_has_note(&s, "s.xml:4: <volume type=\"constvolume\"> has no `value`: left out (lenient)"));
 	assert_true(scene_has_note(
@@ -398,8 +403,8 @@ static void test_volumes_without_a_value(void **state)
 	scene_fini(&s);
 }
 
-/* Names of 0.6 in a file of 3.x are read, whatever has them; strictly they are refused. What a plug-in that is replaced
- * means by a value is not known, so one that the replacement cannot have goes. */
+/* Names of 0.6 in a file of 3.x are read in lenient mode, in any object, and refused in strict mode. A value of an
+ * unsupported plug-in may have another meaning, so one that is invalid for the stand-in is dropped. */
 static void test_names_and_values_of_others(void **state)
 {
 	(void)state;
@@ -437,7 +442,8 @@ static void test_names_and_values_of_others(void **state)
 	scene_fini(&s);
 }
 
-/* What a plug-in that is replaced says twice, or has twice, is no mistake; of layers, the stand-in is not the glass. */
+/* A parameter or object given twice to an unsupported plug-in is no mistake; of several layers, the stand-in is not
+ * the glass. */
 static void test_more_than_the_stand_in_has(void **state)
 {
 	(void)state;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Valid files, damaged at random (fixed seed): the readers answer with a result that holds what it promises, or with an
- * error that says something. Run under the sanitizers this is a small fuzzer; tests/fuzz has the large ones.
+ * Valid files, damaged at random (fixed seed): the readers return either a consistent result or an error with a
+ * message. Under the sanitizers this is a small fuzzer; tests/fuzz has the large ones.
  */
 #include "tests/support/memory_assets.h"
 #include "tests/support/sample_images.h"
@@ -24,7 +24,8 @@ static size_t index_below(double u, size_t n)
 	return (size_t)(u * (double)n);
 }
 
-/* One to four of: a bit turned, a byte replaced, a stretch removed or repeated, the end cut off. */
+/* Writes a damaged copy with one to four changes: a bit flipped, a byte replaced, a range removed or repeated, the
+ * end cut off. */
 static size_t damage(unsigned char *out, const unsigned char *in, size_t size, uint64_t index)
 {
 	memcpy(out, in, size);
@@ -71,7 +72,7 @@ static void check_geometry(const struct shape_geometry *g)
 			assert_true(isfinite(m->position[i][k]) && (!m->normal || isfinite(m->normal[i][k])));
 }
 
-/* How many of the variants were read as a scene with all its shapes and settings. */
+/* Returns the number of variants that were read as a scene with all its shapes and settings. */
 static int read_scene(const struct memory_file *files)
 {
 	struct asset_source assets = memory_assets(files);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Scenes that are short to write and enormous or endless to follow: ladders whose rungs refer twice to the one below,
- * chains of references, files that include each other. Each is refused with file, line and element, and at once: what
- * the limits count is found while reading, without following a reference twice.
+ * Scenes that are short to write and enormous or endless to expand: ladders whose rungs refer twice to the one below,
+ * chains of references, files that include each other. Each is refused with file, line and element, and at once: the
+ * limits count while reading, without following a reference twice.
  */
 #include "common/base/mem.h"
 #include "tests/support/append.h"
@@ -32,7 +32,7 @@ static int read_files(const struct memory_file *files, struct error *e)
 	return r;
 }
 
-/* What was put, read; sentence NULL: it must be accepted. */
+/* Reads the scene built with put(). sentence: part of the expected error; NULL: the scene must be accepted. */
 static void expect(const char *sentence)
 {
 	const struct memory_file files[] = {{"s.xml", xml, used}, {0}};
@@ -42,8 +42,8 @@ static void expect(const char *sentence)
 		fail_msg("%.300s\n gave %d: %s\n not: %s", xml, r, e.text, sentence ? sentence : "a scene");
 }
 
-/* Objects m0, m1, ... m<rungs>, a line each from line 2 on: the first is `leaf`, each other holds the one before
- * `times` times. The end of the scene is left to the caller. */
+/* Writes objects m0, m1, ... m<rungs>, one per line from line 2 on: m0 is `leaf`, each other one contains its
+ * predecessor `times` times. The caller closes the scene. */
 static void nest_elements(const char *element, const char *type, const char *leaf, int rungs, int times,
 			  const char *more)
 {
@@ -62,7 +62,7 @@ static void test_ladders(void **state)
 	(void)state;
 	static const struct {
 		const char *element, *type, *leaf, *more;
-		int allowed; /* rungs */
+		int allowed; /* largest accepted number of rungs */
 		const char *sentence;
 	} all[] = {
 		/* 2^(n+1) - 1 objects in n rungs */
@@ -70,7 +70,7 @@ static void test_ladders(void **state)
 		{"bsdf", "twosided", "diffuse", "", 15, "s.xml:18: <ref>: makes a bsdf of more than 65536 objects"},
 		{"bsdf", "mixturebsdf", "diffuse", "<string name='weights' value='.5,.5'/>", 15,
 		 "s.xml:18: <ref>: makes a bsdf of more than 65536 objects"},
-		/* each rung stands in the scene, too: 2^(n+2) - n - 3 objects */
+		/* each rung is also an object of the scene: 2^(n+2) - n - 3 objects */
 		{"shape", "merge", "cube", "", 24,
 		 "s.xml:27: <shape type=\"merge\">: the scene has more than 67108864"},
 	};
@@ -86,7 +86,7 @@ static void test_ladders(void **state)
 	}
 }
 
-/* Instances of a group count with all that is in it. */
+/* An instance counts with all objects in its group. */
 static void test_instances(void **state)
 {
 	(void)state;
@@ -98,7 +98,7 @@ static void test_instances(void **state)
 	expect("<shape type=\"instance\">: the scene has more than 67108864 objects");
 }
 
-/* A material that many shapes take is made once, and counted once. */
+/* A material shared by many shapes is built once and counts once. */
 static void test_shared_materials(void **state)
 {
 	(void)state;
@@ -107,7 +107,7 @@ static void test_shared_materials(void **state)
 		put("<shape type='cube'><ref id='m14'/></shape>\n");
 	put("</scene>");
 	expect(NULL);
-	/* but each of these is another one: 2048 * 32768 and more */
+	/* but nested materials count for each shape: 2048 * 32768 and more */
 	nest_elements("bsdf", "blendbsdf", "diffuse", 14, 2, "");
 	for (int i = 0; i < 2048; i++)
 		put("<shape type='cube'><bsdf type='mask'><ref id='m14'/></bsdf></shape>\n");
@@ -140,7 +140,7 @@ static void test_chains(void **state)
 	}
 }
 
-/* However long the chain is, and although each object in it is also read by itself. */
+/* Expects one problem, however long the chain is, and although each object in it is also read by itself. */
 static void expect_one(const char *sentence)
 {
 	const struct memory_file files[] = {{"s.xml", xml, used}, {0}};
@@ -169,7 +169,8 @@ static void test_limits_are_told_once(void **state)
 		put("<shape type='merge'><ref id='m25'/></shape>\n");
 	put("</scene>");
 	expect_one("the scene has more than 67108864 objects");
-	/* each refers to the next, the last within the limit twice to that beyond: the first leads to all others */
+	/* each object refers to the next, the last within the limit twice to the first beyond it; the first object
+	 * leads to all others */
 	used = 0;
 	put("<scene version='3.0.0'>\n");
 	for (int i = 0; i < 1000; i++)
@@ -179,7 +180,7 @@ static void test_limits_are_told_once(void **state)
 	expect_one("s.xml:66: <shape type=\"merge\">: objects refer to each other more than 64 deep");
 }
 
-/* The deepest that is accepted can be built and forgotten: what follows references recurses. */
+/* The deepest accepted scene can be built and freed, although the functions that follow references recurse. */
 static void test_the_deepest_is_built(void **state)
 {
 	(void)state;
@@ -200,7 +201,7 @@ static void test_the_deepest_is_built(void **state)
 		fail_msg("%s", e.text);
 }
 
-/* Each file includes the next twice; each includes itself. */
+/* Files include the next one forty times; then the last file includes itself. */
 static void test_includes(void **state)
 {
 	(void)state;
@@ -225,7 +226,7 @@ static void test_includes(void **state)
 	assert_non_null(strstr(e.text, "9.xml:2: <include>: files include each other more than 15 deep"));
 }
 
-/* Files one inside the other, each the only one that the one before includes: as deep as in Mitsuba 3, no deeper. */
+/* A chain of files, each of which includes only the next one: as deep as in Mitsuba 3, no deeper. */
 static void test_includes_in_a_row(void **state)
 {
 	(void)state;
@@ -248,8 +249,8 @@ static void test_includes_in_a_row(void **state)
 	}
 }
 
-/* Included as often as allowed, a file of blanks would keep its reader busy for minutes. Six are too many; in a comment
- * blanks are read faster. */
+/* Included as often as the number of files allows, a file of blanks would keep the reader busy for minutes. Six
+ * inclusions exceed the limit on bytes; blanks within a comment are read faster. */
 static void test_bytes_included(void **state)
 {
 	(void)state;
@@ -272,7 +273,7 @@ static void test_bytes_included(void **state)
 	mem_free(blanks);
 }
 
-/* A long spectrum to which many refer: one of many blanks, and one of many parts. */
+/* A long spectrum with many references: one with many blanks, and one with many parts. */
 static void test_long_spectra(void **state)
 {
 	(void)state;
@@ -292,7 +293,7 @@ static void test_long_spectra(void **state)
 	}
 }
 
-/* A file that misses as many names as it has ids: to compare each with each would take hours. */
+/* A file with as many missing names as ids: comparing each name with each id for suggestions would take hours. */
 static void test_many_missing_names(void **state)
 {
 	(void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Nodes compared with each other, and by what name a user is told of one. */
+/* Comparison of nodes, and the names by which error messages refer to them. */
 #include "common/base/text.h"
 #include "tests/support/memory_assets.h"
 #include "worker/render/render.h"
@@ -12,7 +12,7 @@
 
 #include <cmocka.h>
 
-/* Objects that say the same, and with one word changed. */
+/* Equal objects, and the same objects with one word changed. */
 static void test_same_objects(void **state)
 {
 	(void)state;
@@ -64,7 +64,7 @@ static void test_same_objects(void **state)
 	}
 }
 
-/* Of a long name the end is told, which differs between the files of a scene. */
+/* A long name is shortened to its end, which differs between the files of a scene. */
 static void test_places(void **state)
 {
 	(void)state;
@@ -77,7 +77,7 @@ static void test_places(void **state)
 	n.file = "0123456789/0123456789/0123456789/0123456789/lamps.xml";
 	assert_string_equal(node_title(&n, text),
 			    "`lamp` (...56789/0123456789/0123456789/0123456789/lamps.xml:2147483647)");
-	/* whole characters, wherever names are cut: JSON and the wire take nothing else */
+	/* names are cut between whole characters: JSON and the wire format take valid UTF-8 only */
 	static const char e[] =
 		"\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9"
 		"\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9\u00e9";

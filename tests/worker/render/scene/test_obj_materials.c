@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* OBJ shapes of 0.6 whose file names materials: which BSDF the faces of each get, from the scene or from the .mtl. */
+/* OBJ shapes of 0.6 whose file names materials: the BSDF of each material's faces, from the scene or from the .mtl
+ * file. */
 #include "tests/support/failing_memory.h"
 #include "tests/support/memory_assets.h"
 #include "worker/render/render.h"
@@ -57,7 +58,7 @@ static const struct scene_node *last_shape(const struct scene *s)
 	return s->objects[i - 1];
 }
 
-/* The scene's only shape is a merge of the two materials that have faces. */
+/* Returns one part of the scene's only shape, a merge of the two materials that have faces. */
 static const struct scene_node *part_of(const struct scene *s, uint32_t index)
 {
 	static const char *const names[] = {"gold leaf", "glass"};
@@ -71,7 +72,7 @@ static const struct scene_node *part_of(const struct scene *s, uint32_t index)
 	return part;
 }
 
-/* -1: it has no BSDF. */
+/* Returns the reflectance of a part's BSDF, or -1 if the part has none. */
 static double reflectance(const struct scene *s, uint32_t index)
 {
 	const struct scene_node *bsdf = node_child(part_of(s, index), PLUGIN_BSDF, 0);
@@ -99,7 +100,7 @@ static void test_named_bsdfs(void **state)
 	check(OBJ(BSDF("name='gold leaf'", "0.25") BSDF("name='glass'", "0.5")), 0.25, 0.5, NULL);
 	check(BSDF("id='a'", "0.125") OBJ("<ref id='a' name='glass'/>" BSDF("name='gold leaf'", "0.25")), 0.25, 0.125,
 	      NULL);
-	/* the last that is for it counts */
+	/* the last BSDF that applies to a material counts */
 	check(OBJ(BSDF("", "0.25") BSDF("name='glass'", "0.5")), 0.25, 0.5, NULL);
 	check(OBJ(BSDF("name='glass'", "0.5") BSDF("", "0.25")), 0.25, 0.25, NULL);
 	check(OBJ(BSDF("name='glass'", "0.5")), -1, 0.5,
@@ -108,7 +109,7 @@ static void test_named_bsdfs(void **state)
 	      "no face of d/m.obj has the material `nothing`: this bsdf is not used");
 }
 
-/* All else in the shape is in each of its parts, and whoever refers to the shape has both. */
+/* Each part has all other properties of the shape, and a reference to the shape includes both parts. */
 static void test_parts_are_whole(void **state)
 {
 	(void)state;
@@ -175,7 +176,7 @@ static void test_left_alone(void **state)
 	(void)state;
 	library = "newmtl glass\nKd 1 1 1\n";
 	left_alone("0.6.0", OBJ(BSDF("", "0.25")));
-	left_alone("0.6.0", OBJ(BSDF("name='bsdf'", "0.25"))); /* no material's name: of all faces */
+	left_alone("0.6.0", OBJ(BSDF("name='bsdf'", "0.25"))); /* not a material's name: for all faces */
 	left_alone("0.6.0", OBJ("<boolean name='loadMaterials' value='false'/>"));
 	left_alone("0.6.0", OBJ("<boolean name='collapse' value='true'/>"));
 	left_alone("0.6.0", OBJ("<string name='material' value='glass'/>" BSDF("", "0.25")));
@@ -187,7 +188,7 @@ static void test_left_alone(void **state)
 	left_alone("0.6.0", OBJ(""));
 }
 
-/* Of the .mtl file: the BSDF of glass. */
+/* Returns the BSDF that the .mtl file `text` gives to the material `glass`. */
 static const struct scene_node *made_of(struct scene *s, const char *text)
 {
 	library = text;
@@ -213,12 +214,12 @@ static void test_libraries(void **state)
 	(void)state;
 	struct scene s;
 	library = "newmtl glass\nKd 1 1 1\n";
-	s = read_ok(OBJ("<emitter type='area'/>")); /* all parts shine */
+	s = read_ok(OBJ("<emitter type='area'/>")); /* all parts emit light */
 	assert_true(node_child(part_of(&s, 0), PLUGIN_EMITTER, 0) && node_child(part_of(&s, 1), PLUGIN_EMITTER, 0));
 	scene_fini(&s);
 	const struct scene_node *b =
 		made_of(&s, "newmtl gold leaf\nKd 1 1 1\n\tnewmtl glass \r\n Kd 0.5 1 0 # sRGB\r\nKs 1 1 1\nNs 5\n");
-	assert_string_equal(b->type, "diffuse"); /* without a model nothing shines */
+	assert_string_equal(b->type, "diffuse"); /* without an illumination model there is no specular reflection */
 	assert_int_equal(b->line, 3);
 	assert_true(is_rgb(b, "reflectance", 0.21404, 1, 0));
 	scene_fini(&s);
@@ -230,7 +231,7 @@ static void test_libraries(void **state)
 	b = made_of(&s, "newmtl glass\nillum 2\nKs 0 0 0\nNs 200\nKd 0\n");
 	assert_string_equal(b->type, "diffuse");
 	scene_fini(&s);
-	b = made_of(&s, "newmtl glass\nKd 1 1 1\nnewmtl glass\nillum 7\n"); /* the last of a name */
+	b = made_of(&s, "newmtl glass\nKd 1 1 1\nnewmtl glass\nillum 7\n"); /* the last definition counts */
 	assert_string_equal(b->type, "dielectric");
 	scene_fini(&s);
 	b = made_of(&s, "newmtl glass\nillum 5\n");
@@ -242,9 +243,9 @@ static void test_libraries(void **state)
 	b = node_child(b, PLUGIN_BSDF, 0);
 	assert_string_equal(b->type, "bumpmap");
 	const struct scene_node *bump = node_child(b, PLUGIN_TEXTURE, 0);
-	assert_string_equal(node_string(bump, "filename", ""), "d/m/wood.png"); /* beside the file that names it */
+	assert_string_equal(node_string(bump, "filename", ""), "d/m/wood.png"); /* in the folder of the .mtl file */
 	assert_true(node_float(bump, "gamma", 0) == 1);
-	assert_true(is_rgb(node_child(b, PLUGIN_BSDF, 0), "reflectance", 1, 1, 1)); /* after the picture */
+	assert_true(is_rgb(node_child(b, PLUGIN_BSDF, 0), "reflectance", 1, 1, 1)); /* Kd comes after the picture */
 	assert_string_equal(s.assets[2], "d/m/wood.png");
 	scene_fini(&s);
 	b = made_of(&s, "newmtl glass\nd 1\nmap_d wood.png\nKd 1 1 1\nmap_Kd wood.png\nmap_Bump wood.png\n");
@@ -299,10 +300,10 @@ static void test_too_many(void **state)
 	struct scene s;
 	struct error e;
 	assert_int_equal(scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e), -E2BIG);
-	assert_non_null(strstr(e.text, "d/m.obj:4099: more than 4096 materials")); /* "" is one */
+	assert_non_null(strstr(e.text, "d/m.obj:4099: more than 4096 materials")); /* the unnamed one counts */
 }
 
-/* Every allocation fails once. */
+/* Each allocation fails once. */
 static void test_memory_runs_out(void **state)
 {
 	(void)state;

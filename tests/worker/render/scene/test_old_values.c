@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What Mitsuba 0.6 accepts and 3 does not: taken with a note from files of 0.6, refused in those of 3.x. And what
- * exporters write by default.
+ * Values that Mitsuba 0.6 accepts and 3 does not: accepted with a note in files of 0.6, refused in files of 3.x. And
+ * the values that exporters write by default.
  */
 #include "tests/support/memory_assets.h"
 #include "worker/render/render.h"
@@ -26,7 +26,7 @@ static int read_scene(struct scene *s, const char *version, const char *content,
 	return scene_read(s, &assets, "s.xml", render_plugins(), NULL, 0, e);
 }
 
-/* note: NULL: there is none. */
+/* note: part of the only note; NULL: there must be none. */
 static struct scene read_old(const char *content, const char *note)
 {
 	struct scene s;
@@ -88,7 +88,7 @@ static void test_reflectances_are_scaled(void **state)
 		"outside [0, 1]");
 }
 
-/* Mitsuba limits these where it uses them; in 0.6 only weights. */
+/* Values that Mitsuba clips when it uses them; in 0.6 only weights. */
 static void test_clipped(void **state)
 {
 	(void)state;
@@ -121,7 +121,7 @@ static void test_clipped(void **state)
 	refuses("3.0.0", MIX("<spectrum name='weight' value='400:0.5, 500:1.5'/>"), "weight=1.5 is outside [0, 1]");
 }
 
-/* What plug-ins of 3.x have and those of 0.6 by the same name have not. */
+/* Parameters that plug-ins have in 3.x and not in 0.6. */
 static void test_newer_names(void **state)
 {
 	(void)state;
@@ -133,7 +133,7 @@ static void test_newer_names(void **state)
 #define FILTER(type, name) "<rfilter type='" type "'><float name='" name "' value='2'/></rfilter>"
 	static const struct {
 		const char *content, *name, *written;
-		bool kept; /* in 0.6 as well */
+		bool kept; /* the parameter exists in 0.6 as well */
 	} cases[] = {
 		{BENT("bumpmap", "scale"), "scale", "scale", false},
 		{BENT("normalmap", "scale"), "scale", "scale", false},
@@ -227,7 +227,7 @@ static void test_unknown_names(void **state)
 	scene_fini(&s);
 	refuses("0.6.0", "<bsdf type='diffuse'><rgb name='reflectence' value='1'/></bsdf>",
 		"did you mean `reflectance`?");
-	/* The parameter of another plug-in is a mistake in 3.x only. */
+	/* In 3.x only, a parameter of another plug-in is a mistake. */
 	s = read_old("<bsdf type='diffuse'><float name='exponent' value='9'/></bsdf>",
 		     "`exponent` is not known and is ignored");
 	scene_fini(&s);
@@ -236,7 +236,7 @@ static void test_unknown_names(void **state)
 		     "`scale` is not known and is ignored");
 	scene_fini(&s);
 	refuses("3.0.0", "<emitter type='constant'><float name='scale' value='2'/></emitter>", "has no `scale`");
-	/* A name that resembles one without effect does no harm. */
+	/* A name that resembles a parameter without effect is harmless. */
 	s = read_old("<emitter type='constant'><float name='samplingWeights' value='2'/></emitter>",
 		     "`samplingWeights` is not known and is ignored");
 	scene_fini(&s);
@@ -247,7 +247,7 @@ static void test_unknown_names(void **state)
 		"there is no spectrum of this type");
 }
 
-/* Mitsuba 0.6 warns of names that nobody asks for, whatever the object's class. */
+/* Mitsuba 0.6 warns of parameters that no plug-in reads, in objects of every class. */
 static void test_unknown_names_of_all_classes(void **state)
 {
 	(void)state;
@@ -265,7 +265,7 @@ static void test_unknown_names_of_all_classes(void **state)
 		struct scene s = read_old(kept[i], "is not known and is ignored");
 		scene_fini(&s);
 	}
-	/* All that is said of samplers and integrators is what of them matters. */
+	/* Samplers and integrators get only the note that says which of their parameters count. */
 	struct scene s = read_old("<integrator type='path'><string name='guidingFile' value='x'/></integrator>",
 				  "is ignored except for");
 	scene_fini(&s);
@@ -274,7 +274,7 @@ static void test_unknown_names_of_all_classes(void **state)
 #undef SENSOR
 }
 
-/* The defaults that the Blender exporter of 0.5 writes for images. */
+/* The default parameters that the Blender exporter of 0.5 writes for images. */
 static void test_labels(void **state)
 {
 	(void)state;
@@ -289,7 +289,7 @@ static void test_labels(void **state)
 	refuses("3.0.0", "<bsdf type='diffuse' id='$x[0]'/>", "$x is not defined");
 }
 
-/* The Blender exporter for 3.x writes a little more than 1. */
+/* The Blender exporter for 3.x writes values slightly above 1. */
 static void test_specular(void **state)
 {
 	(void)state;
@@ -302,7 +302,7 @@ static void test_specular(void **state)
 	refuses("3.0.0", "<bsdf type='principled'><float name='specular' value='9'/></bsdf>", "outside [0, 8]");
 }
 
-/* What is given twice: the last one under a name, and the name that 0.6 has. */
+/* Parameters given twice: the last one with the same name counts, and the name that belongs to 0.6. */
 static void test_given_twice(void **state)
 {
 	(void)state;
@@ -339,13 +339,13 @@ static void test_given_twice(void **state)
 			"<string name='fov_axis' value='x'/></sensor>",
 			"`fov_axis` is given twice (first in line 1)");
 	}
-	/* Two names of 0.6. */
+	/* Two names of 0.6 for the same parameter. */
 	refuses("0.6.0",
 		"<bsdf type='diffuse'><rgb name='reflectance' value='1'/><rgb name='diffuseReflectance' value='1'/></bsdf>",
 		"`reflectance` is given twice");
 }
 
-/* Files of 0.5 and 0.6 without an emitter get the sun and sky that Mitsuba adds; those of 3.x nothing. */
+/* Files of 0.5 and 0.6 without an emitter get the sun and sky that Mitsuba adds; those of 3.x do not. */
 static void test_default_light(void **state)
 {
 	(void)state;
@@ -373,7 +373,7 @@ static void test_default_light(void **state)
 			assert_true(strcmp(s.objects[k]->type, "sunsky") != 0);
 		scene_fini(&s);
 	}
-	s = read_old("<bsdf type='diffuse'/>", NULL); /* a file that others include */
+	s = read_old("<bsdf type='diffuse'/>", NULL); /* a file meant to be included */
 	assert_int_equal(s.object_count, 1);
 	scene_fini(&s);
 	struct error e;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Reflectances above 1: refused with their place, or 1 with a note where `lenient`. */
+/* Reflectances above 1 are refused with their place; with `lenient` they count as 1, with a note. */
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_parts.h"
 #include "worker/render/render.h"
@@ -82,7 +82,7 @@ static void test_values(void **state)
 	scene_fini(&s);
 }
 
-/* What is wrong in another way stays an error, and so do ranges that do not end at 1. */
+/* Values that are invalid in another way stay errors, and so do values beyond ranges that do not end at 1. */
 static void test_still_refused(void **state)
 {
 	(void)state;
@@ -93,7 +93,7 @@ static void test_still_refused(void **state)
 		"is outside [0, 10]");
 }
 
-/* The same texture is a height of 2 and a reflectance of 1. */
+/* The same texture is used as a height of 2 and as a reflectance of 1. */
 static void test_textures(void **state)
 {
 	(void)state;
@@ -146,7 +146,7 @@ static void test_a_texture_is_refused_once(void **state)
 	scene_fini(&s);
 }
 
-/* A scene may have many materials with a texture of many numbers. */
+/* Many materials that share a texture with many numbers share the clipped copy, too. */
 static void test_materials_share_the_copy(void **state)
 {
 	(void)state;
@@ -160,7 +160,7 @@ static void test_materials_share_the_copy(void **state)
 	scene_fini(&s);
 }
 
-/* Mitsuba 0.6 scales reflectances; only what it does not scale is left to leniency. */
+/* Mitsuba 0.6 scales reflectances; `lenient` applies only to values that 0.6 does not scale. */
 static void test_scaled_in_old_files(void **state)
 {
 	(void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The public scenes in the folder that HSLT_SCENES names, with the program's own tables; skipped where it is not set.
- */
+/* Reads the public scenes in the folder HSLT_SCENES with the program's own tables; skipped if the variable is not
+ * set. */
 #include "worker/render/render.h"
 #include "worker/render/shape/shape.h"
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Bump and normal maps that name their picture themselves are those with a raw texture of it. */
+/* Bump and normal maps that name their picture directly equal those that contain a raw texture of it. */
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_parts.h"
 #include "worker/render/render.h"
@@ -67,7 +67,7 @@ static void test_what_it_is_not(void **state)
 	assert_int_equal(read_with(&s, "3.0.0", "twosided", FILENAME("a/n.png"), false, &e), -EINVAL);
 	assert_non_null(strstr(e.text, "has no `filename`"));
 	assert_int_equal(read_with(&s, "3.0.0", "normalmap", "<string name='filename'/>", false, &e), -EINVAL);
-	/* A picture that is lost. */
+	/* A picture whose file is missing. */
 	assert_int_equal(read_with(&s, "3.0.0", "normalmap", FILENAME("lost.png"), true, &e), 0);
 	assert_string_equal(s.objects[0]->type, "conductor");
 	assert_true(scene_has_note(&s, "<bsdf type=\"normalmap\"> has no texture left; the BSDF inside stands in"));

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What the reader makes of the scene language: values and spectra, transforms, defaults and parameters, includes,
- * references and aliases, both dialects (0.6 and 3.x). Unknown or ignored features are noted once, with the place.
- * Names of files are in test_scene_files.c, files that are refused in test_bad_scenes.c.
+ * The scene language: values and spectra, transforms, defaults and parameters, includes, references and aliases, in
+ * both dialects (0.6 and 3.x). Unknown or ignored features are noted once, with their place. File names are tested in
+ * test_scene_files.c, refused files in test_bad_scenes.c.
  */
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_parts.h"
@@ -34,7 +34,7 @@ static struct scene read_ok(const char *xml)
 	return s;
 }
 
-/* The content of one <bsdf type="roughconductor"> or of another element, at the top of a scene. */
+/* Reads a scene with one element around `content`, such as <bsdf type="roughconductor">. */
 static struct scene read_inside(const char *version, const char *begin, const char *content, const char *end)
 {
 	char xml[4096];
@@ -158,14 +158,14 @@ static void test_transforms(void **state)
 	check_transform("<matrix value='1 0 0 10 0 0 1 20 0 -1 0 30 -0 1e-9 0 1.000000238418579'/>", p,
 			(vec3){11, 23, 28});
 	check_transform("<matrix value='0 1 0, 0 0 1, 1 0 0'/>", p, (vec3){2, 3, 1});
-	/* In the order in which they stand. */
+	/* Steps apply in the order in which they are written. */
 	check_transform("<scale value='2'/><translate x='1'/>", p, (vec3){3, 4, 6});
 	check_transform("<translate x='1'/><scale value='2'/>", p, (vec3){4, 4, 6});
 	check_transform("<translate x='1'/><rotate z='1' angle='90'/>", p, (vec3){-2, 2, 3});
 	check_transform("<lookAt origin='0,0,5' target='0,0,4' up='0 1 0'/>", (vec3){0, 0, 1}, (vec3){0, 0, 4});
 	check_transform("<look_at origin='0,0,5' target='0,0,4' up='0 1 0'/>", (vec3){0, 0, 1}, (vec3){0, 0, 4});
 	check_transform("<lookat origin='0,0,5' target='0,0,4' up='0 1 0'/>", (vec3){1, 0, 0}, (vec3){-1, 0, 5});
-	/* Where +y goes without `up`, computed by hand from the documentation of each Mitsuba. */
+	/* The direction of +y without `up`, computed by hand from the documentation of each Mitsuba version. */
 	vec3 y = {0, 1, 0};
 	check_transform("<lookat origin='0,0,5' target='0,0,9'/>", y, (vec3){1, 0, 5});
 	check_transform("<lookat origin='0,0,0' target='3,0,4'/>", y, (vec3){0, -1, 0});
@@ -195,7 +195,7 @@ static void test_dialects(void **state)
 	assert_non_null(strstr(e.text, "did you mean `ext_eta`?"));
 }
 
-/* Each file's names are those of its version; all is meant as in 3.x, which alone reads both. */
+/* Names in each file follow the version of that file; the names of both dialects have the meaning of 3.x. */
 static void test_both_dialects(void **state)
 {
 	(void)state;
@@ -225,7 +225,7 @@ static void test_both_dialects(void **state)
 	files[1] = (struct memory_file){0};
 }
 
-/* A file may hold one object without a <scene> around it, which is an object like others. */
+/* A file may contain one object without a <scene> around it, which is read like any other object. */
 static void test_one_object_in_a_file(void **state)
 {
 	(void)state;
@@ -250,7 +250,7 @@ static void test_capitals_of_types(void **state)
 	scene_fini(&s);
 }
 
-/* What forks of Mitsuba add is said, and has no effect. */
+/* Parameters added by forks of Mitsuba are noted and have no effect. */
 static void test_parameters_of_forks(void **state)
 {
 	(void)state;
@@ -258,7 +258,7 @@ static void test_parameters_of_forks(void **state)
 		"<scene version='3.0.0'>\n<sensor type='perspective'>\n<vector name='min_bounds' value='?'/></sensor>\n"
 		"<shape type='sphere'><integer name='num_parameters' value='5'/></shape>\n"
 		"<shape type='sphere'><integer name='num_parameters' value='5'/></shape>\n</scene>");
-	assert_int_equal(s.note_count, 3); /* and that there is no light */
+	assert_int_equal(s.note_count, 3); /* one of them says that there is no light */
 	assert_string_equal(s.notes[0],
 			    "s.xml:3: <sensor type=\"perspective\">: `min_bounds` is not known and is ignored");
 	assert_string_equal(s.notes[1],
@@ -268,7 +268,7 @@ static void test_parameters_of_forks(void **state)
 	scene_fini(&s);
 }
 
-/* Textures of any name are attributes of a shape in Mitsuba 3, which nobody asks for here. */
+/* In Mitsuba 3, textures of any name are attributes of a shape; nothing in these scenes uses them. */
 static void test_textures_of_shapes(void **state)
 {
 	(void)state;
@@ -293,7 +293,7 @@ static void test_numbers_given_as_colours(void **state)
 	}
 }
 
-/* Where a number is wanted and a texture given, leniency keeps the default. */
+/* If a texture is given for a parameter that must be a number, lenient reading keeps the default. */
 static void test_lenient_numbers(void **state)
 {
 	(void)state;
@@ -395,7 +395,7 @@ static void test_include(void **state)
 	files[1] = (struct memory_file){0};
 }
 
-/* Inside an object, of an object: two files deep, and used twice. */
+/* An <include> inside an object: two files deep, and used twice. */
 static void test_include_in_objects(void **state)
 {
 	(void)state;
@@ -484,14 +484,14 @@ static void test_every_problem_is_told(void **state)
 	for (uint32_t i = 0; i < 3; i++)
 		if (strncmp(s.problems[i], want[i], strlen(want[i])) != 0)
 			fail_msg("problem %u: %s\n not: %s", i, s.problems[i], want[i]);
-	assert_int_equal(s.object_count, 2); /* the cubes, as far as they could be read */
+	assert_int_equal(s.object_count, 2); /* the cubes, with their readable properties */
 	scene_fini(&s);
 	assert_int_equal(scene_read(&s, &assets, "s.xml", scene_tables(), NULL, 0, &e), -EINVAL);
 	assert_non_null(strstr(e.text, want[0]));
 	assert_non_null(strstr(e.text, "(and at least 2 more: hslt-scene check lists all)"));
 }
 
-/* 0.6 has two names for a diffuse surface's colour; 3.x has one. */
+/* 0.6 has two names for the colour of a diffuse surface; 3.x has one. */
 static void test_second_name(void **state)
 {
 	(void)state;
@@ -501,7 +501,7 @@ static void test_second_name(void **state)
 	assert_non_null(node_ref(s.objects[0], "reflectance"));
 	assert_true(node_find(s.objects[1], "reflectance")->value.as.rgb[2] == 0.3);
 	scene_fini(&s);
-	/* A value and a texture: the texture counts there, in both orders. */
+	/* With a value and a texture, the texture counts in 0.6, in either order. */
 	s = read_ok(
 		"<scene version='0.6.0'><bsdf type='diffuse'><texture name='reflectance' type='checkerboard'/>"
 		"<spectrum name='reflectance' value='0.5'/></bsdf><bsdf type='diffuse'>"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The list of a scene's files: each once and in order, under one canonical name however the scene writes it. */
+/* The list of a scene's files: each file once and in order, under one canonical name, however the scene writes it. */
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_tables.h"
 
@@ -43,7 +43,7 @@ static void test_assets_are_sorted_and_unique(void **state)
 	scene_fini(&s);
 }
 
-/* However a file is named, it is one file, and its name has no "..". */
+/* However a file is named, it is one file, whose canonical name has no "..". */
 static void test_asset_names_are_canonical(void **state)
 {
 	(void)state;
@@ -60,7 +60,7 @@ static void test_asset_names_are_canonical(void **state)
 	assert_string_equal(node_string(s.objects[0], "filename", ""), names[0]);
 	assert_string_equal(node_string(s.objects[3], "filename", ""), names[3]);
 	scene_fini(&s);
-	/* a search path outside */
+	/* a search path outside the scene's folder */
 	files[1] = (struct memory_file){"%2e%2e/common/a.obj", "x", 1};
 	s = read_ok("<scene version='3.0.0'><path value='m/../../common/'/>"
 		    "<shape type='obj'><string name='filename' value='a.obj'/></shape></scene>");
@@ -68,7 +68,7 @@ static void test_asset_names_are_canonical(void **state)
 	assert_string_equal(s.assets[0], names[0]);
 	assert_int_equal(s.note_count, 0);
 	scene_fini(&s);
-	/* a name from Windows; one that is there as it is written; one that is not there at all */
+	/* a name from Windows; a name that exists as it is written; and one that does not exist */
 	s = read_ok("<scene version='3.0.0'><path value='m/../../common/'/>"
 		    "<shape type='obj'><string name='filename' value='..\\common\\a.obj'/></shape>"
 		    "<shape type='obj'><string name='filename' value='x\\..\\a.obj'/></shape>"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Film, camera, sampler and integrator of a scene's file: the defaults of both dialects, which sensor is taken, crop
- * windows, what --size overrides, what is honoured, noted or refused by name.
+ * Film, camera, sampler and integrator in a scene file: the defaults of both dialects, the choice of the sensor, crop
+ * windows, the values that --size overrides, and which parameters are used, noted, or refused by name.
  */
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_parts.h"
@@ -29,7 +29,7 @@ static int read_scene(const char *xml, uint32_t width, uint32_t height, struct s
 	return r;
 }
 
-/* before: in <scene>, in the old dialect; content: in <sensor>. */
+/* before: content of <scene>, in the old dialect; content: that of <sensor>. */
 static struct scene_settings read_ok(const char *before, const char *content)
 {
 	char xml[2048];
@@ -66,7 +66,7 @@ static void test_defaults(void **state)
 	assert_int_equal(s.max_depth, 128);
 	assert_string_equal(s.integrator, "");
 	assert_true(s.near_clip == 0.01 && s.far_clip == 1e4);
-	/* 50 mm before 24 x 36 mm */
+	/* 50 mm on a film of 24 x 36 mm */
 	assert_string_equal(s.fov_axis, "diagonal");
 	assert_true(fabs(s.fov - 46.79300334396557) < 1e-12);
 }
@@ -84,7 +84,7 @@ static void test_filters(void **state)
 		{"<rfilter type='tent'/>", FILTER_TENT, 1, 1},
 		{"<rfilter type='box'><float name='radius' value='2.5'/></rfilter>", FILTER_BOX, 2.5, 2},
 		{"<rfilter type='gaussian'><float name='stddev' value='1'/></rfilter>", FILTER_GAUSSIAN, 4, 4},
-		/* In 0.6 these have no radius. */
+		/* In 0.6 these filters have no radius. */
 		{"<rfilter type='tent'><float name='radius' value='2.5'/></rfilter>", FILTER_TENT, 1, 1},
 		{"<rfilter type='gaussian'><float name='radius' value='1.5'/></rfilter>", FILTER_GAUSSIAN, 2, 2},
 	};
@@ -114,7 +114,7 @@ static void test_filters(void **state)
 	}
 }
 
-/* 0.6's film for experiments, whose defaults are one pixel and a box. */
+/* 0.6's film for experiments, with defaults of one pixel and a box filter. */
 static void test_mfilm(void **state)
 {
 	(void)state;
@@ -157,7 +157,7 @@ static void test_sampler_and_integrator(void **state)
 		assert_int_equal(read_ok(before, "").max_depth, depths[i].want);
 		assert_int_equal(read_ok(before, "").roulette_depth, 5);
 	}
-	/* Of several the first that shows light. */
+	/* Of several integrators, the first that renders light. */
 	static const char *const outer[] = {"multichannel", "aov"};
 	for (int i = 0; i < 2; i++) {
 		char xml[512];
@@ -207,7 +207,7 @@ static void test_camera(void **state)
 		for (int j = 0; j < 4; j++)
 			assert_true(fabs(s.to_world.m[i][j] - want[i][j]) < 1e-15);
 	s = read_ok("", "<transform name='toWorld'><scale x='-2' y='2' z='2'/></transform>");
-	assert_true(s.to_world.m[0][0] == -1 && s.to_world.m[1][1] == 1); /* a mirror stays one */
+	assert_true(s.to_world.m[0][0] == -1 && s.to_world.m[1][1] == 1); /* mirroring is kept */
 	for (int unit = 0; unit < 2; unit++) {
 		s = read_ok("", unit ? "<string name='focalLength' value='24mm'/>"
 				     : "<string name='focalLength' value='24'/>");
@@ -215,7 +215,7 @@ static void test_camera(void **state)
 	}
 }
 
-/* The first sensor counts; a note says so. */
+/* The first sensor is used; a note says so. */
 static void test_several_sensors(void **state)
 {
 	(void)state;
@@ -237,7 +237,8 @@ static void test_several_sensors(void **state)
 	scene_fini(&s);
 }
 
-/* Notes name what will be missing in the image, or will be shown although Mitsuba would not. */
+/* The notes say which parts of Mitsuba's image will be missing, and which will appear although Mitsuba does not show
+ * them. */
 static void test_notes_on_the_whole(void **state)
 {
 	(void)state;
@@ -287,7 +288,7 @@ static void test_notes_on_the_whole(void **state)
 	}
 }
 
-/* Mitsuba's image of it is another one. */
+/* Mitsuba's image of a stretched environment differs. */
 static void test_note_on_a_stretched_environment(void **state)
 {
 	(void)state;
@@ -318,7 +319,7 @@ static void test_note_on_a_stretched_environment(void **state)
 	}
 }
 
-/* A sun of another model than Mitsuba 3's is less bright in haze; Mitsuba 0.6 has the same. */
+/* A sun of another model than Mitsuba 3's is darker in haze; Mitsuba 0.6 has the same model. */
 static void test_notes_on_suns(void **state)
 {
 	(void)state;
@@ -343,7 +344,7 @@ static void test_notes_on_suns(void **state)
 	}
 }
 
-/* What Mitsuba 3 takes in <scene> changes no light; other values there are mistakes. */
+/* The values that Mitsuba 3 accepts in <scene> have no effect on light; other values there are mistakes. */
 static void test_values_of_the_scene(void **state)
 {
 	(void)state;
@@ -376,7 +377,7 @@ static void test_values_of_the_scene(void **state)
 	}
 }
 
-/* Where Mitsubas differ about what hidden lamps hide, and only there. */
+/* Only where Mitsuba's versions differ in what hidden lamps occlude. */
 static void test_notes_on_hidden_lamps(void **state)
 {
 	(void)state;
@@ -409,7 +410,7 @@ static void test_notes_on_hidden_lamps(void **state)
 
 #define ONE_EDGE "<integrator type='path'><integer name='max_depth' value='1'/></integrator>"
 
-/* A path of one edge ends at an emitter, which a point is not. */
+/* Paths of one edge end at an emitter that can be hit, which a point light cannot. */
 static void test_notes_on_one_edge(void **state)
 {
 	(void)state;
@@ -453,7 +454,7 @@ static void test_crop(void **state)
 	assert_true(s.crop_x == 10 && s.crop_y == 0 && s.crop_width == 30 && s.crop_height == 60);
 #undef CROP
 #define CROP "<integer name='cropOffsetX' value='0'/><integer name='cropWidth' value='100'/>"
-	assert_int_equal(read_ok("", FILM).crop_width, 0); /* all of it is none */
+	assert_int_equal(read_ok("", FILM).crop_width, 0); /* a crop of the whole film is no crop */
 #undef CROP
 #undef FILM
 	s = read_ok(
@@ -477,7 +478,7 @@ static void test_size_is_overridden(void **state)
 	assert_int_equal(read_scene(xml, 70000, 8, &s, &e), -ERANGE);
 }
 
-/* The camera that Mitsuba 3 makes where a scene has none. */
+/* The camera that Mitsuba 3 adds to a scene without one. */
 static void test_no_sensor(void **state)
 {
 	(void)state;
@@ -487,7 +488,7 @@ static void test_no_sensor(void **state)
 	assert_true(s.unplaced && s.fov == 45 && s.width == 768 && s.height == 576);
 	assert_string_equal(s.fov_axis, "x");
 	assert_int_equal(scene_settings_place(&s, "s.xml", (vec3){0, -1, 3}, (vec3){4, 1, 5}, &e), 0);
-	double distance = 2 / tan(M_PI / 8); /* the 4 units of the nearest side fill the image */
+	double distance = 2 / tan(M_PI / 8); /* the nearest side, 4 units wide, fills the image */
 	assert_true(fabs(s.to_world.m[2][3] - (3 - distance)) < 1e-12);
 	assert_true(s.to_world.m[0][3] == 2 && s.to_world.m[1][3] == 0);
 	assert_true(s.to_world.m[0][0] == 1 && s.to_world.m[1][1] == 1 && s.to_world.m[2][2] == 1);
@@ -521,7 +522,7 @@ static void test_refused(void **state)
 	refuses(SENSOR("<transform name='to_world'><scale z='0'/></transform>"), "may only rotate");
 }
 
-/* Both dialects; everything else as a pinhole has it. */
+/* Thin lenses of both dialects; all other parameters are those of a pinhole camera. */
 static void test_thin_lens(void **state)
 {
 	(void)state;
@@ -540,7 +541,7 @@ static void test_thin_lens(void **state)
 		fail_msg("%s", e.text);
 	/* clang-format on */
 	assert_true(s.aperture_radius == 0.25 && s.focus_distance == 7 && s.fov == 30);
-	/* Focused at the far plane, where nothing is said. */
+	/* Without a focus distance, the lens is focused at the far plane. */
 	if (read_scene(
 		    "<scene version='3.0.0'><sensor type='thinlens'><float name='fov' value='30'/><float name='aperture_radius' value='2'/>"
 		    "<float name='far_clip' value='50'/></sensor></scene>",

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Spectra in all spellings, search paths, and booleans as Python writes them. */
+/* All notations of spectra, search paths, and booleans as Python writes them. */
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_tables.h"
 #include "worker/render/math/cie.h"
@@ -15,7 +15,7 @@
 static const char lines[] = "# measured\r\n400 0.5\r\n500\t0.25\n  600 1e-1 \n";
 static struct scene scene;
 
-/* The value of `eta` in a scene with this content; -D and files as below. */
+/* Returns the value of `eta` in a scene with this content, with the parameters and files below. */
 static const struct value *eta_of(const char *version, const char *content)
 {
 	static char xml[2048];
@@ -53,11 +53,11 @@ static void test_files(void **state)
 	assert_int_equal(scene.asset_count, 1);
 	assert_string_equal(scene.assets[0], "a.spd");
 	scene_fini(&scene);
-	/* Once for all that name it. */
+	/* Parameters that name the same file share its values. */
 	v = eta_of("3.0.0", "<spectrum name='eta' filename='a.spd'/><spectrum name='k' filename='a.spd'/>");
 	assert_ptr_equal(v->as.spectrum.value, node_find(scene.objects[0], "k")->value.as.spectrum.value);
 	scene_fini(&scene);
-	/* Found in the second folder, and known by that name from then on. */
+	/* The file is found in the second folder and keeps this canonical name. */
 	v = eta_of("0.6.0", "<spectrum name='eta' filename='b.spd'/>");
 	assert_true(value_at(v, 500) == 0.25);
 	assert_string_equal(scene.assets[0], "spectra/b.spd");
@@ -93,7 +93,7 @@ static void test_types(void **state)
 	assert_true(v->type == VALUE_RGB && v->as.rgb[1] == 0.25);
 	scene_fini(&scene);
 	v = eta_of("3.0.0", "<spectrum name='eta' type='d65'><float name='scale' value='3'/></spectrum>");
-	double y = 0, one = 0; /* luminance 3, as an rgb colour of 3 has it */
+	double y = 0, one = 0; /* luminance 3, as for an RGB colour of 3 */
 	for (int i = 0; i < CIE_COUNT; i++) {
 		y += value_at(v, CIE_FIRST_NM + i) * cie_observer[i][1];
 		one += cie_observer[i][1];
@@ -106,7 +106,7 @@ static void test_types(void **state)
 	scene_fini(&scene);
 }
 
-/* In 3.x a spectrum is a texture of one colour, and may be written so. */
+/* In 3.x, a spectrum is a texture of one colour, and may be written as one. */
 static void test_textures(void **state)
 {
 	(void)state;
@@ -123,7 +123,7 @@ static void test_textures(void **state)
 	scene_fini(&scene);
 }
 
-/* A spectrum with a type is an object, which others may refer to, by an alias as well. */
+/* A spectrum with a type is an object to which others may refer, also by an alias. */
 static void test_references(void **state)
 {
 	(void)state;
@@ -139,10 +139,10 @@ static void test_references(void **state)
 	scene_fini(&scene);
 }
 
-/* Against CIE illuminant A, which is Planck's law at 2848 K with c2 = 1.435e-2 m K: with today's c2 at 2855.5 K;
- * relative to 560 nm its table says 14.708 at 400 nm and 198.261 at 700 nm. And against Stefan and Boltzmann's law in
- * order of magnitude: 5000 K radiate 1.29e4 W / (m^2 sr nm) at 550 nm. The values at 456 and 700 nm are those of
- * Mitsuba 3's tests. */
+/* Against CIE illuminant A, which is Planck's law at 2848 K with c2 = 1.435e-2 m K: at 2855.5 K with today's c2.
+ * Relative to 560 nm its table says 14.708 at 400 nm and 198.261 at 700 nm. And against the Stefan-Boltzmann law in
+ * order of magnitude: 5000 K emit 1.29e4 W / (m^2 sr nm) at 550 nm. The values at 456 and 700 nm are those of Mitsuba
+ * 3's tests. */
 static void test_blackbody(void **state)
 {
 	(void)state;

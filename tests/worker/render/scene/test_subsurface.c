@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The diffuse base that stands in for a dipole. What leaves a flat medium is compared with the integral of the dipole's
- * profile over the surface, and what leaves the plastic with the sum over all reflections below its boundary.
+ * The diffuse base that stands in for a dipole. The reflectance of a flat medium is compared with the integral of the
+ * dipole's profile over the surface, and that of the plastic with the sum over all reflections below its boundary.
  */
 #include "tests/support/memory_assets.h"
 #include "worker/render/render.h"
@@ -16,7 +16,7 @@
 
 #include <cmocka.h>
 
-/* Integrated over directions: Fresnel's reflectance from inside. */
+/* Returns Fresnel's reflectance from inside, integrated over directions. */
 static double diffuse_fresnel(double eta)
 {
 	enum { N = 20000 };
@@ -30,7 +30,7 @@ static double diffuse_fresnel(double eta)
 	return sum / N;
 }
 
-/* Jensen et al. 2001, equation 4, over the plane, for an extinction of 1. */
+/* Returns the integral of Jensen et al. 2001, equation 4, over the plane, for an extinction of 1. */
 static double integrated_dipole(double albedo, double inside)
 {
 	enum { N = 200000 };
@@ -86,7 +86,7 @@ static struct scene read_leniently(const char *xml)
 	return s;
 }
 
-/* The colour of the BSDF of the i-th object. */
+/* Returns the colour of the BSDF of the i-th object. */
 static const double *base_colour(const struct scene *s, unsigned i)
 {
 	const struct property *p = node_find(node_child(s->objects[i], PLUGIN_BSDF, 0), "diffuse_reflectance");
@@ -134,7 +134,8 @@ static void test_scene(void **state)
 		is_base(base_colour(&s, 2), k, (const double[]){0.9, 0.75, 0.5}[k], 1.3);
 	is_base(base_colour(&s, 3), 1, 4.5 / 5.5, eta);
 	is_base(base_colour(&s, 4), 0, 0.74 / 0.772, eta); /* skin1 */
-	/* Not understood, or nothing to put it below; others that refer to the BSDF have it as it is. */
+	/* The coefficients are incomplete, or the BSDF has no base: no stand-in. Other shapes that refer to the same
+	 * BSDF keep it unchanged. */
 	assert_null(node_find(node_child(s.objects[5], PLUGIN_BSDF, 0), "diffuse_reflectance"));
 	assert_null(node_find(node_child(s.objects[8], PLUGIN_BSDF, 0), "diffuse_reflectance"));
 	assert_string_equal(node_child(s.objects[6], PLUGIN_BSDF, 0)->type, "diffuse");

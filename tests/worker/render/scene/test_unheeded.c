@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Parameters that change light a little and are not supported: a note by name, none where the file says that it is off.
- * And what is unknown, or read as something else.
- */
+/* Parameters that change light slightly and are not supported: a note names each one, but not if the file sets it to
+ * off. Also unknown parameters, and values that are read as others. */
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_parts.h"
 #include "worker/render/render.h"
@@ -20,7 +19,7 @@
 	"<bsdf type='" type "'><texture name='t' type='checkerboard'/><bsdf type='diffuse'/><boolean name='" name \
 	"' value='" value "'/></bsdf>"
 
-/* note: NULL: there is none of what may be visible */
+/* note: expected note; NULL: no note about visible differences */
 static void check(const char *inside, const char *note)
 {
 	char xml[1024];
@@ -52,7 +51,8 @@ static void test_notes(void **state)
 	check("<emitter type='directional'><float name='angle' value='0.0'/></emitter>", NULL);
 }
 
-/* Those of an object share a line, each kind once: a second film adds what the first did not have. */
+/* The ignored parameters of an object share a note, one for each kind; a second film's note adds those that the first
+ * film did not have. */
 static void test_lines_of_objects(void **state)
 {
 	(void)state;
@@ -97,7 +97,7 @@ static void test_lines_of_objects(void **state)
 	scene_fini(&s);
 }
 
-/* What is ignored as a whole may hold the depth of paths, which is visible in the image. */
+/* An element that is ignored as a whole may contain the maximum path depth, which is visible in the image. */
 static void test_depths(void **state)
 {
 	(void)state;
@@ -132,7 +132,7 @@ static void test_names_of_integrators(void **state)
 	      NULL);
 }
 
-/* Of Mitsuba's integrators that show all light none is unknown, nor are those here. */
+/* None of Mitsuba's integrators that render all light is unknown, nor are those of this renderer. */
 static void test_known_integrators(void **state)
 {
 	(void)state;
@@ -170,7 +170,7 @@ static void test_known_integrators(void **state)
 	      "surfaces and in media, without its polarization");
 }
 
-/* What a filter over a pixel's footprint becomes. */
+/* Filters over a pixel's footprint are read as the closest supported filter. */
 static void test_wide_filters(void **state)
 {
 	(void)state;
@@ -183,7 +183,7 @@ static void test_wide_filters(void **state)
 #undef MAP
 }
 
-/* Nothing of a sampler is ignored that asks for so many independent samples and for no more. */
+/* A sampler that only asks for a number of independent samples has nothing that is ignored. */
 static void test_independent_samples(void **state)
 {
 	(void)state;

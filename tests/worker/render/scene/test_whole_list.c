@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * scene_read_all lists all problems of a scene in one run and none that merely follows from another: names without
- * values, missing files, duplicate ids, unknown types, includes that break off. What uses a name that is missing is not
+ * scene_read_all() lists all problems of a scene in one run, without those that merely follow from others: names
+ * without values, missing files, duplicate ids, unknown types, truncated includes. Uses of a missing name are not
  * reported again.
  */
 #include "tests/support/memory_assets.h"
@@ -17,7 +17,7 @@
 #define S "<scene version='3.0.0'>"
 #define END "</scene>"
 
-/* Exactly these, which the problems begin with; NULL ends them. */
+/* Expects exactly the problems that begin with these texts; NULL ends the list. */
 static void expect_problems(const struct memory_file *files, bool lenient, const char *const *said)
 {
 	struct asset_source assets = memory_assets(files);
@@ -38,7 +38,7 @@ static void lists_of(const char *xml, const char *const *said)
 	expect_problems(files, false, said);
 }
 
-/* What uses such a name is not looked at, everything else is. */
+/* A value that contains an undefined name is not checked; everything else is. */
 static void test_names_without_values(void **state)
 {
 	(void)state;
@@ -59,7 +59,7 @@ static void test_names_without_values(void **state)
 	lists_of(xml, said);
 }
 
-/* Files would be searched in vain. */
+/* With an undefined search path, missing files are not reported: they might lie there. */
 static void test_paths_without_values(void **state)
 {
 	(void)state;
@@ -67,7 +67,7 @@ static void test_paths_without_values(void **state)
 	lists_of(S "<path value='$models'/><shape type='spher'/>" END, said);
 }
 
-/* Their names and ids are not known: nothing is said of them. */
+/* The names and ids in missing files are unknown, so uses of unknown names and ids are not reported. */
 static void test_files_that_are_not_there(void **state)
 {
 	(void)state;
@@ -88,7 +88,7 @@ static void test_files_that_are_not_there(void **state)
 	expect_problems(files, false, said);
 }
 
-/* A file that cannot be read to its end says nevertheless what it lacked until then. */
+/* A file that cannot be read to its end still gets the problems found before the error. */
 static void test_files_that_break_off(void **state)
 {
 	(void)state;
@@ -99,8 +99,8 @@ static void test_files_that_break_off(void **state)
 	lists_of(S "<shape type='$kind'/>\n", unset);
 }
 
-/* An <include> that is still open there was never read: in the scene, in an object, and as the first element of a file.
- */
+/* An <include> element that is still open at the error was never read: in the scene, in an object, and as the first
+ * element of a file. */
 static void test_includes_that_break_off(void **state)
 {
 	(void)state;
@@ -116,7 +116,7 @@ static void test_includes_that_break_off(void **state)
 	expect_problems(files, false, inner);
 }
 
-/* Every duplicate and every alias; what an alias would name is not complained of. */
+/* Every duplicate id and every alias is reported; uses of an alias are not. */
 static void test_ids(void **state)
 {
 	(void)state;
@@ -132,7 +132,7 @@ static void test_ids(void **state)
 	lists_of(xml, said);
 }
 
-/* Objects are looked at also where the one around them is refused, once each. */
+/* Objects inside a refused one are checked as well, once each. */
 static void test_inside_unknown_types(void **state)
 {
 	(void)state;
@@ -155,14 +155,14 @@ static void test_inside_unknown_types(void **state)
 					     "s.xml:6: <bsdf type=\"dul\">: there is no bsdf of this type",
 					     NULL};
 	expect_problems(files, false, strict);
-	/* What is left out may hold anything. */
+	/* Objects that are left out may contain anything. */
 	static const char *const lenient[] = {"s.xml:1: <sensor type=\"distant\">: this sensor of Mitsuba's",
 					      "s.xml:1: <float>: `x` is not a (finite) number",
 					      "s.xml:3: <integer>: width=0 is outside", NULL};
 	expect_problems(files, true, lenient);
 }
 
-/* Each step, with the attributes of the <transform> itself, in animations and textures as well. */
+/* Each step is checked, and the attributes of <transform> itself, also in animations and textures. */
 static void test_wrong_steps(void **state)
 {
 	(void)state;
@@ -186,7 +186,7 @@ static void test_wrong_steps(void **state)
 					   "s.xml:11: <translate>: has no attribute `w`",
 					   NULL};
 	lists_of(xml, said);
-	/* Each step is fine; only all together are not. */
+	/* Each step is valid, but their product is not. */
 	static const char *const product[] = {"s.xml:2: <scale>: the transform is out of range", NULL};
 	lists_of(
 		S
@@ -195,7 +195,7 @@ static void test_wrong_steps(void **state)
 		product);
 }
 
-/* What a parameter of an unknown plug-in means is not known, but how values are written is. */
+/* The parameters of an unknown plug-in are unknown, but the notation of their values is checked. */
 static void test_values_in_unknown_types(void **state)
 {
 	(void)state;
@@ -217,8 +217,8 @@ static void test_values_in_unknown_types(void **state)
 	lists_of(xml, said);
 }
 
-/* The whole objects before the place where a file breaks off are looked at, what is open there is not, and all that
- * includes the file is. */
+/* Complete objects before the error in a truncated file are checked, open ones are not, and everything in the
+ * including files is. */
 static void test_included_files_that_break_off(void **state)
 {
 	(void)state;
@@ -249,7 +249,7 @@ static void test_included_files_that_break_off(void **state)
 	expect_problems(files, false, said);
 }
 
-/* One wrong node, mesh, light or camera of a glTF file does not hide the others; each is said once. */
+/* An invalid node, mesh, light or camera of a glTF file does not hide others; each is reported once. */
 static void test_gltf(void **state)
 {
 	(void)state;

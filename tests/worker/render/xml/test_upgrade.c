@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Files of Mitsuba before 0.5 against twins that were written for 0.5 by hand, by the rules of its upgrade: the same
- * objects with the same values. And against themselves: before 0.4 the camera's left is its right.
+ * Files of Mitsuba versions before 0.5, against twins rewritten for 0.5 by hand by the rules of its upgrade: the same
+ * objects with the same values. Also against themselves: before 0.4, cameras were mirrored.
  */
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_parts.h"
@@ -144,7 +144,7 @@ static void test_version_2(void **state)
 		     "");
 }
 
-/* Colours whose factor is not 1 move into a texture `scale`, and those that are missing had other values than now. */
+/* Colours with a factor other than 1 move into a texture `scale`, and missing colours had other default values. */
 static void test_materials_of_version_2(void **state)
 {
 	(void)state;
@@ -187,7 +187,7 @@ static void test_materials_of_version_2(void **state)
 		"");
 }
 
-/* It was mirrored, and so were cameras: twice is as now. */
+/* The first lookAt was mirrored, and so were cameras: both together give today's result. */
 static void test_first_lookat(void **state)
 {
 	(void)state;
@@ -208,7 +208,7 @@ static void test_first_lookat(void **state)
 		"<emitter type='spot'>" TO("<scale x='-1'/><lookAt origin='1 2 3' target='0 0 0'/>") "</emitter>", "");
 }
 
-/* What includes a file of another version keeps its own, and the angle of view is the smaller side's. */
+/* A file that includes one of another version keeps its own; the field of view refers to the smaller side. */
 static void test_each_file_for_itself(void **state)
 {
 	(void)state;
@@ -229,7 +229,7 @@ static void test_each_file_for_itself(void **state)
 	}
 }
 
-/* What another element says from then on has its effect: no note calls it ignored. */
+/* Parameters that the upgrade moves to another element have an effect: no note calls them ignored. */
 static void test_nothing_is_called_ignored(void **state)
 {
 	(void)state;
@@ -243,7 +243,8 @@ static void test_nothing_is_called_ignored(void **state)
 	scene_fini(&s);
 }
 
-/* The name that `principled` and `principledthin` had before their release, in files of 2.x and 3.x only. */
+/* `disney`, the name of `principled` and `principledthin` before their release, is read in files of 2.x and 3.x only.
+ */
 static void test_disney(void **state)
 {
 	(void)state;
@@ -273,7 +274,7 @@ static void test_disney(void **state)
 	assert_non_null(strstr(e.text, "`thin` of <bsdf type=\"principled\"> would change the image"));
 }
 
-/* The same text as of 0.3 and as of 0.4, which read it without turning anything. */
+/* The same text as version 0.3, and as 0.4, which does not mirror cameras. */
 static void test_left_is_right(void **state)
 {
 	(void)state;
@@ -321,7 +322,7 @@ static void test_refused(void **state)
 	}
 }
 
-/* Before 0.3 files had no version. Those that a file without one includes need none either. */
+/* Before 0.3, files had no version. Files included by a file without a version need none either. */
 static void test_no_version(void **state)
 {
 	(void)state;
@@ -363,7 +364,8 @@ static void test_no_version(void **state)
 	}
 }
 
-/* From 2.x on an object may have a version: its names, and those of what is inside it, follow that, and no others. */
+/* From 2.x on an object may have a version: the names in this object and the objects inside it follow it, and no
+ * others do. */
 static void test_versions_of_objects(void **state)
 {
 	(void)state;

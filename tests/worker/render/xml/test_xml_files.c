@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Where a scene's files are looked for: the folders of <path>, in Mitsuba's order, those that may not be read, and
- * paths from another machine. Files are their own names here, so what is read says which one it was.
+ * Where a scene's files are searched for: the folders of <path>, in Mitsuba's order, folders that may not be read,
+ * and paths from another machine. The content of each file is its own name, so a test sees which file was read.
  */
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_parts.h"
@@ -16,7 +16,7 @@
 
 #include <cmocka.h>
 
-/* The names that exist, and those that lead out of the folders that may be read. */
+/* The names that exist, and names outside the folders that may be read. */
 struct disk {
 	const char *scene, *there[4], *outside[4];
 };
@@ -47,7 +47,7 @@ static void disk_close(void *user, struct asset *a)
 	(void)user, (void)a;
 }
 
-/* The name under which a mesh called `written` is read, and how many notes there are. */
+/* Expects the name under which the mesh `written` is read, and the number of notes. */
 static void expect_name(struct disk d, const char *paths, const char *written, const char *name, uint32_t notes)
 {
 	char text[512];
@@ -68,7 +68,7 @@ static void expect_name(struct disk d, const char *paths, const char *written, c
 
 #define PATHS "<path value='a'/><path value='../b'/>"
 
-/* Mitsuba 3 puts each folder before those that it searches already, the scene's among them. */
+/* Mitsuba 3 puts each folder before those that it already searches, the scene's own among them. */
 static void test_paths_in_order(void **state)
 {
 	(void)state;
@@ -79,7 +79,8 @@ static void test_paths_in_order(void **state)
 	expect_name((struct disk){.there = {"m.ply"}}, PATHS, "none.ply", "none.ply", 0);
 }
 
-/* One that may not be read is named if no other has the file, so that its opener can say what would allow it. */
+/* A file that may not be read is named if no other folder has the file, so that opening it can report how to allow
+ * it. */
 static void test_path_outside(void **state)
 {
 	(void)state;
@@ -89,8 +90,8 @@ static void test_path_outside(void **state)
 	expect_name((struct disk){.there = {"a/m.ply"}, .outside = {outside}}, PATHS, "m.ply", "a/m.ply", 0);
 }
 
-/* A path that is not there is replaced by its longest end that is; a path that is there stays, also if it may not be
- * read. */
+/* A path that does not exist is replaced by its longest suffix that does; an existing path is kept, even if it may
+ * not be read. */
 static void test_ends_of_paths(void **state)
 {
 	(void)state;

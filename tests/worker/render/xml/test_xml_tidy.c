@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* XML that Mitsuba 3 reads and the standard forbids: what it becomes, byte by byte, and that the rest stays as it is.
- */
+/* XML that Mitsuba 3 reads although the standard forbids it: the corrected text, byte by byte; valid XML stays
+ * unchanged. */
 #include "common/base/mem.h"
 #include "worker/render/xml/xml_tidy.h"
 
@@ -73,7 +73,7 @@ static void test_sizes(void **state)
 	same = xml_tidy(big, &size);
 	assert_true(same && size == 4 && memcmp(same, big, 4) == 0);
 	mem_free(same);
-	/* Markup without an end must not be searched for again and again. */
+	/* For markup without an end, the search for this end must not be repeated for each occurrence. */
 	enum { MANY = 1 << 20 };
 	size = MANY * sizeof wide;
 	char *endless = mem_alloc(size, 1);
