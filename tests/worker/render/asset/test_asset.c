@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Which files a scene may open: those below its folder and below the search folders, by any name that leads there; not
- * what `..`, absolute names, links out of it, folders, FIFOs and devices would reach. The canonical name of a file is
- * the same by each way.
+ * Which files a scene may open: those below its folder and below the search folders, by any name that leads there;
+ * but not by `..`, absolute names, links out of the folder, folders, FIFOs or devices. The canonical name of a file
+ * is the same by every route.
  */
 #include "worker/render/asset/asset_keeper.h"
 #include "worker/render/asset/asset_name.h"
@@ -115,7 +115,7 @@ static void test_files_elsewhere(void **state)
 	refuses("sub/../../secret", "must lie below");
 	refuses("sub/..", "must lie below");
 	refuses("..", "must lie below");
-	refuses("/etc/passwd", "must lie below"); /* no canonical name */
+	refuses("/etc/passwd", "must lie below"); /* not a canonical name */
 	refuses("%2f/etc/passwd", "/etc/passwd: leads out of the scene's folder; to allow that, give --path /etc");
 	refuses("%2f/etc/../passwd", "%2f/etc/../passwd: files must lie below");
 	refuses("out", "out: ");
@@ -175,7 +175,7 @@ static void test_canonical_names(void **state)
 	assert_string_equal(asset_name_shown("%2e%2e/%2e%2e/%2e%2e/b", little, sizeof little), "../../.");
 }
 
-/* Counts; two files whose handles tell them apart. */
+/* A source that counts calls; its two files have handles that distinguish them. */
 struct counts {
 	int opened, closed;
 };
@@ -207,7 +207,7 @@ static void open_and_close(const struct asset_source *s, const char *name)
 	s->close(s->user, &a);
 }
 
-/* The scene's own folder first, then the others in turn; each is as closed as the first. */
+/* The scene's own folder is searched first, then the others in turn; each is as restricted as the first. */
 static void test_search(void **state)
 {
 	(void)state;
@@ -232,7 +232,7 @@ static void test_search(void **state)
 		     {"theirs", "other", 0},
 		     {"nowhere", NULL, -ENOENT},
 		     {"out", NULL, -EXDEV},
-		     {"../more/theirs", NULL, -EINVAL}, /* no canonical name */
+		     {"../more/theirs", NULL, -EINVAL}, /* not a canonical name */
 		     {"%2e%2e/more/theirs", "other", 0},
 		     {"%2e%2e/more/both", "other", 0},
 		     {"%2e%2e/scene/both", "own", 0},
@@ -263,7 +263,7 @@ static void test_search(void **state)
 	assert_int_equal(asset_folders_of(folder, (const char *[40]){0}, 40).count, ASSET_FOLDERS_MAX);
 }
 
-/* For a file outside of the folder the error names the folder to pass, and the file as the user wrote it. */
+/* For a file outside the folder, the error names the folder to pass, and the file as the user wrote it. */
 static void test_outside_is_said(void **state)
 {
 	(void)state;
@@ -277,7 +277,7 @@ static void test_outside_is_said(void **state)
 	refuses("%2e%2e/common/a.png", wanted);
 	expect_content("%2e%2e/scene/a.obj", "inside");
 	refuses("%2e%2e/scene/none.obj", "../scene/none.obj: No such file");
-	/* what is nowhere, to someone who may say where else to search */
+	/* a file that is nowhere, for a caller that can add search folders */
 	struct asset_folders f = asset_folders_of(folder, NULL, 0);
 	struct asset_source own = asset_search(&f), more;
 	struct asset a;
@@ -289,7 +289,7 @@ static void test_outside_is_said(void **state)
 	more = asset_search(&f);
 	assert_int_equal(more.open(more.user, "none.obj", &a, &e), -ENOENT);
 	assert_string_equal(e.text, "none.obj: no such file in the scene's folder or those of --path");
-	/* what is in a folder around the scene's, or below the current one */
+	/* a file in a folder around the scene's, or below the current one */
 	f = asset_folders_of(folder, NULL, 0);
 	assert_int_equal(own.open(own.user, "more/theirs", &a, &e), -ENOENT);
 	snprintf(wanted, sizeof wanted, "more/theirs: no such file in the scene's folder; --path %s finds it", real);
@@ -319,7 +319,7 @@ static void expect_not_found(const char *name, const char *text)
 	assert_string_equal(e.text, wanted);
 }
 
-/* A file of nearly that name, in folders of nearly that name. */
+/* A file of a similar name, in folders of a similar name. */
 static void test_names_that_are_near(void **state)
 {
 	(void)state;
@@ -331,17 +331,17 @@ static void test_names_that_are_near(void **state)
 	expect_not_found("sub/wood_floor.png", "; did you mean `sub/Wood Floor.png`?");
 	expect_not_found("Mesh_1.obj", "; did you mean `mesh_1.obj`?");
 	expect_not_found("common/./B.png", "");
-	expect_not_found("mesh_2.obj", ""); /* another one of a series */
+	expect_not_found("mesh_2.obj", ""); /* another file of a series */
 	expect_not_found("mesh_11.obj", "");
-	expect_not_found("fifoo", ""); /* no file */
+	expect_not_found("fifoo", ""); /* not a regular file */
 	expect_not_found("subs", "");
 	expect_not_found("outt", ""); /* leads out of the folder */
 	expect_not_found("absolut", "");
-	expect_not_found("scene/EMPTY", "; did you mean `scene/empty`?"); /* of the second folder */
+	expect_not_found("scene/EMPTY", "; did you mean `scene/empty`?"); /* in the second folder */
 }
 
-/* By its whole name, a file is found below the scene's folder and the others, whether these are called as they are or
- * by a link, and nowhere else. */
+/* By its absolute name, a file is found below the scene's folder and the search folders, whether these are named
+ * directly or by a link, and nowhere else. */
 static void test_absolute_names(void **state)
 {
 	(void)state;
@@ -371,7 +371,7 @@ static void test_absolute_names(void **state)
 	assert_int_equal(unlink(link), 0);
 }
 
-/* A file that is asked for again and again is opened once, and in the end all that was opened is closed. */
+/* A file that is opened repeatedly is opened once underneath, and in the end every opened file is closed. */
 static void test_keeper(void **state)
 {
 	(void)state;
@@ -389,7 +389,7 @@ static void test_keeper(void **state)
 	assert_int_equal(s.open(s.user, "c", &first, &e), -ENOENT);
 	open_and_close(&s, "a");
 	assert_true(c.opened == 3 && c.closed == 2);
-	/* used twice at once, and another beside it */
+	/* used twice at once, with another file beside it */
 	assert_int_equal(s.open(s.user, "a", &first, &e), 0);
 	assert_int_equal(s.open(s.user, "b", &other, &e), 0);
 	assert_int_equal(s.open(s.user, "a", &second, &e), 0);
@@ -402,7 +402,7 @@ static void test_keeper(void **state)
 	assert_true(c.opened == 4 && c.closed == 4);
 }
 
-/* It does not read for ever. */
+/* The keeper reads a file again only a limited number of times. */
 static void test_keeper_ends(void **state)
 {
 	(void)state;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * glTF against its XML twin (tests/scenes/gltf): the same picture, bit for bit, in each form that files have. What is
- * malformed or not supported is answered by a sentence; no damaged byte does anything else.
+ * glTF against its XML twin (tests/scenes/gltf): the same image, bit by bit, in each form of the file format.
+ * Malformed or unsupported files give an error message, and damaged bytes have no other effect.
  */
 #include "common/base/mem.h"
 #include "tests/support/dice.h"
@@ -40,7 +40,8 @@ static void test_twin(void **state)
 	struct asset texture;
 	struct error e;
 	assert_int_equal(folder.open(folder.user, "rgb.hdr", &texture, &e), 0);
-	/* By place, chances would follow the last bits of the cameras, which differ. */
+	/* With the choice of emitters by position, the probabilities would depend on the last bits of the cameras,
+	 * which differ. */
 	worlds_accuracy = "emitter-choice=power";
 	struct picture want = render(world_of_own_scene("gltf", "twin.xml", SIDE, SIDE));
 	gltf_files_make(&f);
@@ -64,7 +65,7 @@ static void test_twin(void **state)
 	folder.close(folder.user, &texture);
 }
 
-/* ---- one change each */
+/* ---- one change each ---- */
 
 static struct gltf_files changed;
 
@@ -83,7 +84,7 @@ static int build_shapes(const struct scene *s, const struct memory_file *files, 
 	return rc;
 }
 
-/* By the reader, or by the shapes. */
+/* Expects an error from the reader, or from building the shapes. */
 static void refuses(const struct memory_file *files, const char *text)
 {
 	struct scene s;
@@ -149,7 +150,7 @@ static const struct {
 	{"\"index\": 0},", "\"index\": 3},", "there is no textures[3]"},
 	{"{\"source\": 0, ", "{", "images of unknown_format are not supported"},
 	{"\"roughnessFactor\": 0.5", "\"roughnessFactor\": 1.5", "s.gltf:25: <float>: roughness=1.5 is outside [0, 1]"},
-	/* known, and not supported */
+	/* a known attribute with an unsupported type */
 	{"\"TEXCOORD_0\": 11", "\"TEXCOORD_0\": 11, \"COLOR_0\": 11", "of a type that color cannot have"},
 	{"\"TEXCOORD_0\": 2}", "\"TEXCOORD_0\": 2, \"COLOR_0\": 9}",
 	 "`color` has another number of entries than `position`"},
@@ -166,7 +167,7 @@ static void test_malformed(void **state)
 {
 	(void)state;
 	for (size_t i = 0; i < sizeof malformed / sizeof *malformed; i++) {
-		bool buffer = strcmp(malformed[i].from, "BUFFER") == 0; /* what pack would put there */
+		bool buffer = strcmp(malformed[i].from, "BUFFER") == 0; /* a placeholder that packing fills in */
 		const struct memory_file *files =
 			gltf_files_change(&changed, buffer ? NULL : malformed[i].from, malformed[i].to);
 		if (buffer) {
@@ -205,7 +206,7 @@ static void test_malformed_containers(void **state)
 	refuses(changed.list, "its header says");
 }
 
-/* A bound on values holds before jansson takes memory for them; brackets within text do not count. */
+/* The limit on values applies before jansson allocates memory for them; brackets within text do not count. */
 static void test_too_much(void **state)
 {
 	(void)state;
@@ -223,7 +224,7 @@ static void test_too_much(void **state)
 	mem_free(text);
 }
 
-/* Bytes of a small file damaged, and prefixes of it: a scene, or a sentence. */
+/* Damaged bytes of a small file, and prefixes of the file, give a scene or an error message. */
 static void test_damaged(void **state)
 {
 	(void)state;
@@ -248,7 +249,7 @@ static void test_damaged(void **state)
 		}
 }
 
-/* ---- what becomes of materials, cameras and lights */
+/* ---- the resulting materials, cameras and lights ---- */
 
 static const struct scene_node *find(const struct scene *s, enum plugin_class cls, const char *type)
 {
@@ -275,7 +276,7 @@ static void test_lights_and_cameras(void **state)
 	mat4 m = node_transform(spot, "to_world");
 	assert_near(node_float(spot, "cutoff_angle", 0), 0.5 * 180 / M_PI);
 	assert_near(node_float(spot, "beam_width", 0), 0.25 * 180 / M_PI);
-	assert_true(m.m[2][2] == -1 && m.m[0][3] == 2 && m.m[2][3] == 2); /* it shines along -z */
+	assert_true(m.m[2][2] == -1 && m.m[0][3] == 2 && m.m[2][3] == 2); /* the light emits along -z */
 	scene_fini(&s);
 	s = gltf_files_scene("\"type\": \"point\"", "\"type\": \"directional\"", false);
 	m = node_transform(find(&s, PLUGIN_EMITTER, "directional"), "to_world");
@@ -289,7 +290,8 @@ static void test_lights_and_cameras(void **state)
 	scene_fini(&s);
 }
 
-/* Lamps of Blender are in lumens since 3.4, its emission never is; its diffuse surfaces are the format's since 4.0. */
+/* Blender's lamps are in lumens since version 3.4, its emission never is; its diffuse surfaces are those of the
+ * format since 4.0. */
 static void test_versions_of_blender(void **state)
 {
 	(void)state;
@@ -319,7 +321,7 @@ static void test_versions_of_blender(void **state)
 	}
 }
 
-/* All of the scene's box is within the field of view of the camera that stands in. */
+/* The camera that stands in has the scene's whole box within its field of view. */
 static void test_no_camera_no_light(void **state)
 {
 	(void)state;
@@ -348,7 +350,7 @@ static unsigned count_of(const struct scene *s, enum plugin_class cls)
 	return n;
 }
 
-/* What Draco compressed is read where the accessors have the numbers, too. */
+/* A Draco-compressed mesh is read if its accessors contain the numbers as well. */
 static void test_draco(void **state)
 {
 	(void)state;
@@ -372,7 +374,7 @@ static void test_draco(void **state)
 
 #define HIDDEN(value) "\"extensions\": {\"KHR_node_visibility\": {" value "}"
 
-/* Neither shapes nor lights of a hidden node and those below are there, but its camera is. */
+/* Shapes and lights of a hidden node and of its descendants are absent, but its camera is present. */
 static void test_hidden(void **state)
 {
 	(void)state;
@@ -398,7 +400,7 @@ static void test_hidden(void **state)
 	}
 }
 
-/* Nothing is left out in silence. */
+/* Ignored extensions and properties get a note. */
 static void test_notes(void **state)
 {
 	(void)state;
@@ -418,13 +420,13 @@ static void test_loose_files(void **state)
 	(void)state;
 	struct gltf_files f;
 	struct scene s, whole = gltf_files_scene(NULL, NULL, false);
-	gltf_files_make(&f); /* a byte order mark */
+	gltf_files_make(&f); /* with a byte order mark */
 	memmove(f.json + 3, f.json, strlen(f.json) + 1);
 	memcpy(f.json, "\xef\xbb\xbf", 3);
 	s = gltf_files_packed(&f, GLTF_BINARY);
 	assert_int_equal(s.object_count, whole.object_count);
 	scene_fini(&s);
-	gltf_files_make(&f); /* JSON with zeros behind it */
+	gltf_files_make(&f); /* JSON padded with zeros */
 	strcat(f.json, "  ");
 	gltf_files_pack(&f, GLTF_BINARY);
 	for (size_t at = 19 + f.file[12] + 256u * f.file[13]; f.file[at] != '}'; at--)
@@ -432,7 +434,7 @@ static void test_loose_files(void **state)
 	assert_int_equal(gltf_files_read(f.list, false, &s, &(struct error){""}), 0);
 	assert_int_equal(s.object_count, whole.object_count);
 	scene_fini(&s);
-	gltf_files_make(&f); /* no scenes: the same nodes are roots */
+	gltf_files_make(&f); /* without scenes: the same nodes are roots */
 	gltf_files_replace(&f, "\"scene\": 0", "\"extras\": 0");
 	gltf_files_replace(&f, "\"scenes\"", "\"other\"");
 	s = gltf_files_packed(&f, GLTF_BINARY);
@@ -440,7 +442,7 @@ static void test_loose_files(void **state)
 	assert_true(scene_has_note(&s, "it has no scenes: all of its nodes are shown"));
 	scene_fini(&s);
 	scene_fini(&whole);
-	/* a picture by its whole path, and one that the exporter lost */
+	/* a picture with an absolute path, and one that the exporter lost */
 	struct error e;
 	const struct memory_file *files = gltf_files_change(&f, "\"rgb.hdr\"", "\"file:///x/rgb.hdr\"");
 	assert_int_equal(gltf_files_read(files, false, &s, &e), 0);
@@ -452,7 +454,7 @@ static void test_loose_files(void **state)
 	scene_fini(&s);
 }
 
-/* What a scale of 0 leaves as a point or a line is not there; a sheet still is, and is refused. */
+/* A mesh that a scale of 0 reduces to a point or a line is left out; one reduced to a sheet is refused. */
 static void test_no_area(void **state)
 {
 	(void)state;

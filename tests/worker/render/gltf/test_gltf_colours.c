@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Colours at the vertices of glTF meshes (COLOR_0) against PLY files with the same numbers and materials that name the
- * attribute: the same scattering everywhere on the meshes.
+ * Colours at the vertices of glTF meshes (COLOR_0), against PLY files with the same numbers and materials that name
+ * the attribute: the scattering is equal everywhere on the meshes.
  */
 #include "tests/support/gltf_files.h"
 #include "tests/support/mesh_files.h"
@@ -16,7 +16,7 @@
 
 #include <cmocka.h>
 
-/* The texture coordinates of the strip, 0 or 65535 in two bytes each, taken for four channels of a byte each. */
+/* The texture coordinates of the strip, 0 or 65535 in two bytes each, are read as four channels of one byte each. */
 #define LAST "\"normalized\": true, \"count\": 4, \"type\": \"VEC2\"}],"
 #define BYTES \
 	"\"normalized\": true, \"count\": 4, \"type\": \"VEC2\"},\n{\"bufferView\": 8, \"componentType\": 5121, " LAST
@@ -153,7 +153,7 @@ static void test_twin(void **state)
 			const struct bsdf *of_a = &a->bsdfs[a->parts[s].bsdf], *of_b = &b->bsdfs[b->parts[s].bsdf];
 			spectrum fa = of_a->ops->eval(of_a, &at, wo, wi), fb = of_b->ops->eval(of_b, &at, wo, wi);
 			for (int l = 0; l < SPECTRUM_LANES; l++) {
-				if (!(fabs(fa.v[l] - fb.v[l]) <= 1e-12 * fb.v[l])) /* of the index, which is computed */
+				if (!(fabs(fa.v[l] - fb.v[l]) <= 1e-12 * fb.v[l])) /* the index is computed */
 					fail_msg("shape %u, triangle %u, lane %d: %a, in the twin %a", s, k / 16, l,
 						 fa.v[l], fb.v[l]);
 				sum += fa.v[l];
@@ -166,7 +166,7 @@ static void test_twin(void **state)
 	pictures_fini(&p);
 }
 
-/* No threshold of a product; of opaque materials alpha says nothing. */
+/* A product with a vertex colour has no threshold; with opaque materials alpha has no effect. */
 static void test_modes(void **state)
 {
 	(void)state;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Materials of glTF as the scene reader translates them: base colour and metal, the layers and volumes that extensions
- * add (clearcoat, sheen, transmission, anisotropy, specular reflection), surfaces that shine, images in buffers, WebP
- * and formats that are not read. What has no equivalent is named in a note or refused.
+ * Materials of glTF as the scene reader translates them: base colour and metal, the layers and volumes of extensions
+ * (clearcoat, sheen, transmission, anisotropy, specular reflection), emitting surfaces, images in buffers, WebP, and
+ * unsupported formats. Features without an equivalent are named in a note or refused.
  */
 #include "tests/support/gltf_files.h"
 #include "tests/support/pictures.h"
@@ -25,7 +25,8 @@ static void assert_near(double got, double want)
 }
 
 #define IOR "\"KHR_materials_ior\": {"
-/* Layers that `principled` has in its own way, textures of two of them, and details that are left out with a note. */
+/* Layers that `principled` represents in its own way, textures for two of them, and details that are left out with a
+ * note. */
 static void test_layers(void **state)
 {
 	(void)state;
@@ -55,7 +56,7 @@ static void test_layers(void **state)
 	scene_fini(&s);
 }
 
-/* It is what a medium accepts, too. */
+/* Fails unless the medium only absorbs; such a medium is valid for the renderer. */
 static void assert_absorbs_only(const struct scene_node *node)
 {
 	struct arena arena = {0};
@@ -68,7 +69,7 @@ static void assert_absorbs_only(const struct scene_node *node)
 	arena_fini(&arena);
 }
 
-/* After a distance of 2, a quarter of red light, half of green light and nearly no blue light is left. */
+/* After a distance of 2, one quarter of red light, one half of green light and nearly no blue light is left. */
 static void test_volume(void **state)
 {
 	(void)state;
@@ -97,7 +98,8 @@ static void test_volume(void **state)
 	scene_fini(&s);
 }
 
-/* A share of the light passes diffusely, with a colour of its own; a metal lets less of it pass, and glass none. */
+/* A share of the light is transmitted diffusely, with a colour of its own; a metal transmits less of it, and glass
+ * none. */
 static void test_diffuse_transmission(void **state)
 {
 	(void)state;
@@ -127,7 +129,7 @@ static void test_diffuse_transmission(void **state)
 	assert_string_equal(node_string(node_child(weight, PLUGIN_TEXTURE, 0), "channel", ""), "a");
 	assert_near(node_find(colour, "scale")->value.as.rgb[1], 0.5);
 	scene_fini(&s);
-	s = gltf_files_scene(IOR, THROUGH("") ", " IOR, false); /* which transmits */
+	s = gltf_files_scene(IOR, THROUGH("") ", " IOR, false); /* the material transmits */
 	assert_string_equal(scene_named(&s, "bsdf of materials[2]")->type, "principled");
 	assert_true(scene_has_note(&s, "is left out if the material also transmits light otherwise"));
 	scene_fini(&s);
@@ -135,7 +137,7 @@ static void test_diffuse_transmission(void **state)
 #undef THROUGH
 }
 
-/* The two roughnesses of `principled` are those of the format. */
+/* The two roughnesses of `principled` equal those of the format. */
 static void test_anisotropy(void **state)
 {
 	(void)state;
@@ -190,7 +192,7 @@ static void test_materials(void **state)
 	assert_null(node_find(glass, "specular_transmittance"));
 	scene_fini(&s);
 
-	/* Coloured, as `principled` would be. */
+	/* A coloured specular reflection, like that of `principled`. */
 	s = gltf_files_scene(
 		"\"metallicFactor\": 0, \"roughnessFactor\": 0.5},\n\"extensions\": {\"KHR_materials_transmission\": ",
 		"\"metallicFactor\": 0, \"roughnessFactor\": 0.5, \"baseColorFactor\": [0.25, 0.81, 0.04, 1]},\n"
@@ -221,12 +223,12 @@ static void test_materials(void **state)
 	scene_fini(&s);
 
 	s = gltf_files_scene(", \"material\": 0}", "}", false);
-	scene_named(&s, "bsdf of materials[4]"); /* the format's own, one behind the last */
+	scene_named(&s, "bsdf of materials[4]"); /* the format's default material, after the last one of the file */
 	scene_fini(&s);
 }
 
-/* What reflects at normal incidence is min(r^2 c, 1) f: f is the strength, and a colour its largest component, which
- * the index has, times `specular_color`. Glass keeps its index. */
+/* The reflectance at normal incidence is min(r^2 c, 1) f: f is the strength, and a colour is its largest component,
+ * which the index includes, times `specular_color`. Glass keeps its index. */
 #define R2 ((0.75 / 2.75) * (0.75 / 2.75))
 static void test_reflection(void **state)
 {
@@ -279,7 +281,7 @@ static void test_reflection(void **state)
 		}
 }
 
-/* Both sides of a surface that is doubleSided shine. */
+/* Both sides of a doubleSided surface emit light. */
 static void test_both_sides_shine(void **state)
 {
 	(void)state;
@@ -293,7 +295,7 @@ static void test_both_sides_shine(void **state)
 	}
 }
 
-/* A WebP image is preferred to the one for those who cannot read it. */
+/* A WebP image is preferred to the fallback image for readers without WebP. */
 static void test_webp(void **state)
 {
 	(void)state;
@@ -311,7 +313,8 @@ static void test_webp(void **state)
 	scene_fini(&s);
 }
 
-/* Of an image that is not read the one for those who cannot read it is taken; without that it has to be converted. */
+/* If the format of an image is not supported, the fallback image is used; without one, the error asks to convert the
+ * image. */
 static void test_foreign_images(void **state)
 {
 	(void)state;
@@ -353,7 +356,7 @@ static void test_foreign_images(void **state)
 		}
 }
 
-/* Without a material: the format's default, which is metal, or Blender's, which is grey. */
+/* A mesh without a material has the format's default, which is a metal, or Blender's, which is grey. */
 static void test_no_material(void **state)
 {
 	(void)state;
@@ -376,7 +379,8 @@ static void test_no_material(void **state)
 	}
 }
 
-/* An image in the middle of a buffer is the same as in a file, wherever it begins, in each form that files have. */
+/* An image in the middle of a buffer equals the same image in a file, at every offset, in each form of the file
+ * format. */
 static void test_images_in_buffers(void **state)
 {
 	(void)state;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Compressed glTF: the meshes are those of the file before, bit for bit; filters are undone as the specification's
- * formulas say; what is malformed is answered by a sentence, and no damaged byte does anything else.
+ * Compressed glTF: the meshes equal those of the original file, bit by bit; filters are undone by the formulas of the
+ * specification; malformed data gives an error message, and damaged bytes have no other effect.
  */
 #include "common/base/mem.h"
 #include "tests/support/dice.h"
@@ -23,7 +23,7 @@
 static const char *const extensions[] = {"EXT_meshopt_compression", "KHR_meshopt_compression"};
 static struct gltf_files changed;
 
-/* ---- all shapes of a file */
+/* ---- all shapes of a file ---- */
 
 struct built {
 	struct scene scene;
@@ -34,7 +34,7 @@ struct built {
 	unsigned count;
 };
 
-/* 0, or after a failure what shape_build or the reader says. */
+/* Reads the file and builds its shapes. Returns 0, or the error of the reader or of shape_build(). */
 static int build(const struct memory_file *files, bool lenient, struct built *b, struct error *e)
 {
 	struct asset_source assets = memory_assets(files);
@@ -67,7 +67,7 @@ static void build_sound(const struct memory_file *files, struct built *b)
 	assert_true(b->count > 0);
 }
 
-/* The encoder may begin a triangle at another corner. */
+/* The encoder may rotate the corners of a triangle. */
 static bool is_same_triangle(const uint32_t a[3], const uint32_t b[3])
 {
 	for (int k = 0; k < 3; k++)
@@ -113,7 +113,7 @@ static void test_twin(void **state)
 	free_built(&plain);
 }
 
-/* ---- filters */
+/* ---- filters ---- */
 
 enum { VERTICES = 63, INSTANCES = 4, ROOM = 4096 };
 
@@ -138,7 +138,7 @@ static void put_view(const void *numbers, size_t count, size_t stride, const cha
 	own.size += size;
 }
 
-/* As the specification defines the three filters. */
+/* The three filters as the specification defines them. */
 
 static vec3 octahedral(double x, double y, double one)
 {
@@ -175,7 +175,7 @@ static void rotate(const double q[4], double m[3][3])
 	memcpy(m, turn, sizeof turn);
 }
 
-/* What is encoded. */
+/* The numbers to encode. */
 static struct {
 	int32_t position[VERTICES][3];
 	int8_t normal[VERTICES][4];
@@ -260,7 +260,7 @@ static void test_filters(void **state)
 				vec3 n = fine ? octahedral(f[0], f[1], f[2]) : octahedral(c[0], c[1], c[2]),
 				     p = {exponential(encoded.position[v][0]), exponential(encoded.position[v][1]),
 					  exponential(encoded.position[v][2])};
-				/* Each component to one unit of the format. */
+				/* Tolerance of one unit of the format in each component. */
 				assert_direction(mesh->normal[v], mesh_unit(mat4_vector(&m, n)),
 						 2 * sqrt(3) / (fine ? 32767 : 127));
 				assert_direction(mesh->position[v], mat4_point(&m, p), 1e-8);
@@ -270,7 +270,7 @@ static void test_filters(void **state)
 	}
 }
 
-/* Five colours as meshoptimizer 1.3 writes them with 8, 6 and 12 bits, the last into components of two bytes. */
+/* Five colours as meshoptimizer 1.3 encodes them with 8, 6 and 12 bits, the last into components of two bytes. */
 static void test_colours(void **state)
 {
 	(void)state;
@@ -319,7 +319,7 @@ static void test_colours(void **state)
 	}
 }
 
-/* ---- one change each */
+/* ---- one change each ---- */
 
 static void refuses(const struct memory_file *files, const char *text)
 {
@@ -377,7 +377,7 @@ static void test_malformed(void **state)
 	}
 }
 
-/* The first of the compressed bytes says by which coding. */
+/* The first of the compressed bytes tells the coding. */
 static void test_codings(void **state)
 {
 	(void)state;
@@ -395,7 +395,7 @@ static void test_codings(void **state)
 	}
 }
 
-/* What half a megabyte could stand for is more than one file may have; there is memory for it. */
+/* Half a megabyte of compressed data would expand to more than one file may have, although memory would suffice. */
 static void test_too_much(void **state)
 {
 	(void)state;
@@ -416,7 +416,7 @@ static void test_too_much(void **state)
 	mem_free(bytes);
 }
 
-/* Bytes of the file and of its buffer damaged: a scene, or a sentence. */
+/* Damaged bytes of the file and of its buffer give a scene or an error message. */
 static void test_damaged(void **state)
 {
 	(void)state;
@@ -442,7 +442,7 @@ static void test_damaged(void **state)
 	assert_true(sound > 100 && sound < 1900);
 }
 
-/* Each allocation of the reader's fails once: a sentence, and a scene in the end. */
+/* Each allocation of the reader fails once: each failure gives an error message, and the last run a scene. */
 static void test_memory(void **state)
 {
 	(void)state;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Version 1 of meshopt's coding of attributes: streams by meshoptimizer 1.3 itself, which have all kinds of planes,
- * groups and deltas, several blocks and one that is not full; streams that are cut off, too long or damaged.
+ * Version 1 of meshopt's coding of attributes: streams encoded by meshoptimizer 1.3 itself, with all kinds of planes,
+ * groups and deltas, several blocks and a partial one; and streams that are truncated, too long or damaged.
  */
 #include "tests/support/dice.h"
 #include "worker/render/gltf/gltf_meshopt_v1.h"
@@ -60,7 +60,7 @@ static void put(unsigned char *to, uint32_t x, int width)
 		to[i] = (unsigned char)(x >> 8 * i);
 }
 
-/* Squares, a fall, floats of equal distances, and bytes: one that stays, random ones, multiples of 3, random bits. */
+/* Squares, a decreasing sequence, equally spaced floats, and bytes: constant, random, multiples of 3, random bits. */
 static void test_all_kinds(void **state)
 {
 	(void)state;
@@ -102,7 +102,7 @@ static void test_malformed(void **state)
 	unsigned char bytes[sizeof all_kinds + 1] = {0}, out[(COUNT + 1) * STRIDE];
 	size_t size = sizeof all_kinds;
 	for (size_t some = 0; some < size; some++) {
-		unsigned char part[sizeof all_kinds]; /* its end is that of the array: sanitizers see what is beyond */
+		unsigned char part[sizeof all_kinds]; /* ends with the array, so that sanitizers see reads beyond */
 		memcpy(part + size - some, all_kinds, some);
 		assert_false(gltf_meshopt_v1(part + size - some, some, COUNT, STRIDE, out));
 	}
@@ -112,7 +112,7 @@ static void test_malformed(void **state)
 	assert_false(gltf_meshopt_v1(all_kinds, size, COUNT + 1, STRIDE, out));
 	assert_false(gltf_meshopt_v1(all_kinds, size, COUNT - 1, STRIDE, out));
 	assert_false(gltf_meshopt_v1(all_kinds, size, COUNT, STRIDE - 4, out));
-	for (int kind = 0; kind < 256; kind++) { /* the last channel's deltas are of bytes */
+	for (int kind = 0; kind < 256; kind++) { /* the last channel's deltas are bytes */
 		memcpy(bytes, all_kinds, size);
 		bytes[size - 1] = (unsigned char)kind;
 		bool known = kind < 2 || (kind & 15) == 2;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Vertices of glTF that are computed while the file is read: each way to write the same triangle gives that triangle,
- * moved ones are where the specification puts them, and instances are at their places.
+ * Vertices of glTF that are computed while the file is read: each notation of the same triangle gives this triangle,
+ * moved vertices lie where the specification puts them, and instances are at their positions.
  */
 #include "common/base/mem.h"
 #include "tests/support/memory_assets.h"
@@ -21,7 +21,7 @@
 
 enum { BUFFERS = 2, BYTES = 4096, JSON = 16384 };
 
-/* A file in memory: its buffers, and its JSON, in which $0 and $1 stand for them. */
+/* A file in memory: its buffers, and its JSON, in which $0 and $1 stand for the buffers. */
 static struct {
 	unsigned char bytes[BUFFERS][BYTES];
 	size_t size[BUFFERS];
@@ -34,7 +34,7 @@ static void begin(void)
 	memset(&file, 0, sizeof file);
 }
 
-/* Returns where they begin. */
+/* Appends bytes to a buffer; returns their offset. */
 static size_t add_bytes(int buffer, const void *bytes, size_t size)
 {
 	size_t at = file.size[buffer];
@@ -77,7 +77,7 @@ static void assert_at(const struct world *w, uint32_t shape, int k, vec3 want)
 			 want.z);
 }
 
-/* Corners at the origin, on x and on y, each at that distance. */
+/* Expects a triangle with corners at the origin, on x and on y, the latter two at the distance `side`. */
 static void assert_triangle(const struct world *w, uint32_t shape, vec3 origin, double side)
 {
 	assert_at(w, shape, 0, origin);
@@ -97,7 +97,7 @@ static void refuses(const char *text)
 
 static const float plain[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
 
-/* ---- the same triangle */
+/* ---- the same triangle ---- */
 
 #define NODES "'asset': {'version': '2.0'}, 'scene': 0, 'scenes': [{'nodes': [0]}], 'nodes': [{'mesh': 0"
 #define ONE_BUFFER "'buffers': [$0]"
@@ -139,7 +139,7 @@ static void of_each_type(void **state)
 	}
 }
 
-/* Zeros, of which two vertices are replaced; and in another buffer than the indices. */
+/* Zeros, with two vertices replaced, in a buffer other than that of the indices. */
 static void sparse_accessors(void **state)
 {
 	(void)state;
@@ -160,7 +160,7 @@ static void sparse_accessors(void **state)
 	struct world *w = world_of_files(4, 4, file.list);
 	assert_triangle(w, 0, (vec3){0, 0, 0}, 1);
 	world_free(w);
-	char *type = strstr(file.json, "5123"); /* -1 would be an index */
+	char *type = strstr(file.json, "5123"); /* with a signed type, -1 would be an index */
 	memcpy(type, "5122", 4);
 	refuses("accessors[1]: of a type that index cannot have");
 	file.bytes[0][1] = 3; /* there is no such vertex */
@@ -185,7 +185,7 @@ static void in_several_buffers(void **state)
 	world_free(w);
 }
 
-/* ---- moved ones */
+/* ---- moved vertices ---- */
 
 #define TARGETS(node, mesh, count)                                                                                           \
 	"{" NODES node "}], 'meshes': [{'primitives': [{'attributes': {'POSITION': 0}, 'targets': [{'POSITION': 1}, "        \
@@ -220,8 +220,9 @@ static void morph_targets(void **state)
 	refuses("accessors[1]: a morph target has another number of vertices than its primitive");
 }
 
-/* Joint 0 stays, joint 1 moved by (0, 0, 4) below a node twice as large at (1, 0, 0); bound where it was at (0, 0, 2).
- * The vertices have all of joint 0, all of joint 1, and three quarters of it, in weights that sum up to 1 and to 2. */
+/* Joint 0 stays; joint 1 is moved by (0, 0, 4) below a node of scale 2 at (1, 0, 0), and was bound at (0, 0, 2). The
+ * first vertex belongs to joint 0, the second to joint 1, the third to joint 1 with a share of three quarters; the
+ * sums of the weights are 1 and 2. */
 #define SKIN(joints)                                                                                                                    \
 	"{'asset': {'version': '2.0'}, 'scene': 0, 'scenes': [{'nodes': [0, 1, 2]}], 'nodes': [{'mesh': 0, 'skin': 0, "                 \
 	"'translation': [9, 9, 9]}, {}, {'translation': [1, 0, 0], 'scale': [2, 2, 2], 'children': [3]}, {'translation': [0, 0, 4]}], " \
@@ -261,7 +262,7 @@ static void skins_move_vertices(void **state)
 	refuses("there is no nodes[30]");
 }
 
-/* ---- instances */
+/* ---- instances ---- */
 
 #define INSTANCES(scale_count)                                                                                      \
 	"{'extensionsRequired': ['EXT_mesh_gpu_instancing'], " NODES ", 'translation': [10, 0, 0], 'extensions': "  \
@@ -293,7 +294,7 @@ static void of_a_list(void **state)
 
 enum { SIDE = 300, CORNERS = SIDE * SIDE * 6 };
 
-/* Three nodes with a grid of that many units a side, as numbers of that type. */
+/* Writes three nodes with a grid of numbers of the given type. */
 static void write_grid(char *json, size_t room, int type, int stride, double scale)
 {
 	snprintf(
@@ -308,8 +309,8 @@ static void write_grid(char *json, size_t room, int type, int stride, double sca
 		CORNERS * stride, stride, CORNERS * stride);
 }
 
-/* A large mesh of several nodes is in memory once; the camera that stands in sees as much of one of whole numbers that
- * represent -1 to 1. */
+/* A large mesh shared by several nodes is in memory once; for a mesh of integers that represent -1 to 1, the camera
+ * that stands in has the same view. */
 static void of_several_nodes(void **state)
 {
 	(void)state;
@@ -339,10 +340,10 @@ static void of_several_nodes(void **state)
 	assert_true(eye[0].z > SIDE && vec3_length(vec3_sub(eye[0], eye[1])) < 1e-6 * eye[0].z);
 }
 
-/* ---- animations */
+/* ---- animations ---- */
 
-/* A triangle with two morph targets; the first animation puts it at (1, 2, 3), turns it by 90 degrees about z, makes it
- * twice as large and, by the second target, half as large again; the second one is for nobody. */
+/* A triangle with two morph targets. The first animation moves it to (1, 2, 3), turns it by 90 degrees about z,
+ * doubles its size and, by the second target, enlarges it by another half; the second animation is unused. */
 #define CHANNEL(sampler, path) "{'sampler': " sampler ", 'target': {'node': 0, 'path': '" path "'}}"
 #define ANIMATED(channels, accessors)                                                                                 \
 	"{" NODES                                                                                                     \
@@ -389,7 +390,7 @@ static void animations_are_interpolated(void **state)
 	finish_json(ANIMATED(
 		CHANNEL("0", "translation") ", {'sampler': 0, 'target': {'path': 'pointer'}}, " CHANNEL("3", "blur"),
 		PLACE TURN_OF("") SIZE WEIGHTS_OF("4")));
-	w = world_of_files(4, 4, file.list); /* what is not animated is the node's */
+	w = world_of_files(4, 4, file.list); /* properties that are not animated are those of the node */
 	assert_triangle(w, 0, (vec3){1, 2, 4}, 2);
 	world_free(w);
 	finish_json(ANIMATED(
@@ -411,7 +412,7 @@ static void animations_are_interpolated(void **state)
 	refuses("accessors[3]: a value that is not finite");
 }
 
-/* ---- buffers */
+/* ---- buffers ---- */
 
 static int opened;
 static struct asset_source inner;
@@ -429,7 +430,7 @@ static void close_counted(void *user, struct asset *a)
 	inner.close(inner.user, a);
 }
 
-/* Twenty meshes whose vertices are computed, from two buffers by turns. */
+/* Makes twenty meshes with computed vertices, from two buffers in turn. */
 static void make_by_turns(const char *buffers)
 {
 	static const int8_t i8[12] = {0, 0, 0, 0, 127, 0, 0, 0, 0, 127, 0, 0};
@@ -457,7 +458,7 @@ static void make_by_turns(const char *buffers)
 	finish_json(json);
 }
 
-/* Of those in the file itself each is decoded once. */
+/* Each buffer embedded in the file is decoded once. */
 static void by_turns(void **state)
 {
 	(void)state;
@@ -473,7 +474,7 @@ static void by_turns(void **state)
 	scene_fini(&s);
 }
 
-/* Files of 60 GB, as they say. */
+/* Opens files that claim a size of 60 GB. */
 static int open_large(void *user, const char *name, struct asset *out, struct error *e)
 {
 	int rc = open_counted(user, name, out, e);
@@ -482,7 +483,7 @@ static int open_large(void *user, const char *name, struct asset *out, struct er
 	return rc;
 }
 
-/* Other files are read again, but not for ever. */
+/* External files are read again when needed, but only a limited number of times. */
 static void by_turns_for_ever(void **state)
 {
 	(void)state;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Less usual glTF files: several sets of texture coordinates, unlit materials, files without extents of their
- * accessors, cameras and lights, version 1, and materials of specular and glossiness; and the names that the reader
- * gives to shapes.
+ * Less usual glTF files: several sets of texture coordinates, unlit materials, accessors without bounds, files
+ * without cameras and lights, version 1, and specular-glossiness materials; and the names that the reader gives to
+ * shapes.
  */
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_parts.h"
@@ -98,7 +98,7 @@ static const struct scene_node *material_of(const struct scene *s)
 	return NULL;
 }
 
-/* By which coordinates the image of a property is looked up. */
+/* Returns the coordinates by which the image of a property is looked up. */
 static const char *coordinates_of(const struct scene_node *bsdf, const char *name)
 {
 	const struct property *p = node_find(bsdf, name);
@@ -106,7 +106,7 @@ static const char *coordinates_of(const struct scene_node *bsdf, const char *nam
 	return node_string(p->value.as.node, "coordinates", "");
 }
 
-/* One set is the shape's, the normal map's if there is one, the other an attribute. */
+/* One set becomes that of the shape, preferably the normal map's; the other becomes an attribute. */
 static void test_two_sets(void **state)
 {
 	(void)state;
@@ -126,7 +126,7 @@ static void test_two_sets(void **state)
 	scene_fini(&s);
 }
 
-/* Lit, with a note; a file that requires it is refused. */
+/* Unlit materials are rendered as lit ones, with a note; a file that requires the extension is refused. */
 static void test_unlit(void **state)
 {
 	(void)state;
@@ -147,7 +147,7 @@ static void test_versions(void **state)
 	refuses(FILE_OF("\"1.0\"", FIRST, "", BOUNDS), "glTF of version \"1.0\"; 2.0 is supported");
 }
 
-/* Without bounds a camera cannot be placed before the meshes are read: there is none in the scene. */
+/* Without bounds, no camera can be placed before the meshes are read, so the scene has none. */
 static void test_camera(void **state)
 {
 	(void)state;
@@ -163,7 +163,7 @@ static void test_camera(void **state)
 	}
 }
 
-/* A material that glows as far as a screen does is shown by other light; a lamp is light enough. */
+/* A material that glows like a screen needs other light in the scene; a lamp is enough light. */
 static void test_light(void **state)
 {
 	(void)state;
@@ -173,7 +173,7 @@ static void test_light(void **state)
 			strong ? GLOWS(", \"extensions\": {\"KHR_materials_emissive_strength\": {\"emissiveStrength\": 1.5}}")
 			       : GLOWS(""));
 		int skies = 0;
-		assert_non_null(node_child(shape_of(&s), PLUGIN_EMITTER, 0)); /* it shines in any case */
+		assert_non_null(node_child(shape_of(&s), PLUGIN_EMITTER, 0)); /* the shape emits light in any case */
 		for (uint32_t i = 0; i < s.object_count; i++)
 			skies += s.objects[i]->cls == PLUGIN_EMITTER && strcmp(s.objects[i]->type, "constant") == 0;
 		assert_int_equal(skies, !strong);
@@ -181,7 +181,7 @@ static void test_light(void **state)
 	}
 }
 
-/* Base and metal are those of which the two colours were made. */
+/* Base colour and metalness are those from which the two colours were computed. */
 static void test_specular_glossiness(void **state)
 {
 	(void)state;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Readers of PNG, JPEG, HDR and EXR: all kinds and depths of pixels come out with the values that were written, with
- * and without the sRGB curve; truncated and damaged files are refused; files that promise more pixels than a scene may
- * have are refused before anything is allocated; each failing allocation is an error and leaks nothing.
+ * Readers of PNG, JPEG, HDR and EXR: all types and depths of pixels are read with the values that were written, with
+ * and without the sRGB curve; truncated and damaged files are refused; files that promise more pixels than a scene
+ * may have are refused before anything is allocated; each failing allocation gives an error and leaks nothing.
  */
 #include "tests/support/failing_memory.h"
 #include "tests/support/image_read.h"
@@ -90,7 +90,7 @@ static void test_png(void **state)
 		}
 }
 
-/* One number of each pixel, and alpha, which is 1 where there is none and never decoded as a colour. */
+/* One channel of each pixel, and alpha, which is 1 in images without alpha and never decoded as a colour. */
 static void test_channels(void **state)
 {
 	(void)state;
@@ -161,7 +161,7 @@ static void test_bad_png(void **state)
 	free(png);
 }
 
-/* A PNG of one pixel whose header says that it has side x side. */
+/* Returns a PNG of one pixel whose header claims side x side pixels. */
 static unsigned char *promising_png(unsigned side, int color, size_t *size)
 {
 	unsigned char *small = sample_png(1, 1, SAMPLE_RGB, 8, 0, size), high = (unsigned char)(side >> 8),
@@ -189,8 +189,8 @@ static void refuses_png(unsigned side, int color, const char *text)
 	free(png);
 }
 
-/* A header that promises pixels and nothing behind it must not cost a gigabyte first; nor one with much behind it, more
- * than that. */
+/* A header that promises pixels with no data after it must not cost a gigabyte; nor may one with some data cost more
+ * than the data can fill. */
 static void test_png_bomb(void **state)
 {
 	(void)state;
@@ -198,7 +198,7 @@ static void test_png_bomb(void **state)
 	refuses_png(16000, 2, "i: 16000 x 16000 pixels; at most 134217728");
 }
 
-/* The size that a frame's header tells; a file of that size may be well compressed. */
+/* The size in a frame's header; a file of this size may be well compressed. */
 static void test_jpeg_bomb(void **state)
 {
 	(void)state;
@@ -338,7 +338,7 @@ static void test_exr(void **state)
 	refuses(exr, size / 2, "i: ");
 	mem_free(exr);
 	exr = make_exr(rgb, 3, value, &size);
-	for (size_t i = 0; i < size - 40; i++) /* xMin yMin xMax yMax behind the name, the type and a length */
+	for (size_t i = 0; i < size - 40; i++) /* xMin yMin xMax yMax follow the name, the type and a length */
 		if (memcmp(exr + i, "dataWindow\0box2i", 17) == 0)
 			memcpy(exr + i + 17 + 4 + 8, "\xdf\x2e\0\0\xdf\x2e\0", 8);
 	refuses(exr, size, "i: 12000 x 12000 pixels of 3 channels take 1647 MB decoded; at most 1536 MB");

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Windows bitmaps written by hand, from the format's description: all widths of pixels, both directions, and lies. */
+/* Windows bitmaps written by hand from the format's description: all pixel sizes, both row orders, and false headers.
+ */
 #include "tests/support/memory_assets.h"
 #include "tests/support/image_read.h"
 
@@ -24,7 +25,7 @@ static void put(unsigned char *p, uint32_t x, int bytes)
 		p[i] = (unsigned char)(x >> 8 * i);
 }
 
-/* Which of `colours` pixel (x,y) is, y from the top. */
+/* Returns the index into `colours` of pixel (x,y), with y from the top. */
 static uint32_t index_at(uint32_t x, uint32_t y, uint32_t colours)
 {
 	return (3 * x + 7 * y + x * y) % colours;
@@ -36,7 +37,7 @@ static void colour_of(uint32_t i, bool grey, unsigned char bgr[3])
 		bgr[k] = (unsigned char)(37 * i + (grey ? 5 : 61 * k));
 }
 
-/* Without a palette (24, 32 bits) the colours stand in the pixels. */
+/* Without a palette (24, 32 bits), the pixels contain the colours. */
 static struct bitmap bitmap_of(uint32_t bits, bool grey, bool down, bool core, bool masks)
 {
 	struct bitmap b = {.size = 0};

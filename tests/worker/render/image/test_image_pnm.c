@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Portable maps written by hand: integers of 8 and 16 bits, floats in both byte orders, comments, and lies. */
+/* Portable maps written by hand: integers of 8 and 16 bits, floats in both byte orders, comments, and false headers. */
 #include "tests/support/memory_assets.h"
 #include "worker/render/image/image.h"
 #include "worker/render/image/srgb.h"
@@ -51,7 +51,7 @@ static struct file integers(const char *header, unsigned channels, unsigned max)
 	return f;
 }
 
-/* Sample i is in the row y from the top, and stored in the row from the bottom. */
+/* Sample i belongs to its row from the top; rows are stored from the bottom. */
 static struct file reals(const char *header, unsigned channels, bool big_endian)
 {
 	struct file f = header_of(header);
@@ -88,7 +88,7 @@ static void refuses_text(const char *text, const char *why)
 	refuses(&f, f.size, why);
 }
 
-/* max 0: floats, times `scale`. */
+/* max 0: floats, multiplied by `scale`. */
 static void check(const struct file *f, unsigned channels, unsigned max, double scale)
 {
 	for (int raw = 0; raw < 2; raw++) {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* TGA files written by hand, from the format's description: all kinds, plain and packed, from all corners, and lies. */
+/* TGA files written by hand from the format's description: all types, plain and compressed, from all corners, and
+ * false headers. */
 #include "tests/support/memory_assets.h"
 #include "worker/render/image/image.h"
 #include "worker/render/image/srgb.h"
@@ -25,7 +26,7 @@ struct form {
 	bool packed, down, leftwards;
 };
 
-/* Runs in some rows, across the ends of others, and none. */
+/* Some rows have runs, others have runs that cross their ends, and others none. */
 static unsigned level_at(unsigned x, unsigned y, unsigned k)
 {
 	unsigned run = y == 1 ? 0 : y == 2 ? x / 3 : x;
@@ -58,7 +59,7 @@ static unsigned pixel_of(const struct form *o, unsigned n, unsigned char out[4])
 	return o->kind == MAPPED ? 1 : o->bits / 8;
 }
 
-/* Packets of at most four pixels. */
+/* Writes packets of at most four pixels. */
 static void put_pixels(struct file *f, const struct form *o)
 {
 	for (unsigned n = 0; n < WIDTH * HEIGHT;) {
@@ -169,7 +170,7 @@ static void test_all_kinds(void **state)
 		}
 }
 
-/* Without a name, the signature of version 2 tells. */
+/* Without a file name, the signature of version 2 identifies the format. */
 static void test_signature(void **state)
 {
 	(void)state;
@@ -214,7 +215,7 @@ static void test_lies(void **state)
 	refuses_changed(MAPPED, 24, 3, FIRST - 1, "beyond the palette");
 	const struct form o = {COLOUR, 24, true, false, false};
 	struct file f = file_of(&o);
-	f.bytes[13] = 8; /* the best compression could not hold so many */
+	f.bytes[13] = 8; /* more pixels than the best compression could hold */
 	f.bytes[15] = 8;
 	refuses(&f, f.size, "too short for");
 }

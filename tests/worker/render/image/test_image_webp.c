@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* WebP files made by libwebp's encoder: exact where they are lossless, near where they are not; and damaged ones. */
+/* WebP files made by libwebp's encoder: equal if lossless, close if lossy; and damaged files. */
 #include "common/base/mem.h"
 #include "tests/support/dice.h"
 #include "worker/render/image/image.h"
@@ -41,7 +41,7 @@ static void test_lossless(void **state)
 	(void)state;
 	uint8_t rgba[4 * WIDTH * HEIGHT], *file = NULL;
 	draw(rgba);
-	for (int i = 0; i < WIDTH * HEIGHT; i++) /* the encoder clears the colours of what is transparent */
+	for (int i = 0; i < WIDTH * HEIGHT; i++) /* the encoder clears the colours of transparent pixels */
 		rgba[4 * i + 3] = (uint8_t)(rgba[4 * i + 3] | 1);
 	size_t size = WebPEncodeLosslessRGBA(rgba, WIDTH, HEIGHT, 4 * WIDTH, &file);
 	assert_true(size > 0);
@@ -98,7 +98,7 @@ static void refuses(const void *bytes, size_t size, const char *text)
 	arena_fini(&a);
 }
 
-/* Prefixes and single bytes: an image of the same size, or a sentence. */
+/* Prefixes and single changed bytes give an image of the same size or an error message. */
 static void test_damaged(void **state)
 {
 	(void)state;

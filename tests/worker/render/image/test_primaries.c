@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Images whose header says that R, G and B are other colours than those of BT.709, against published matrices: of
- * BT.2020 (ITU-R BT.2087, four digits) and of ACEScg (S-2014-004, to XYZ).
+ * Images whose header states primaries other than those of BT.709, against published matrices: of BT.2020 (ITU-R
+ * BT.2087, four digits) and of ACEScg (S-2014-004, to XYZ).
  */
 #include "worker/render/image/image.h"
 #include "worker/render/image/primaries.h"
@@ -34,7 +34,7 @@ static void expect(const char *what, const struct primaries *p, double expected[
 				fail_msg("%s: [%d][%d] is %.6f, not %.6f", what, i, j, m[i][j], expected[i][j]);
 }
 
-/* The columns of the matrix from XYZ, applied to the columns of another. */
+/* Applies the inverse of the BT.709 matrix (from XYZ) to the columns of another matrix. */
 static void from_xyz(const double columns[3][3], double m[3][3])
 {
 	for (int j = 0; j < 3; j++) {
@@ -56,7 +56,7 @@ static void test_matrices(void **state)
 					 {0.1561876870, 0.0536895174, 1.0103391003}};
 	expect("BT.709", &bt709, same, 1e-14);
 	expect("BT.2020", &bt2020, of_bt2020, 6e-5);
-	/* The published matrices from XYZ have a white that differs in the fourth digit. */
+	/* The white of the published matrices from XYZ differs in the fourth digit. */
 	from_xyz(axes, m);
 	expect("XYZ", &xyz, m, 1e-3);
 	from_xyz(ap1, m);
@@ -71,8 +71,8 @@ static void test_no_colours(void **state)
 	static const struct primaries none[] = {
 		{{0, 0, 0, 0}, {0, 0, 0, 0}},				    /* a header of zeros */
 		{{0.64f, 0.30f, 0.15f, 0.3127f}, {0.33f, 0.60f, 0.06f, 0}}, /* a white without luminance */
-		{{0.1f, 0.2f, 0.4f, 0.3f}, {0.1f, 0.2f, 0.4f, 0.3f}},	    /* on a line */
-		{{0.7f, 0.2f, 0.45f, 0.3f}, {0.1f, 0.6f, 0.35f, 0.3f}},	    /* on a line but for rounding */
+		{{0.1f, 0.2f, 0.4f, 0.3f}, {0.1f, 0.2f, 0.4f, 0.3f}},	    /* collinear */
+		{{0.7f, 0.2f, 0.45f, 0.3f}, {0.1f, 0.6f, 0.35f, 0.3f}},	    /* collinear but for rounding */
 		{{NAN, 0.30f, 0.15f, 0.3127f}, {0.33f, 0.60f, 0.06f, 0.3290f}},
 		{{0.64f, 0.30f, 0.15f, INFINITY}, {0.33f, 0.60f, 0.06f, 0.3290f}},
 	};
@@ -82,7 +82,7 @@ static void test_no_colours(void **state)
 			fail_msg("%zu has colours", i);
 }
 
-/* An image of one colour, with these primaries in its header. */
+/* Returns an image of one colour with these primaries in its header. */
 static unsigned char *make_exr(const struct primaries *p, const float *colour, size_t *size)
 {
 	struct exr_image x = {.width = 1, .height = 1, .channel_count = 3, .full_width = 1, .full_height = 1};
@@ -100,7 +100,7 @@ static unsigned char *make_exr(const struct primaries *p, const float *colour, s
 		stored[2 * k] = p->x[k];
 		stored[2 * k + 1] = p->y[k];
 	}
-	static const char name[] = "chromaticities\0chromaticities"; /* then a length of four bytes */
+	static const char name[] = "chromaticities\0chromaticities"; /* followed by a length of four bytes */
 	size_t at = 0;
 	while (memcmp(bytes + at, name, sizeof name) != 0)
 		assert_true(++at < *size - sizeof name);
