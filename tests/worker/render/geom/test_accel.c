@@ -184,8 +184,7 @@ static void check_segments(const char *name, const struct geom_shape *body)
 		struct ray_end from = body_end(&x), to = body_end(&y);
 		if (!body->is_sphere && x.prim.prim == y.prim.prim)
 			continue;
-		if (accel_occluded(open, &from,
-				   &to)) /* the ball of triangles has valleys: does the search in double agree? */
+		if (accel_occluded(open, &from, &to)) /* the mesh has valleys: does the search in double agree? */
 			unseen += !hidden_by_mesh(body, x.p, y.p);
 		else if (i % 50 == 0)
 			unseen += hidden_by_mesh(body, x.p, y.p);

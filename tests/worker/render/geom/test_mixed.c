@@ -181,8 +181,7 @@ static void test_mixed(void **state)
 			"%zu %zu %zu, blocked %zu\n",
 			sizes[i].size, n, close, far, segments, floor, met[0], met[1], met[2], blocked);
 		double expected = (double)n * (double)sizes[i].wrong * 1e-6;
-		size_t most = (size_t)(expected + 4 * sqrt(expected) +
-				       1); /* with an allowance of four standard deviations for small samples */
+		size_t most = (size_t)(expected + 4 * sqrt(expected) + 1); /* 4 sigma, also for small samples */
 		assert_true(close <= most && far <= most && segments <= most && floor <= most);
 		for (int k = 0; k < SHAPES; k++)
 			assert_true(met[k] > n / 50);

@@ -95,8 +95,7 @@ static void test_look_at(void **state)
 	mat4 m = mat4_look_at((vec3){0, -9, 3.5}, (vec3){0, 0, 3.5}, (vec3){0, 0, 1});
 	assert_vec3(mat4_vector(&m, (vec3){0, 0, 1}), 0, 1, 0, 1e-15);
 	assert_vec3(mat4_vector(&m, (vec3){0, 1, 0}), 0, 0, 1, 1e-15);
-	assert_vec3(mat4_vector(&m, (vec3){1, 0, 0}), -1, 0, 0,
-		    1e-15); /* to the left of a viewer who looks along +y with z up */
+	assert_vec3(mat4_vector(&m, (vec3){1, 0, 0}), -1, 0, 0, 1e-15); /* left of a viewer along +y with z up */
 	assert_vec3(mat4_point(&m, (vec3){0, 0, 0}), 0, -9, 3.5, 0);
 	assert_near(mat4_det3(m), 1, 1e-15);
 }

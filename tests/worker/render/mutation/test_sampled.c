@@ -68,9 +68,8 @@ struct sampling {
 	const struct example *example;
 	const struct mutation_ops *ops;
 	struct full_path *x, *y;
-	unsigned vertex[FULL_PATH_MAX_VERTICES], count,
-		ends;			       /* vertices that move; ends: how many of them are ends of the path */
-	double mean[MOST], factor[MOST][MOST]; /* factor: Cholesky's, of the covariance */
+	unsigned vertex[FULL_PATH_MAX_VERTICES], count, ends; /* moving vertices; ends: of these, path ends */
+	double mean[MOST], factor[MOST][MOST];		      /* factor: Cholesky's, of the covariance */
 	unsigned long failures;
 };
 

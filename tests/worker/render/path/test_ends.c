@@ -133,9 +133,7 @@ static double irradiance(const struct lamps *l, double x, double z)
 
 static void check_floor(const char *name, const struct lamps *l, struct effort e)
 {
-	enum {
-		N = 480
-	}; /* the midpoint rule errs by 1e-6; with 48 points by 7e-5, which low-discrepancy samples would reveal */
+	enum { N = 480 }; /* the midpoint rule errs by 1e-6; with 48 by 7e-5, which the samples would reveal */
 	static struct agree_image image;
 	const struct agree_side sides[] = {{"path", e.path, 32, 0, 0},
 					   {"bdpt", e.bdpt, 32, 0, 0},

@@ -178,8 +178,7 @@ static void test_grid_as_layers(void **state)
 		}
 		assert_int_equal(to[0].kind, to[1].kind);
 		in_media += to[0].kind == VERTEX_MEDIUM;
-		if (to[0].kind ==
-		    VERTEX_MEDIUM) /* the medium in the middle of the first scene may differ from that of the second */
+		if (to[0].kind == VERTEX_MEDIUM) /* the medium in the middle may differ between the scenes */
 			assert_true(fabs(to[0].x.p.z / w[0]->scale + w[0]->center.z - to[1].x.p.z / w[1]->scale -
 					 w[1]->center.z) < 1e-5);
 		assert_true(fabs(pdf[0] / pdf[1] - 1) < 1e-5);
