@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Parts of the worker daemon: the thread pool runs tasks and returns them on the loop's thread, workers share a cache
- * folder without sharing a slot and never use somebody else's, files of an earlier run are hashed before use, a job is
- * built from the files that it needs, and the numeric fingerprint is the same each time.
+ * Parts of the worker daemon: the thread pool runs tasks and returns them on the loop's thread; workers share a cache
+ * folder without sharing a slot, and never use another user's cache; files of an earlier run are hashed before use; a
+ * job is built from the files that it needs; and the numeric fingerprint is the same each time.
  */
 #include "common/base/mem.h"
 #include "worker/daemon/job_cache.h"
@@ -77,7 +77,7 @@ static void the_pool_runs_tasks(void **state)
 	}
 	while (atomic_load(&running) < 3)
 		usleep(100);
-	assert_false(thread_pool_take_back(c, &jobs[0].task)); /* it runs */
+	assert_false(thread_pool_take_back(c, &jobs[0].task)); /* it is running */
 	assert_true(thread_pool_take_back(c, &jobs[50].task));
 	assert_true(thread_pool_take_back(c, &jobs[JOBS - 1].task));
 	assert_false(thread_pool_take_back(c, &jobs[50].task));
@@ -114,13 +114,13 @@ static void workers_share_a_cache_folder(void **state)
 	assert_int_equal(blob_write_commit(w, &e), 0);
 	assert_false(blob_has(b.blobs, &h, NULL)); /* each has a slot of its own */
 	cache_close(&a);
-	assert_int_equal(cache_open(&c, path, 1000, &e), 0); /* the free slot again, with what it held */
+	assert_int_equal(cache_open(&c, path, 1000, &e), 0); /* the free slot is used again, with its contents */
 	assert_true(blob_has(c.blobs, &h, NULL));
 	cache_close(&b);
 	cache_close(&c);
 }
 
-/* In /tmp anybody can be there first, with files of the right names and wrong contents. */
+/* In /tmp any user can create the folder first, with files of the right names and wrong contents. */
 static void a_cache_of_others_is_not_used(void **state)
 {
 	(void)state;
@@ -221,7 +221,7 @@ static void on_read(struct job_cache *b)
 	files_read++;
 }
 
-/* Files of an earlier run are read before they are used, not on the loop's thread: the damaged one is fetched again. */
+/* Files of an earlier run are read before use, and not on the loop's thread: the damaged file is fetched again. */
 static void files_of_an_earlier_run_are_read(void **state)
 {
 	(void)state;
@@ -284,10 +284,10 @@ static void a_job_cache_holds_what_it_needs(void **state)
 	assert_false(blob_hash_equal(&b->wanted, &first));
 	store_text(&cache, texts[1]);
 	assert_int_equal(job_cache_look(b, &loop),
-			 JOB_CACHE_LACKS); /* the third is the first again; the empty one is left */
+			 JOB_CACHE_LACKS); /* the third equals the first; the empty one is missing */
 	store_text(&cache, texts[3]);
 	assert_int_equal(job_cache_look(b, &loop), JOB_CACHE_HAS);
-	/* The scene is none: that is found by the builder, and said. */
+	/* The scene is invalid: building it fails with a message. */
 	assert_int_equal(thread_pool_new(&thread_pool, &loop, 1, &e), 0);
 	b->built = on_built;
 	assert_int_equal(job_cache_build(b, thread_pool, &e), 0);
@@ -314,7 +314,7 @@ static void the_fingerprint_is_stable(void **state)
 	assert_non_null(strstr(a, "build="));
 	assert_non_null(strstr(a, "embree"));
 	assert_non_null(strstr(a, "libc="));
-	assert_true(strlen(a) < FINGERPRINT_MAX - 1); /* nothing was cut off */
+	assert_true(strlen(a) < FINGERPRINT_MAX - 1); /* not truncated */
 	assert_true(fingerprint_self_test() == fingerprint_self_test());
 }
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A worker's lease queue with a scripted coordinator: files that several jobs want come once, whatever
- * happens to the job that asked first, to the connection or to the disk.
+ * A worker's lease queue with a scripted coordinator: a file needed by several jobs is fetched once, whatever happens
+ * to the job that asked first, to the connection or to the disk.
  */
 #include "common/base/disk.h"
 #include "tests/support/folder.h"
@@ -29,8 +29,8 @@ static void a_shared_file_comes_once(void **state)
 	coord_finish();
 }
 
-/* The job that asked ends, then the others do; what was under way is nobody's, and is asked for anew by the next one.
- */
+/* The job that asked for a file ends, then the other jobs do. The piece under way belongs to no job, and the next job
+ * asks for it again. */
 static void whoever_asked_may_go(void **state)
 {
 	(void)state;
@@ -43,7 +43,7 @@ static void whoever_asked_may_go(void **state)
 	coord_hear_blob_get(&coord.mesh, 2 * PIECE);
 	coord_end_job(2);
 	coord_grant(3);
-	coord_send_piece(&coord.mesh, 2 * PIECE); /* nobody wants it now, but it was asked for */
+	coord_send_piece(&coord.mesh, 2 * PIECE); /* no job needs this piece now, but it was requested */
 	coord_describe(3);
 	coord_hear_blob_get(&coord.scenes[2], 0);
 	coord_send_piece(&coord.scenes[2], 0);
@@ -52,7 +52,7 @@ static void whoever_asked_may_go(void **state)
 	coord_finish();
 }
 
-/* A job that comes while the piece of one that has ended is under way goes on with that. */
+/* A job that arrives while a piece for an ended job is under way continues with this piece. */
 static void a_late_job_takes_over(void **state)
 {
 	(void)state;
@@ -65,7 +65,7 @@ static void a_late_job_takes_over(void **state)
 	coord_describe(2);
 	coord_hear_blob_get(&coord.scenes[1], 0);
 	coord_send_piece(&coord.scenes[1], 0);
-	coord_grant(3); /* what came before has been handled by now */
+	coord_grant(3); /* all earlier messages have been handled by now */
 	coord_send_piece(&coord.mesh, 2 * PIECE);
 	coord_serve_mesh(3, PIECES);
 	coord_hear_built(1);
@@ -89,7 +89,7 @@ static void a_new_connection_goes_on(void **state)
 	coord_serve_mesh(2, PIECES);
 	coord_hear_built(2);
 	coord_hang_up();
-	coord_welcome(); /* the jobs have gone, and with them what was fetched of nothing */
+	coord_welcome(); /* the jobs are gone, and with them their fetches */
 	assert_int_equal(coord_hear()->body_case, FARM__ENVELOPE__BODY_LEASE_REQUEST);
 	assert_null(coord.agent->fetches);
 	coord_finish();
@@ -110,8 +110,8 @@ static void old_leases_do_not_pile_up(void **state)
 	coord_finish();
 }
 
-/* A coordinator that has lost its spool, and grants a lease of another job 1 before the worker knows: it gets it back,
- * and can grant it again. */
+/* A coordinator that has lost its spool grants a lease of another job 1 before the worker knows: the lease is
+ * returned, and can be granted again. */
 static void another_job_of_that_number(void **state)
 {
 	(void)state;
@@ -136,7 +136,7 @@ static void another_job_of_that_number(void **state)
 	coord_finish();
 }
 
-/* Pieces that nobody asked for, or not now, or not there. */
+/* Pieces that were not requested, not requested now, or do not exist. */
 static void what_was_not_asked_for_is_refused(void **state)
 {
 	(void)state;
@@ -171,7 +171,7 @@ static void lies_are_noticed(void **state)
 	coord_send_piece(&coord.mesh, (PIECES - 1) * PIECE);
 	coord.mesh_bytes[MESH - 1] ^= 1;
 	const uint64_t first = coord_hear_failed("do not match the blob");
-	coord_serve_mesh(0, PIECES); /* the other one tries for itself */
+	coord_serve_mesh(0, PIECES); /* the other job fetches the file itself */
 	assert_int_equal(coord_hear_failed("scene"), 3 - first);
 	coord_finish();
 }
@@ -183,7 +183,7 @@ static void a_store_without_room_fails_each_once(void **state)
 	coord_begin_jobs(2);
 	coord_serve_mesh(0, 1);
 	const uint64_t first = coord_hear_failed("exceeds its limit");
-	assert_false(coord.own); /* it was set up so: no worker may have room for such a file */
+	assert_false(coord.own); /* a configured limit: no worker may have room for this file */
 	coord_serve_mesh(0, 1);
 	assert_int_equal(coord_hear_failed("exceeds its limit"), 3 - first);
 	coord_hear_silence();
@@ -210,14 +210,14 @@ static void a_full_disk_is_its_own_fault(void **state)
 	assert_int_equal(coord_hear_failed("No space left on device"), 1);
 	assert_true(coord.own);
 	disk_use(NULL);
-	coord_grant(1); /* with room again it works */
+	coord_grant(1); /* with free space again it works */
 	coord_describe(1);
 	coord_serve_mesh(0, PIECES);
 	coord_hear_built(1);
 	coord_finish();
 }
 
-/* What was in the cache is there no more. */
+/* Files in the cache have been deleted. */
 static void a_lost_file_is_its_own_fault(void **state)
 {
 	(void)state;

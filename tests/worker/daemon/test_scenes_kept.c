@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Which scenes a worker holds at once after memory ran short, with a scripted coordinator: one at a time for ten
- * minutes, twice as long when it happens again, then all. Leases of the scene that waits are given back, and no job
- * fails of it.
+ * Which scenes a worker holds at the same time after memory ran short, with a scripted coordinator: one at a time for
+ * ten minutes, twice as long if it happens again, then all. Leases of a waiting scene are returned, and no job fails
+ * because of it.
  */
 #include "common/base/clock.h"
 #include "common/base/mem.h"
@@ -23,7 +23,7 @@
 #include <stdatomic.h>
 #include <unistd.h>
 
-/* A worker starts whose rendering process has just been ended by SIGKILL. */
+/* Starts a worker whose rendering process has just been killed by SIGKILL. */
 static void begin_short(void)
 {
 	struct error e;
@@ -35,12 +35,12 @@ static void begin_short(void)
 static void hear_later(uint64_t job, const char *why)
 {
 	assert_int_equal(coord_hear_failed(why), job);
-	assert_true(coord.own); /* which counts against no job */
+	assert_true(coord.own); /* the failure does not count against the job */
 	assert_true(coord.at->env.message->lease_failed->later);
 }
 
-/* Two scenes that fit into memory only one after the other would end each rendering process, and neither job would ever
- * be done. */
+/* Two scenes that fit into memory only one at a time would kill each rendering process, so that neither job would
+ * ever be done. */
 static void one_scene_at_a_time_where_memory_was_short(void **state)
 {
 	struct error e;
@@ -50,7 +50,7 @@ static void one_scene_at_a_time_where_memory_was_short(void **state)
 	coord_grant(1);
 	coord_grant(2);
 	coord_finish();
-	work_lose(SIGSEGV, clock_seconds()); /* a fault of a scene, not of the machine */
+	work_lose(SIGSEGV, clock_seconds()); /* the fault of a scene, not of the machine */
 	coord_start(0);
 	coord_grant(1);
 	coord_grant(2);
@@ -60,7 +60,7 @@ static void one_scene_at_a_time_where_memory_was_short(void **state)
 	coord_say_grant(2);
 	hear_later(2, "memory ran short, so it holds one scene at a time, now that of j1");
 	coord_say_revoke(1);
-	coord_grant(2); /* the scene of j1 may be wanted again, but it is used by nobody */
+	coord_grant(2); /* j1 has no lease, so its scene may be dropped */
 	coord_say_grant(1);
 	hear_later(1, "now that of j2");
 	coord_end_job(2);
@@ -68,8 +68,8 @@ static void one_scene_at_a_time_where_memory_was_short(void **state)
 	coord_finish();
 }
 
-/* However many leases its job is granted: it takes no new ones, and once nobody uses the scene the other job is next.
- */
+/* The scene in memory must give way however many leases its job is granted: it gets no new ones, and once it is
+ * unused the other job's scene is built. */
 static void a_scene_makes_way_for_one_that_waits(void **state)
 {
 	(void)state;
@@ -77,7 +77,7 @@ static void a_scene_makes_way_for_one_that_waits(void **state)
 	coord_grant(1);
 	coord_say_grant(2);
 	hear_later(2, "now that of j1");
-	coord.agent->turn.since -= 299; /* as if so long had passed */
+	coord.agent->turn.since -= 299; /* as if this time had passed */
 	coord_say_revoke(1);
 	coord_say_grant(1);
 	coord_say_grant(2);
@@ -90,7 +90,7 @@ static void a_scene_makes_way_for_one_that_waits(void **state)
 	coord_say_grant(1);
 	hear_later(1, "now that of j2");
 	coord.agent->turn.since -= 301;
-	coord.agent->turn.asked -= 61; /* j1 has not been granted for so long */
+	coord.agent->turn.asked -= 61; /* j1 has not been granted a lease for this time */
 	coord_say_revoke(2);
 	coord_say_grant(2);
 	coord_say_grant(1);
@@ -98,7 +98,8 @@ static void a_scene_makes_way_for_one_that_waits(void **state)
 	coord_finish();
 }
 
-/* After ten minutes; each time memory runs short again within as long, the next period is twice as long. */
+/* The restriction ends after ten minutes; each time memory runs short again within the same time, the next period is
+ * twice as long. */
 static void the_restriction_ends(void **state)
 {
 	struct error e;
@@ -111,12 +112,12 @@ static void the_restriction_ends(void **state)
 	work_memory_short(1700);
 	assert_true(work_memory_was_short(2899));
 	assert_false(work_memory_was_short(2901));
-	work_memory_short(4101); /* as long again has passed without: ten minutes */
+	work_memory_short(4101); /* the same time has passed without a shortage: ten minutes */
 	assert_true(work_memory_was_short(4700));
-	work_lose(SIGKILL, 4700); /* within the period: it begins anew, as long as before */
+	work_lose(SIGKILL, 4700); /* within the period: it restarts with the same length */
 	assert_true(work_memory_was_short(5299));
 	assert_false(work_memory_was_short(5301));
-	double at = 5300, lasts = 600; /* the last one began at 4700 */
+	double at = 5300, lasts = 600; /* the last period began at 4700 */
 	for (int i = 0; i < 8; i++) {
 		lasts = 2 * lasts < 19200 ? 2 * lasts : 19200;
 		work_memory_short(at);
@@ -126,7 +127,7 @@ static void the_restriction_ends(void **state)
 	assert_false(work_memory_was_short(at + 1));
 }
 
-/* After the period both jobs are accepted again. */
+/* After the period, both jobs are accepted again. */
 static void then_it_takes_any(void **state)
 {
 	struct error e;
@@ -139,7 +140,7 @@ static void then_it_takes_any(void **state)
 	coord_finish();
 }
 
-/* Keeps the pool's only thread busy. */
+/* A task that keeps the pool's only thread busy until gate_open. */
 static atomic_bool gate_open;
 static void wait_at_gate(struct task *task)
 {
@@ -148,10 +149,10 @@ static void wait_at_gate(struct task *task)
 		usleep(100);
 }
 
-/* The job's world is being built, and one of its first allocations fails. The job is the latest. */
+/* Builds the world of the latest job, while one of the first allocations fails. */
 static void run_out_of_memory(uint64_t job)
 {
-	struct task gate = {.run = wait_at_gate, .done = wait_at_gate /* which is open by then */};
+	struct task gate = {.run = wait_at_gate, .done = wait_at_gate /* done: the gate is open by then */};
 	atomic_store(&gate_open, false);
 	thread_pool_add(coord.agent->thread_pool, &gate);
 	coord_describe(job);
@@ -170,7 +171,7 @@ static void run_out_of_memory(uint64_t job)
 static const char small_scene[] =
 	"<scene version='3.0.0'>" SENSOR("0,0,5", "0,0,0") "<shape type='sphere'/><emitter type='constant'/></scene>\n";
 
-/* Both scenes are files of the coordinator's, and the worker has computed a lease of the first. */
+/* Both scenes are files of the coordinator, and the worker has computed a lease of the first. */
 static void compute_first_of_two(void)
 {
 	coord_make_file(&coord.scenes[0], small_scene, sizeof small_scene - 1);
@@ -183,14 +184,14 @@ static void compute_first_of_two(void)
 	assert_int_equal(coord_hear()->body_case, FARM__ENVELOPE__BODY_LEASE_RESULT);
 }
 
-/* The lease of a job that has ended is still on its thread: another job is not refused, which would be asked for again
- * after 10 s only. Its files are fetched, and its scene waits. Returns the lease, whose thread then stops. */
+/* A lease of an ended job is still on its thread. Another job is not refused, because the coordinator would offer it
+ * again only after 10 s: its files are fetched, and its scene waits. Returns the lease; its thread stops afterwards. */
 static struct lease_task *begin_beside_a_thread(struct job_cache **next)
 {
 	begin_short();
 	compute_first_of_two();
 	struct lease_task *l = coord.agent->leases;
-	l->state = LEASE_QUEUED; /* as if its thread still computed it */
+	l->state = LEASE_QUEUED; /* as if its thread were still computing it */
 	coord_end_job(1);
 	coord_grant(2);
 	assert_true(l->unwanted);
@@ -214,7 +215,7 @@ static void a_thread_that_has_yet_to_stop(void **state)
 	coord_finish();
 }
 
-/* It has given back the leases of the scene that waits. */
+/* A worker that leaves has returned the leases of the waiting scene, and must not build it. */
 static void who_leaves_builds_no_more(void **state)
 {
 	struct job_cache *next;
@@ -228,8 +229,8 @@ static void who_leaves_builds_no_more(void **state)
 	coord_finish();
 }
 
-/* As above, where the system refuses memory instead. No job is at fault, whether or not its scene was alone; in
- * company, the worker holds one scene at a time afterwards. */
+/* Like a shortage that kills the process, but the system refuses memory. No job is at fault, whether or not its scene
+ * was the only one; if it was not, the worker holds one scene at a time afterwards. */
 static void a_lack_of_memory_is_no_jobs_fault(void **state)
 {
 	struct error e;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A supervisor with processes that end as they are told: which of them are followed by another, and what its exit code
- * is. Each runs in a process of its own. */
+/* A supervisor whose worker processes end as planned: after which ends another process is started, and the
+ * supervisor's exit code. Each supervisor runs in a process of its own. */
 #include "worker/daemon/supervise.h"
 
 #include <errno.h>
@@ -19,13 +19,13 @@
 
 enum { STARTS_MOST = 8, BY_SIGNAL = 1000, NEVER = -1 };
 
-/* Shared with the processes. */
+/* The test's plan, in memory shared with the processes. */
 static struct {
-	int ends[STARTS_MOST]; /* of each process, by start: its exit code, BY_SIGNAL and a signal, or NEVER */
+	int ends[STARTS_MOST]; /* by start: an exit code, BY_SIGNAL + a signal, or NEVER */
 	atomic_int starts;
-	atomic_int forks, failing_forks; /* so many of the supervisor's, after the first, fail */
-	int hang_up; /* the process that sends SIGHUP to the supervisor before it ends; 0: none does */
-	bool counts; /* in the supervisor */
+	atomic_int forks, failing_forks; /* the supervisor's forks; after the first, this many fail */
+	int hang_up;			 /* number of the process that sends SIGHUP to the supervisor; 0: none */
+	bool counts;			 /* set in the supervisor */
 } * plan;
 
 pid_t __real_fork(void);
@@ -44,7 +44,7 @@ static int run_child(void *user)
 	(void)user;
 	int start = atomic_fetch_add(&plan->starts, 1), end = start < STARTS_MOST ? plan->ends[start] : 99;
 	if (plan->hang_up == start + 1)
-		kill(getppid(), SIGHUP); /* which it receives before this process ends: SIGCHLD has a higher number */
+		kill(getppid(), SIGHUP); /* delivered before this process ends: SIGCHLD has a higher number */
 	while (end == NEVER)
 		pause();
 	if (end >= BY_SIGNAL)
@@ -52,7 +52,7 @@ static int run_child(void *user)
 	return end;
 }
 
-/* The exit code of a supervisor that was started with SIGHUP at that. */
+/* Returns the exit code of a supervisor started with this disposition of SIGHUP. */
 static int supervise_code(void (*hang_up)(int))
 {
 	int status;
@@ -71,7 +71,8 @@ static int supervise_code(void (*hang_up)(int))
 	return WEXITSTATUS(status);
 }
 
-/* Whatever the process of that number ends with is the program's exit code, and no other process follows. */
+/* Whatever exit code the process with this number returns is the program's exit code, and no further process is
+ * started. */
 static void is_the_last(int process, const int *codes, size_t count)
 {
 	for (size_t i = 0; i < count; i++) {
@@ -107,7 +108,7 @@ static void no_process_for_a_while(void **state)
 	assert_int_equal(plan->forks, 4);
 }
 
-/* As under nohup, when its terminal ends. */
+/* SIGHUP is ignored as under nohup, when the terminal closes. */
 static void ignored_hang_up(void **state)
 {
 	(void)state;
@@ -116,7 +117,7 @@ static void ignored_hang_up(void **state)
 	plan->ends[1] = 6;
 	assert_int_equal(supervise_code(SIG_IGN), 6);
 	assert_int_equal(plan->starts, 2);
-	plan->ends[0] = NEVER; /* it is passed on */
+	plan->ends[0] = NEVER; /* SIGHUP ends the process, to which it is passed on */
 	assert_int_equal(supervise_code(SIG_DFL), 0);
 	assert_int_equal(plan->starts, 1);
 	plan->hang_up = 0;

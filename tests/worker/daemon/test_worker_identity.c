@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Starts are counted, whatever the file says; a home stays what it is while its file does. */
+/* Starts are counted, whatever the file contains; the home's name remains the same as long as its file exists. */
 #include "worker/daemon/worker_identity.h"
 
 #include "common/base/disk.h"
@@ -77,7 +77,7 @@ static int fail_when_full(int fd)
 	return -1;
 }
 
-/* Nobody counts, and what was there stays. */
+/* With a full disk the start is not counted, and the file remains unchanged. */
 static void disk_full(void **state)
 {
 	(void)state;
