@@ -13,7 +13,7 @@
 static void student_s_table(void **unused)
 {
 	(void)unused;
-	/* Two-sided 5 %, from any printed table. */
+	/* Two-sided 5 % quantiles, as in any printed table. */
 	static const double degrees[] = {1, 2, 5, 15, 30, 1e9}, t[] = {12.706, 4.303, 2.571, 2.131, 2.042, 1.960};
 	for (int i = 0; i < 6; i++)
 		assert_true(fabs(stats_t(0.05, degrees[i]) - t[i]) < 6e-4);
@@ -24,7 +24,8 @@ static void a_difference_by_hand(void **unused)
 	(void)unused;
 	const double a[] = {1, 2, 3, 4}, b[] = {2, 2, 2, 2}, one = 2, none = 0;
 	double t;
-	/* Mean 2.5, variance of the mean 5/12: a quarter more, sd sqrt(5/12)/2, 3 degrees (3.182). */
+	/* Mean 2.5, variance of the mean 5/12: a quarter above the other mean, standard deviation sqrt(5/12)/2, 3
+	 * degrees of freedom (3.182). */
 	struct interval d = stats_difference(a, 4, b, 4, 0.05, &t), exact = stats_difference(a, 4, &one, 1, 0.05, NULL);
 	double half = 3.18245 * sqrt(5.0 / 12) / 2;
 	assert_true(fabs(d.value - 0.25) < 1e-12 && fabs(d.low - (0.25 - half)) < 1e-4 &&
@@ -35,9 +36,9 @@ static void a_difference_by_hand(void **unused)
 }
 
 /*
- * 4,000 differences of groups of unequal spread at 95 %: the intervals hold the truth in 3,800 of them, sd 14; 75 more
- * or fewer (level 1e-6 by the normal approximation and 5 of 14 more for Welch's own) would be a fault, such as degrees
- * of freedom forgotten (z for t at 7 degrees misses 9 %).
+ * 4,000 differences of groups with unequal spread, at 95 %: the intervals contain the true value in 3,800 of them,
+ * with standard deviation 14. A deviation of more than 75 (level 1e-6 by the normal approximation, plus 5 of 14 for
+ * Welch's own) is a fault, such as ignoring the degrees of freedom (z instead of t at 7 degrees misses 9 %).
  */
 static void intervals_hold_the_truth(void **unused)
 {
@@ -75,10 +76,10 @@ static void the_front(void **unused)
 	(void)unused;
 	const struct stats_point p[] = {
 		{log(10.0), 0.02, 0, 0, 0.01, false},	   /* the default */
-		{log(10.2), 0.02, 0, 0, 0.01, false},	   /* not surely slower */
-		{log(14.0), 0.02, 0, 0, 0.01, false},	   /* surely slower, no better */
-		{log(5.0), 0.02, 0.05, 0.05, 0.07, false}, /* twice as fast, biased: a trade */
-		{log(5.1), 0.02, 0.20, 0.20, 0.25, false}, /* as fast, more biased */
+		{log(10.2), 0.02, 0, 0, 0.01, false},	   /* not significantly slower */
+		{log(14.0), 0.02, 0, 0, 0.01, false},	   /* significantly slower, no better */
+		{log(5.0), 0.02, 0.05, 0.05, 0.07, false}, /* twice as fast, biased: a trade-off */
+		{log(5.1), 0.02, 0.20, 0.20, 0.25, false}, /* equally fast, more biased */
 		{log(9.9), 0.02, 0.03, 0.03, 0.05, false}, /* as fast as the default, biased */
 		{log(7.0), 0.02, 0.06, 0.06, 0.08, false}, /* slower and no less biased than the fourth */
 	};
@@ -94,13 +95,13 @@ static void the_front(void **unused)
 					   {log(5.0), 0.3, 0, 0, 0.5, false}};
 	stats_front(wide, 3, 0.05, by);
 	assert_true(by[0] == 0 && by[1] == 1 && by[2] == 2);
-	/* Faster, but suspect, or known too little: neither beats. */
+	/* Faster, but suspected of bias, or with too large an uncertainty: neither dominates. */
 	const struct stats_point weak[] = {{log(10.0), 0.02, 0, 0, 0.5, false},
 					   {log(5.0), 0.02, 0.03, 0, 0.5, false},
 					   {log(5.0), 0.02, 0, 0, 0.9, false}};
 	stats_front(weak, 3, 0.05, by);
 	assert_true(by[0] == 0 && by[1] == 1 && by[2] == 2);
-	/* Known to make another image: it may be beaten, and beats nobody. */
+	/* Points known to make another image: they may be dominated, but dominate no other point. */
 	const struct stats_point other[] = {{log(10.0), 0.02, 0.01, 0, 0.05, false},
 					    {log(5.0), 0.02, 0, 0, 0.05, true},
 					    {log(20.0), 0.02, 0, 0, 0.05, true}};

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * hslt-compare's figures against ones worked out by hand on small images, its percentile, trimming, shrinking, heat
- * map, and --exact, which sees one bit and each attribute that is not excluded.
+ * The figures of hslt-compare against values worked out by hand on small images; its percentile, trimming, shrinking
+ * and heat map; and --exact, which detects a single bit and each attribute that is not excluded.
  */
 #include "worker/cli/image/compare.h"
 
@@ -57,8 +57,8 @@ static bool near(double a, double b)
 }
 
 /*
- * B is 1 everywhere but for a pixel of (2, 4, 6): over 4 pixels its mean is (9 + 12) / 12 = 1.75. A is wrong in two
- * values: 0.5 at one pixel's R, 3 where B has 4.
+ * B is 1 everywhere except for one pixel of (2, 4, 6): over 4 pixels its mean is (9 + 12) / 12 = 1.75. A is wrong in
+ * two values: 0.5 in one pixel's R, and 3 where B has 4.
  */
 static void figures_are_those_made_by_hand(void **unused)
 {
@@ -87,7 +87,7 @@ static void the_peak_is_a_percentile(void **unused)
 {
 	(void)unused;
 	struct picture b = make_picture(20, 10, 1);
-	*value_at(&b, 1, 17) = 100; /* of 600 values, rank 597 leaves three out */
+	*value_at(&b, 1, 17) = 100; /* of 600 values, rank 597 leaves out the three largest */
 	*value_at(&b, 0, 30) = 90;
 	*value_at(&b, 2, 31) = 80;
 	assert_true(near(compare_pictures(&b, &b, 0).peak, 1));
@@ -102,7 +102,7 @@ static void equal_pictures_are_infinitely_good(void **unused)
 	struct picture a = make_picture(3, 1, 0), b = make_picture(3, 1, 0);
 	struct compare_result r = compare_pictures(&a, &b, 0);
 	assert_true(r.rel_mse == 0 && r.rmse == 0 && isinf(r.psnr) && r.psnr > 0);
-	*value_at(&a, 0, 0) = 1; /* anything is infinitely far from black nothing */
+	*value_at(&a, 0, 0) = 1; /* any value differs infinitely from a black reference */
 	assert_true(isinf(compare_pictures(&a, &b, 0).rel_mse));
 	picture_fini(&a);
 	picture_fini(&b);
@@ -120,7 +120,7 @@ static void trimming_leaves_out_the_worst_pixels(void **unused)
 	assert_int_equal(r.left_out, 1);
 	assert_true(near(r.rmse, sqrt((0.25 + 0.0625) / (999 * 3))));
 	assert_true(near(r.rel_mse, (0.25 + 0.0625) / (4 + 0.0004) / (999 * 3)));
-	assert_true(r.ratio[0] > 100); /* means are of all pixels */
+	assert_true(r.ratio[0] > 100); /* the means are over all pixels */
 	r = compare_pictures(&a, &b, 0.002);
 	assert_true(r.left_out == 2 && near(r.rmse, sqrt(0.0625 / (998 * 3))));
 	assert_true(compare_pictures(&a, &b, 0.003).rmse == 0);
@@ -160,14 +160,14 @@ static void shrinking_takes_means_of_boxes(void **unused)
 	assert_int_equal(picture_shrink(&p, 3, 2, &e), -EINVAL);
 	assert_int_equal(picture_shrink(&p, 0, 2, &e), -EINVAL);
 	assert_int_equal(picture_shrink(&p, 2, 2, &e), 0);
-	const float wanted[] = {4.5f, 6.5f, 16.5f, 18.5f}; /* 0 1 4 5 8 9 and so on */
+	const float wanted[] = {4.5f, 6.5f, 16.5f, 18.5f}; /* means of 0 1 4 5, of 2 3 6 7, and so on */
 	for (size_t i = 0; i < 4; i++)
 		assert_true(p.rgb[1][i] == wanted[i] && p.rgb[0][i] == 0 && p.rgb[2][i] == 0);
 	assert_true(p.image.width == 2 && p.image.height == 2);
 	picture_fini(&p);
 }
 
-/* ---- exactness: by way of files, as the program sees them */
+/* ---- exactness, by way of files, as the program reads them ---- */
 
 static struct picture through_file(struct exr_image *img)
 {
@@ -195,7 +195,7 @@ static const struct exr_attribute attributes[] = {
 };
 enum { ATTRIBUTES = sizeof attributes / sizeof *attributes };
 
-/* Is the picture still the same when it has these attributes? */
+/* Returns whether the image counts as unchanged with these attributes. */
 static bool same_with(const struct exr_attribute *changed, size_t count, char *why)
 {
 	struct exr_attribute copy[ATTRIBUTES];
@@ -235,8 +235,8 @@ static void exact_sees_attributes_but_the_excluded(void **unused)
 			assert_non_null(strstr(why, attributes[i].name));
 	}
 	assert_true(same_with(attributes, ATTRIBUTES, why));
-	assert_true(same_with(attributes, 3, why));  /* without the excluded */
-	assert_false(same_with(attributes, 2, why)); /* without a group count */
+	assert_true(same_with(attributes, 3, why));  /* without the excluded attribute */
+	assert_false(same_with(attributes, 2, why)); /* without the group count */
 	assert_non_null(strstr(why, "hslt:groups"));
 }
 
@@ -254,7 +254,7 @@ static void exact_sees_one_bit(void **unused)
 	*value_at(&b, 0, 14) = 0;
 	assert_false(compare_exact(&a.image, &b.image, why, sizeof why)); /* equal as numbers */
 	*value_at(&a, 0, 14) = *value_at(&b, 0, 14) = NAN;
-	assert_true(compare_exact(&a.image, &b.image, why, sizeof why)); /* not as numbers */
+	assert_true(compare_exact(&a.image, &b.image, why, sizeof why)); /* equal bits, but not equal as numbers */
 	b.image.x = 1;
 	assert_false(compare_exact(&a.image, &b.image, why, sizeof why));
 	b.image.x = 0;
@@ -299,7 +299,7 @@ static void a_heatmap_is_a_png(void **unused)
 	struct error e;
 	for (int k = 0; k < 3; k++) {
 		*value_at(&a, k, 1) = 3;
-		*value_at(&a, k, 2) = 1.03162f; /* half way from 0.1 % to 100 % on a logarithmic scale */
+		*value_at(&a, k, 2) = 1.03162f; /* halfway from 0.1 % to 100 % on a logarithmic scale */
 	}
 	*value_at(&a, 1, 3) = NAN;
 	assert_int_equal(compare_heatmap(&a, &b, rgb, &e), 0);

@@ -14,7 +14,7 @@
 static void the_curve_undoes_the_reader_s(void **unused)
 {
 	(void)unused;
-	/* The standard's two rounded thresholds leave a step of 3e-8 where the pieces meet. */
+	/* The standard's two rounded thresholds leave a step of 3e-8 between the two pieces of the curve. */
 	for (int i = 0; i <= 1000; i++)
 		assert_true(fabs(tonemap_srgb(srgb_to_linear(i / 1000.0)) - i / 1000.0) < 1e-7);
 }

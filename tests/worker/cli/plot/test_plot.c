@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Plots as gnuplot draws them, read back as XML: points stand where their values say on both kinds of axes, texts come
- * through whatever they contain, axes have marks, an empty plot says so. Without gnuplot the error names it.
+ * Plots as gnuplot draws them, read back as XML: points lie where their values say on both kinds of axes, texts
+ * survive whatever they contain, axes have tick marks, and an empty plot says so. Without gnuplot, the error names
+ * it.
  */
 #include "worker/cli/plot/plot.h"
 #include "worker/cli/plot/plot_axis.h"
@@ -19,9 +20,9 @@
 #include <stdarg.h>
 #include <cmocka.h>
 
-/* What an SVG holds, read by an XML parser of its own. */
+/* The contents of an SVG, as read by an XML parser in this test. */
 struct content {
-	char text[4096]; /* of <text> elements, with bars between */
+	char text[4096]; /* of <text> elements, separated by bars */
 	size_t text_size, uses, scripts;
 	double use_x[64], use_y[64];
 	bool in_text;
@@ -65,7 +66,7 @@ static void read_svg(const struct plot *p, struct content *c)
 	if (plot_svg(p, &svg, &size, &e))
 		fail_msg("%s", e.text);
 	assert_int_equal(strlen(svg), size);
-	assert_null(strstr(svg, "scale(0.00)")); /* no matrix, says who cannot invert it, and shows nothing at all */
+	assert_null(strstr(svg, "scale(0.00)")); /* a singular matrix: some viewers then show nothing at all */
 	XML_Parser x = XML_ParserCreate(NULL);
 	XML_SetUserData(x, c);
 	XML_SetElementHandler(x, begin, end);
@@ -84,7 +85,7 @@ static void points_are_where_their_values_say(void **unused)
 	struct plot p = {"Title", "time", "error", true, true, 1, &s, NULL, 0};
 	struct content c;
 	read_svg(&p, &c);
-	/* Four can be shown; the fifth mark is the legend's. Equal ratios are equal distances. */
+	/* Four points are drawn; the fifth mark is the legend's. Equal ratios have equal distances. */
 	assert_int_equal(c.uses, 5);
 	size_t first = fabs((c.use_x[1] - c.use_x[0]) - (c.use_x[2] - c.use_x[1])) < 0.5 ? 0 : 1;
 	for (size_t i = first; i + 2 < first + 4; i++) {

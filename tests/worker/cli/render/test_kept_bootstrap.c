@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A render that is stopped in its bootstrap, after so many leases of it, and one that goes on with them: the same bits
- * as one that was never stopped, with no lease done twice. Files of other plans, other scenes, other fingerprints
- * and damaged ones are not used. Renders are stopped from within, so that nothing depends on time.
+ * A render stopped in its bootstrap, after a number of leases, and one that continues from the kept file: the same
+ * bits as a render that was never stopped, with no lease computed twice. Files of other plans, scenes or
+ * fingerprints, and damaged files, are not used. Renders are stopped from within, so that nothing depends on time.
  */
 #include "common/base/bytes.h"
 #include "tests/support/folder.h"
@@ -28,7 +28,7 @@ struct trial {
 	struct render_arguments arguments;
 	struct plan plan;
 	atomic_bool stop;
-	uint32_t leases, stop_after; /* done in this run; 0: never stopped */
+	uint32_t leases, stop_after; /* computed in this run; stop_after 0: never stopped */
 	const char *fingerprint;
 	char image[128], text[512];
 };
@@ -57,7 +57,7 @@ static void keep_result(void *user, const struct bootstrap *b)
 	kept_bootstrap_write(&t->kept, b);
 }
 
-/* The scene's bytes go through the source that takes note of them. */
+/* Opens the scene through the source that records its bytes. */
 static void note_scene(struct kept_bootstrap *k, const char *bytes)
 {
 	struct memory_file files[] = {{"s.xml", bytes, strlen(bytes)}, {NULL, NULL, 0}};
@@ -97,7 +97,7 @@ static struct trial trial_of(const struct world *w, uint64_t seed, const char *b
 	return t;
 }
 
-/* NULL: stopped before a round was complete. */
+/* Returns the image, or NULL if the render was stopped before a round was complete. */
 static float *render(const struct world *w, struct trial *t)
 {
 	struct local_run r = {.world = w,
@@ -138,7 +138,7 @@ static void test_goes_on(void **state)
 	float *truth = render(w, &whole);
 	uint32_t all = whole.leases;
 	assert_true(truth && all > LEASES && !*whole.text && !is_there("image.exr.bootstrap"));
-	/* Stopped in the bootstrap, once and again, and in the first round. */
+	/* Stopped twice in the bootstrap, and once in the first round. */
 	static const uint32_t stops[] = {STOP_AFTER, 3, LEASES - STOP_AFTER - 3 + 2};
 	uint32_t done = 0;
 	for (size_t i = 0; i < sizeof stops / sizeof *stops; i++) {
@@ -193,7 +193,7 @@ static void test_of_another_command(void **state)
 	world_free(w);
 }
 
-/* One byte after the other changed, and the file cut there: nothing of it is used. */
+/* Each byte changed in turn, and the file truncated at this byte: no part of the file is used. */
 static void test_damage(void **state)
 {
 	(void)state;
@@ -229,7 +229,7 @@ static void test_damage(void **state)
 
 /* ---- the bytes of the file ---- */
 
-/* As a build of x86-64 wrote it from memory: mark, text "text", one lease of two, checksum. */
+/* The file written by an x86-64 build from memory: magic number, text "text", one lease of two, checksum. */
 enum { OLD_SIZE = 364, OLD_LEASE = 32, OLD_WEIGHTS = OLD_LEASE + 320 };
 static const struct golden old_runs[] = {
 	{0, "48534c54424f4f31040302010c0b0a09080706050400000074657874010000000000000001"},
@@ -284,7 +284,7 @@ static struct bootstrap *old_bootstrap(bool filled)
 	return s;
 }
 
-/* Puts these bytes there, with a checksum that fits, and says how many leases came of them; text: what was said. */
+/* Writes these bytes with a valid checksum, and returns the number of leases read from them; text: the message. */
 static uint32_t resume_from(const unsigned char *bytes, size_t size, char text[512])
 {
 	struct kept_bootstrap k = old_kept();
@@ -311,17 +311,18 @@ static void test_bytes_stay(void **state)
 	kept_bootstrap_resume(&k, again, text, sizeof text);
 	assert_non_null(strstr(text, "continues from 1 of 2 leases"));
 	assert_true(unlink(k.path) == 0);
-	kept_bootstrap_write(&k, again); /* all of it came back */
+	kept_bootstrap_write(&k, again); /* every lease was read back */
 	golden_compare(k.path, bytes, sizeof bytes);
 	bootstrap_free(s);
 	bootstrap_free(again);
 }
 
-/* Cut anywhere, with a byte more, each bit of the mark and of the lease's place, and weights that are none. */
+/* Truncated at each byte, one byte too long, each bit of the magic number and of the lease's position flipped, and
+ * invalid weights. */
 static void test_bytes_of_none(void **state)
 {
 	(void)state;
-	enum { END = OLD_SIZE - 4, PART = 8 * (OLD_LEASE + 4) /* the bit that makes it the other part of its group */ };
+	enum { END = OLD_SIZE - 4, PART = 8 * (OLD_LEASE + 4) /* turns the lease into the other part of its group */ };
 	unsigned char bytes[OLD_SIZE];
 	char text[512];
 	golden_fill(old_runs, sizeof old_runs / sizeof *old_runs, bytes, sizeof bytes);
@@ -337,14 +338,14 @@ static void test_bytes_of_none(void **state)
 		assert_int_equal(strstr(text, "is not used: ") != NULL, bit != PART);
 		bytes[bit / 8] ^= (unsigned char)(1 << bit % 8);
 	}
-	for (int large = 0; large < 2; large++) { /* a weight below 0, one that is no number */
+	for (int large = 0; large < 2; large++) { /* a negative weight, and one that is no number */
 		put_float(bytes + OLD_WEIGHTS, large ? NAN : -1);
 		assert_int_equal(resume_from(bytes, END, text), 0);
 		assert_non_null(strstr(text, "a bootstrap weight is negative or not finite"));
 	}
 }
 
-/* Where there is no file beside the image, nothing is kept, which is said; as it is before anything is finished. */
+/* If no file can be written beside the image, or no lease has finished, nothing is kept, and a message says so. */
 static void test_no_place(void **state)
 {
 	(void)state;

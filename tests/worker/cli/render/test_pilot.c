@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* How a pilot is cut: like the render but for its epoch, with enough rounds in its time, its bootstrap bounded. */
+/* The plan of a pilot: equal to the render's except for its epoch, with enough rounds in its time and a bounded
+ * bootstrap. Checked for a range of costs per sample. */
 #include "worker/cli/render/pilot.h"
 
 #include <math.h>
@@ -43,7 +44,7 @@ static void pilots_of_chains(void **state)
 	}
 }
 
-/* 8,000 rays a bootstrap sample, 4 ms: neither a probe nor a pilot of a minute begins with minutes of them. */
+/* 8,000 rays per bootstrap sample, 4 ms: neither a probe nor a one-minute pilot may begin with minutes of bootstrap. */
 static void slow_bootstraps_are_short(void **state)
 {
 	(void)state;
@@ -70,7 +71,7 @@ static void pilots_of_samples(void **state)
 	assert_int_equal(pilot_render_plan(&request, &render, &e), 0);
 	assert_true(render.target_error > 0);
 	assert_false(
-		pilot_probe(&request, &render, &probe)); /* one sample a pixel and group is a round, and long enough */
+		pilot_probe(&request, &render, &probe)); /* one sample per pixel and group is a round and long enough */
 	pilot_request(&request, &render, &probe, NULL, 60, &pilot);
 	assert_int_equal(plan_make(&pilot, &plan, &e), 0);
 	assert_true(plan.epoch == 1 && plan.groups == render.groups && plan.seconds == 60 && plan.rounds == UINT64_MAX);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* docs/compatibility.md is what the registries say today. The working folder is the tree's root. */
+/* docs/compatibility.md must equal the list generated from the registries. The working folder is the root of the
+ * tree. */
 #include "worker/cli/scene/compatibility.h"
 
 #include <setjmp.h>
@@ -28,7 +29,7 @@ static void test_page(void **state)
 		at += length;
 	}
 	assert_string_equal(at, "");
-	/* Of each kind a row that must be there. */
+	/* One row of each kind that must be present. */
 	assert_non_null(strstr(text, "\n| `roughconductor` | `material`"));
 	assert_non_null(strstr(text, "\n| emitter | `astroobject` |"));
 	assert_non_null(strstr(text, "\n| any | `max_depth`"));

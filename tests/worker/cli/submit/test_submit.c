@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What hslt-submit sends: the bytes that it read when it checked the scene, from below the scene's folder, or nothing.
- * For which job it waits: for that one. */
+/* hslt-submit sends exactly the bytes that it read when it checked the scene, from below the scene's folder, or
+ * nothing; and it waits for the job that it submitted, and for no other. */
 #include "coordinator/server/server.h"
 #include "coordinator/server/server_options.h"
 #include "tests/support/folder.h"
@@ -28,7 +28,7 @@
 
 static char scene[96], mesh[128], secret[96], kept[96], address[32];
 static pid_t pid;
-static const struct output_files none; /* that could replace an input */
+static const struct output_files none; /* no output could replace an input */
 
 static void serve(const char *listen, const char *spool, const char *port_file)
 {
@@ -43,7 +43,7 @@ static void serve(const char *listen, const char *spool, const char *port_file)
 	_exit(server_run(&c, &e) ? 1 : 0);
 }
 
-/* Until it listens. */
+/* Starts a coordinator and waits until it listens. */
 static int start(const char *listen, const char *spool_name)
 {
 	char spool[96], port_file[96];
@@ -102,7 +102,7 @@ static int send_to(struct client *cl, const struct scene_files *b, struct submit
 	return submit_send(cl, &r, b, job, text, sizeof text, e);
 }
 
-/* The error, "" when it was taken. */
+/* Returns the error of submitting these files, or "" if the job was accepted. */
 static const char *submit_error(const struct scene_files *b)
 {
 	static struct error e;
@@ -127,7 +127,7 @@ static void what_was_checked_is_sent(void **state)
 {
 	(void)state;
 	struct scene_files b;
-	static struct render_arguments o; /* large */
+	static struct render_arguments o; /* too large for the stack */
 	o.render.max_depth = 4;
 	struct error e;
 	assert_int_equal(scene_files_read(&b, scene, &o, &none, &e), 0);
@@ -145,12 +145,12 @@ static void what_was_checked_is_sent(void **state)
 	scene_files_fini(&b);
 }
 
-/* A library of meshes beside the scene's folder (--path): under the same name. */
+/* Meshes in a library folder beside the scene's folder (--path) are sent under the same name. */
 static void what_is_elsewhere_is_sent_too(void **state)
 {
 	(void)state;
 	struct scene_files b;
-	static struct render_arguments o; /* large */
+	static struct render_arguments o; /* too large for the stack */
 	struct error e;
 	char library[256], moved[300];
 	snprintf(library, sizeof library, "%s/library", folder);
@@ -198,8 +198,8 @@ static bool is_in(const struct scene_files *b, const char *name)
 
 #define PART(x) "<scene version='3.0.0'>" x "</scene>"
 
-/* Files named by included files lie in their folders, or in the scene's own: sent under the names that a worker, who
- * has nothing else, finds them by. */
+/* Files named by included files lie in the folder of the included file, or in that of the scene. They are sent under
+ * names by which a worker, which has only the sent files, finds them. */
 static void what_included_files_name_is_sent(void **state)
 {
 	(void)state;
@@ -218,14 +218,14 @@ static void what_included_files_name_is_sent(void **state)
 	write_file("parts/both.xml", PART("<bsdf type='plastic' id='both'/>"));
 	write_file("both.xml", PART("<bsdf type='diffuse' id='both'/>"));
 	write_file("parts/up.xml", PART("<bsdf type='conductor' id='up'/>"));
-	write_file("parts/eta.spd", "400 1\n700 2\n"); /* in the folder of the file around it */
+	write_file("parts/eta.spd", "400 1\n700 2\n"); /* in the folder of the including file */
 	write_file("own.xml", PART("<bsdf type='diffuse' id='own'/>"));
 	static const char *const sent_names[] = {
 		"s.xml",	 "own.xml",	"parts/a.xml", "parts/deep/b.xml", "parts/deep/both.xml",
 		"parts/eta.spd", "parts/up.xml"};
 	enum { SENT = sizeof sent_names / sizeof *sent_names };
 	struct scene_files b;
-	static struct render_arguments o; /* large */
+	static struct render_arguments o; /* too large for the stack */
 	struct error e;
 	o.render.max_depth = 4;
 	snprintf(path, sizeof path, "%s/nested/s.xml", folder);
@@ -252,7 +252,7 @@ static void what_included_files_name_is_sent(void **state)
 	assert_string_equal(type_of(&s, "up"), "conductor");
 	assert_string_equal(type_of(&s, "own"), "diffuse");
 	assert_int_equal(s.asset_count, SENT - 1);
-	/* What is there, but not below the scene's folder, stays closed. */
+	/* An existing file outside the scene's folder must not be read. */
 	write_file("parts/own.xml", PART("<include filename='../../box/box.xml'/>"));
 	snprintf(path, sizeof path, "%s/nested/s.xml", folder);
 	assert_int_equal(scene_files_read(&b, path, &o, &(struct output_files){0}, &e), -EINVAL);
@@ -287,12 +287,13 @@ static int wait_for(struct client **cl, const struct submitted *job, struct subm
 	return reconnect_job(cl, &(struct reconnect){.coordinator = address, .patience = 60}, job, output, end, e);
 }
 
-/* The coordinator comes back, with its spool or with another one in which our number is somebody else's. */
+/* The coordinator restarts, with its own spool or with another one, in which the job's number belongs to another job.
+ */
 static void one_job_is_waited_for(void **state)
 {
 	(void)state;
 	struct scene_files b;
-	static struct render_arguments o; /* large */
+	static struct render_arguments o; /* too large for the stack */
 	o.render.max_depth = 4;
 	struct submit_end end;
 	struct submitted job, other;
