@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Settings that trade accuracy for time: the spelling that a plan holds comes back as it is, everything else is
- * refused, and each reaches what works by it. */
+/* Settings that trade accuracy for time: the spelling in a plan is read back unchanged, every other one is refused,
+ * and each setting reaches the code that it controls. */
 #include "tests/support/worlds.h"
 #include "worker/render/render.h"
 #include "worker/render/halfvec/walk.h"
@@ -39,7 +39,7 @@ static void test_canonical(void **state)
 		assert_string_equal(canonical(cases[i][0]), cases[i][1]);
 }
 
-/* A text and its canonical form are worth the same, and the longest fits into a plan. */
+/* A text and its canonical form mean the same, and the longest text fits into a plan. */
 static void test_all_at_once(void **state)
 {
 	(void)state;
@@ -63,7 +63,7 @@ static void test_all_at_once(void **state)
 	assert_int_equal(accuracy_settings_read(once, &b, NULL), 0);
 	assert_memory_equal(&a, &b, sizeof a);
 	assert_int_equal(render_settings_canonical(once, twice, NULL), 0);
-	assert_memory_equal(once, twice, sizeof once); /* zeros behind the text too */
+	assert_memory_equal(once, twice, sizeof once); /* the bytes after the text are zero as well */
 	assert_true(strlen(once) + 8 < sizeof once);
 	assert_true(plan_text_ok(once, sizeof once));
 	size_t entries = 1;
@@ -147,7 +147,7 @@ static void test_walk_limits(void **state)
 	assert_true(l.tolerance == 1e-5 && l.least_step == 0.5 && l.back == 0.25 && l.scale == 1);
 }
 
-/* The BSDF of a world's only shape. */
+/* Returns the BSDF of a world's only shape. */
 static const struct bsdf *material(const char *accuracy, const char *bsdf, struct world **w)
 {
 	worlds_accuracy = accuracy;
@@ -214,7 +214,7 @@ static void test_tessellation(void **state)
 	}
 }
 
-/* A lease refuses a world that was built by other settings than the plan's. */
+/* A lease refuses a world built with other settings than the plan's. */
 static void test_lease_and_world(void **state)
 {
 	(void)state;

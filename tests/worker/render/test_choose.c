@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The integrator that is chosen for scenes whose light is easy or hard to find, and the length of the pilot. The rule
- * itself: test_choose_rule.c. */
+/* The integrator that is chosen for scenes whose light is known to be easy or hard to find, and the length of the
+ * pilot. The rule itself is tested in test_choose_rule.c. */
 #include "tests/support/length.h"
 #include "tests/support/worlds.h"
 #include "worker/render/render.h"
@@ -33,7 +33,7 @@ static void choose_for(const struct world *w, uint64_t seed, uint64_t spp, struc
 		fail_msg("%s", e.text);
 }
 
-/* Where light behind glass is found by chance alone. */
+/* A world without refracted connections, in which only chance finds light behind glass. */
 static struct world *without_refraction(const char *folder, const char *file)
 {
 	worlds_effects = "-refracted-shadows";
@@ -42,7 +42,7 @@ static struct world *without_refraction(const char *folder, const char *file)
 	return w;
 }
 
-enum { SEEDS = 4, SPP = 40 }; /* the pilot's usual length, from 30 on at 160x90 */
+enum { SEEDS = 4, SPP = 40 }; /* length of the usual pilot, which 30 or more give at 160x90 */
 
 static bool chooses_chains(struct world *w, uint64_t seed)
 {
@@ -68,7 +68,7 @@ static void an_open_room_needs_no_chains(void **state)
 	world_free(w);
 }
 
-/* A furnace: every sample brings nearly the same, of which the second moment is 1. */
+/* A furnace: all samples contribute nearly the same, with a second moment of 1. */
 static void samples_that_are_all_alike_have_no_variance(void **state)
 {
 	(void)state;
@@ -85,7 +85,7 @@ static void samples_that_are_all_alike_have_no_variance(void **state)
 	world_free(w);
 }
 
-/* Merging knows no media that scatter: the choice is by samples alone. */
+/* Merging does not support scattering media: the choice is made by samples alone. */
 static void fog_is_not_merged(void **state)
 {
 	(void)state;
@@ -104,7 +104,7 @@ static void fog_is_not_merged(void **state)
 	world_free(w);
 }
 
-/* The faces of a cloud are no surfaces that could focus light; those of glass in it are. */
+/* The `null` faces of a cloud do not focus light; glass inside the cloud does. */
 static void clouds_focus_nothing(void **state)
 {
 	(void)state;
@@ -130,7 +130,7 @@ static void clouds_focus_nothing(void **state)
 	}
 }
 
-/* Light sub-paths bring it: the samples of bdpt begin the chains, and bdpt itself need not be looked at. */
+/* Light sub-paths find the light: the samples of bdpt start the chains, and no pilot of bdpt itself is needed. */
 static bool merging_finds_rare_light(struct world *w, uint64_t seed)
 {
 	struct plan_request r;
@@ -139,7 +139,7 @@ static bool merging_finds_rare_light(struct world *w, uint64_t seed)
 	return c.merged.share > 0.03 && c.settled && strcmp(r.integrator, "erpt") == 0;
 }
 
-/* It is far brighter than the map's cells around it, but every sample of its pixel says so. */
+/* The lamp is far brighter than the map's cells around it, but every sample of its pixel finds it. */
 static void a_lamp_in_view_is_not_rare_light(void **state)
 {
 	(void)state;
@@ -163,8 +163,9 @@ static void a_lamp_in_view_is_not_rare_light(void **state)
 	world_free(w);
 }
 
-/* Light sub-paths end in its image, a pixel of thousands of times the brightness around it that none of the map's
- * samples met. In a darker room what it throws by the mirror onto the wall that is seen in it would be rare indeed. */
+/* Light sub-paths end in the lamp's image, one pixel thousands of times brighter than its surroundings, which none of
+ * the map's samples met. In a darker room, the light that the lamp throws by the mirror onto the visible wall would
+ * be rare indeed. */
 static void a_small_lamp_in_a_mirror_is_not_rare_light(void **state)
 {
 	(void)state;
@@ -203,11 +204,11 @@ static void a_small_lamp_in_a_mirror_is_not_rare_light(void **state)
 		assert_string_not_equal(r.integrator, "hslt");
 		rare += c.bdpt.rare / SEEDS;
 	}
-	assert_true(rare < 0.05); /* 0.003; 0.15 if splats were not held against their pixels */
+	assert_true(rare < 0.05); /* 0.003; 0.15 if splats were not compared with their pixels */
 	world_free(w);
 }
 
-/* Wide lobes and a large lamp: a broad range of contributions that has an end. */
+/* Wide lobes and a large lamp: the contributions have a wide but bounded range. */
 static void light_with_an_end_to_its_tail_is_given_to_erpt4(void **state)
 {
 	(void)state;
@@ -220,12 +221,11 @@ static void light_with_an_end_to_its_tail_is_given_to_erpt4(void **state)
 		assert_true(c.path.tail < 2);
 		times += strcmp(r.integrator, "erpt4") == 0;
 	}
-	assert_true(times >= SEEDS / 2); /* 78 % of other seeds */
+	assert_true(times >= SEEDS / 2); /* 78 % over other seeds */
 	world_free(w);
 }
 
-/* A lamp in a ball of glass: bdpt finds what lies on the walls, and finds it clean; what is seen in a mirror it misses.
- */
+/* A lamp in a glass ball: bdpt finds the light on the walls, without noise, but misses the light seen in a mirror. */
 static void a_lamp_behind_glass_that_path_never_hits_needs_chains(void **state)
 {
 	(void)state;
@@ -233,14 +233,14 @@ static void a_lamp_behind_glass_that_path_never_hits_needs_chains(void **state)
 	for (uint64_t seed = 0; seed < 2 * SEEDS; seed++)
 		assert_true(chooses_chains(w, seed));
 	world_free(w);
-	/* Refracted connections find it. */
+	/* Refracted connections find this light. */
 	w = world_of_own_scene("bulb", "scene.xml", 160, 90);
 	for (uint64_t seed = 0; seed < SEEDS; seed++)
 		assert_false(chooses_chains(w, seed));
 	world_free(w);
 }
 
-/* Short pilots of kitchen of which path finds nothing, seeds where that is so: bdpt finds what there is. */
+/* Short pilots of the kitchen in which path finds nothing (the seeds are chosen for that): bdpt finds the light. */
 static void light_that_path_never_finds_may_be_easy_for_bdpt(void **state)
 {
 	(void)state;
@@ -256,9 +256,9 @@ static void light_that_path_never_finds_may_be_easy_for_bdpt(void **state)
 	world_free(w);
 }
 
-/* The sun on the floor of a pool, unless connections are refracted: a pilot's samples meet it once or never, and what
- * one says cannot be told from a lamp's edge. Merging knows it: 0.05 to 0.07 of the light is rare, where 0.03 are
- * enough. */
+/* The sun on the floor of a pool, without refracted connections: the samples of a pilot meet it once or never, and
+ * one such sample cannot be told from the edge of a lamp. Merging knows it: 0.05 to 0.07 of the light is rare, and
+ * 0.03 suffices. */
 static void light_that_no_sample_meets_is_known_by_merging(void **state)
 {
 	(void)state;
@@ -268,7 +268,7 @@ static void light_that_no_sample_meets_is_known_by_merging(void **state)
 	world_free(w);
 }
 
-/* A caustic of a point light: path does not find it, so that what it finds looks clean. */
+/* A caustic of a point light: path does not find it, so that its samples look clean. */
 static void path_is_not_chosen_where_it_misses_light(void **state)
 {
 	(void)state;
@@ -304,7 +304,7 @@ static void path_is_not_chosen_where_it_misses_light(void **state)
 	world_free(w);
 }
 
-/* In most pilots no sample meets the sun through the water, or one: the others look clean. */
+/* In most pilots, at most one sample meets the sun through the water, and the others look clean. */
 static void path_is_not_chosen_where_glass_may_focus_light(void **state)
 {
 	(void)state;
@@ -331,7 +331,7 @@ static void light_through_water_begins_chains(void **state)
 	world_free(w);
 }
 
-/* Seen through glass and lit through it: a few samples in 16,384 find most of the light, and the others look clean. */
+/* A scene seen and lit through glass: a few samples in 16,384 find most of the light, and the others look clean. */
 static void light_that_few_samples_find_begins_chains(void **state)
 {
 	(void)state;
@@ -341,7 +341,7 @@ static void light_that_few_samples_find_begins_chains(void **state)
 	world_free(w);
 }
 
-/* All light comes through rough glass, and much is seen through it: what samples find at all they find by luck. */
+/* All light comes through rough glass, and much of the image is seen through it: samples find light by luck only. */
 static void light_that_is_found_by_luck_needs_chains(void **state)
 {
 	(void)state;
@@ -363,7 +363,8 @@ static void where_no_light_is_found_the_longest_search_goes_on(void **state)
 	world_free(w);
 }
 
-/* Longer renders have longer pilots, up to a second or two a kind: they are made by one thread. */
+/* Longer renders have longer pilots, up to one or two seconds for each kind of sample, because pilots use one thread.
+ */
 static void the_pilot_of_hours_is_bounded(void **state)
 {
 	(void)state;
@@ -379,7 +380,7 @@ static void the_pilot_of_hours_is_bounded(void **state)
 		struct plan_request r;
 		struct render_choice c;
 		choose_for(w, 0, of[i].spp, &r, &c);
-		assert_int_equal(c.samples, 4 * of[i].samples); /* two maps, for the first is black, path, bdpt */
+		assert_int_equal(c.samples, 4 * of[i].samples); /* two maps, as the first is black, path, and bdpt */
 	}
 	world_free(w);
 }
@@ -399,7 +400,7 @@ static void the_same_request_gives_the_same_choice(void **state)
 	world_free(w);
 }
 
-/* Crops of a film are put together: all must be rendered by one integrator. */
+/* Crops of a film are assembled, so one integrator must render them all. */
 static void a_crop_is_rendered_as_the_whole_is(void **state)
 {
 	(void)state;
@@ -437,13 +438,13 @@ static void a_short_render_has_a_brief_pilot(void **state)
 	world_free(w);
 }
 
-/* A share of the render, whatever its length; no less than says anything of a tail. */
+/* The pilot is a share of the render, whatever its length, but long enough to tell the tail of the distribution. */
 static void the_pilot_is_a_small_part_of_the_render(void **state)
 {
 	(void)state;
 	struct world *w = world_of_own_scene("box", "box.xml", 60, 50);
 	static const struct {
-		uint64_t spp, least; /* samples of one kind */
+		uint64_t spp, least; /* least: samples of each kind */
 	} of[] = {{1, 1 << 12}, {50, 1 << 12}, {100, 1 << 13}, {200, 1 << 14}, {500, 1 << 14}, {3000, 1 << 16}};
 	for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
 		struct plan_request r;
@@ -452,19 +453,19 @@ static void the_pilot_is_a_small_part_of_the_render(void **state)
 		double all = 62.0 * 52.0 * (double)of[i].spp;
 		assert_in_range(c.samples, 2 * of[i].least, 3 * of[i].least);
 		if (of[i].spp > 1)
-			assert_true((double)of[i].least < all / 22); /* of a thirty-second the nearest power */
+			assert_true((double)of[i].least < all / 22); /* the power of two nearest to 1/32 */
 	}
 	world_free(w);
 }
 
-/* A render of seconds has no pilot of hours, nor has one of which only the error is given. */
+/* A render of seconds, or one with only a target error, must not have a pilot of hours. */
 static void a_render_without_a_number_of_samples_has_a_short_pilot(void **state)
 {
 	(void)state;
 	struct world *w = world_of_own_scene("box", "box.xml", 60, 50);
 	static const struct {
 		double seconds, target;
-		uint64_t spp, samples; /* a pixel; of the pilot, one kind */
+		uint64_t spp, samples; /* spp: per pixel; samples: of the pilot, each kind */
 	} of[] = {{1, 0, 0, 1 << 12},  {8, 0, 0, 1 << 14},  {8, 0, 1 << 30, 1 << 14},
 		  {60, 0, 0, 1 << 16}, {60, 0, 1, 1 << 12}, {0, 0.02, 0, 1 << 14}};
 	for (size_t i = 0; i < sizeof of / sizeof *of; i++) {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The rule by which an integrator is chosen from the figures of a pilot, and the sentence that gives the reason. */
+/* The rule that chooses an integrator from the figures of a pilot, and the sentence that gives the reason; against a
+ * table written by hand. */
 #include "worker/render/choose.h"
 #include "worker/render/render.h"
 
@@ -22,9 +23,9 @@ static void the_rule(void **state)
 		bool settled;
 	} cases[] = {
 		{{1, 0, 4, 4, 1, 0}, {2, 0, 3, 3, 1, 0}, FLAT, "path", false},
-		{{1, 0, 4, 4, 1, 0}, {2, 0, 3, 3, 1, 0}, FOCUSES, "bdpt8", false}, /* what it throws may be rare */
+		{{1, 0, 4, 4, 1, 0}, {2, 0, 3, 3, 1, 0}, FOCUSES, "bdpt8", false}, /* focused light may be rare */
 		{{1, 0, 2.2, 2.2, 1, 0.02}, {2, 0, 3, 3, 1, 0}, FLAT, "path", false},
-		{{1, 0, 4, 4, 1, 0.04}, {2, 0, 3, 3, 1, 0}, FLAT, "erpt4", false}, /* a firefly among the few */
+		{{1, 0, 4, 4, 1, 0.04}, {2, 0, 3, 3, 1, 0}, FLAT, "erpt4", false}, /* a firefly among the samples */
 		{{1, 0, 4, 4, 1, 0.04}, {2, 0, 3, 3, 1, 0}, FOCUSES, "erpt4", false},
 		{{2.1, 0, 3, 3, 1, 0}, {2, 0, 3, 3, 1, 0}, FLAT, "erpt", false},
 		{{0, 0, 4, 4, 1, 0},
@@ -39,13 +40,13 @@ static void the_rule(void **state)
 		 {2, 0, 3, 3, 1, 0},
 		 FOCUSES,
 		 "erpt",
-		 false}, /* bdpt finds what path does not */
-		{{1, 0, 4, 4, 1, 0}, {2, 0.9, 0.5, 0.5, 1, 0}, FOCUSES, "erpt", false},	     /* path does not meet it */
-		{{1, 0.2, 3.5, 1.5, 1, 0}, {5, 0.04, 2, 0.6, 1, 0}, FOCUSES, "erpt", false}, /* by luck one of them */
-		{{1, 0.2, 3.5, 1.5, 1, 0}, {5, 0.04, 1, 1.05, 1, 0}, FOCUSES, "bdpt8", false}, /* with an end to them */
-		{{1, 0.5, 1.1, 1.1, 1, 0}, {2, 0.25, 1.4, 1.8, 1, 0}, FOCUSES, "erpt", false}, /* rare to path alone */
+		 false}, /* bdpt finds what path misses */
+		{{1, 0, 4, 4, 1, 0}, {2, 0.9, 0.5, 0.5, 1, 0}, FOCUSES, "erpt", false},	       /* path never meets it */
+		{{1, 0.2, 3.5, 1.5, 1, 0}, {5, 0.04, 2, 0.6, 1, 0}, FOCUSES, "erpt", false},   /* one of them by luck */
+		{{1, 0.2, 3.5, 1.5, 1, 0}, {5, 0.04, 1, 1.05, 1, 0}, FOCUSES, "bdpt8", false}, /* with a bounded tail */
+		{{1, 0.5, 1.1, 1.1, 1, 0}, {2, 0.25, 1.4, 1.8, 1, 0}, FOCUSES, "erpt", false}, /* rare for path only */
 		{{1, 0.35, 1.4, 1.7, 1, 0}, {5, 0.3, 1.26, 1.95, 1, 0}, FOCUSES, "erpt", false}, /* but it has a mean */
-		{{1, 0.35, 1.4, 0.7, 1, 0}, {5, 0.3, 1.24, 1.95, 1, 0}, FOCUSES, "hslt", false}, /* not for sure */
+		{{1, 0.35, 1.4, 0.7, 1, 0}, {5, 0.3, 1.24, 1.95, 1, 0}, FOCUSES, "hslt", false}, /* not for certain */
 		{{1, 0.35, 1.4, 0.7, 1, 0}, {5, 0.3, 1.26, 1.95, 1, 0}, FOCUSES, "erpt", false},
 		{{1, 0.35, 1.4, 1.1, 1, 0},
 		 {5, 0.3, 1.24, 1.95, 1, 0},
@@ -54,38 +55,34 @@ static void the_rule(void **state)
 		 false}, /* path is lucky enough */
 		{{1, 0.5, 0.5, 0.9, 1, 0}, {2, 0.5, 0.5, 3, 1, 0}, FOCUSES, "hslt", false},
 		{{1, 0.5, 0.5, 0.9, 1, 0}, {2, 0.1, 0.5, 0.5, 1, 0}, FOCUSES, "erpt", false},
-		{{1, 0, 0.5, 0.6, 1, 0}, {2, 0.9, 0.3, 0.4, 1, 0}, FOCUSES, "hslt", false}, /* path says: no mean */
-		{{1, 0.07, 1.6, 1.7, 1, 0}, {600, 0.5, 1.2, 0.75, 1, 0}, FOCUSES, "erpt", false}, /* path says: some */
-		{{1, 0.1, 1.5, 0.7, 1, 0}, {2, 0.1, 1.5, 0.7, 1, 0}, FOCUSES, "erpt", false},	  /* too little */
-		{{1, 0.1, 1.5, 0.7, 1, 0}, {2, 0.1, 1.5, 1.2, 1, 0}, FOCUSES, "erpt", false},	  /* for one it does */
+		{{1, 0, 0.5, 0.6, 1, 0}, {2, 0.9, 0.3, 0.4, 1, 0}, FOCUSES, "hslt", false},	  /* by path: no mean */
+		{{1, 0.07, 1.6, 1.7, 1, 0}, {600, 0.5, 1.2, 0.75, 1, 0}, FOCUSES, "erpt", false}, /* by path: a mean */
+		{{1, 0.1, 1.5, 0.7, 1, 0}, {2, 0.1, 1.5, 0.7, 1, 0}, FOCUSES, "erpt", false},	  /* too little light */
+		{{1, 0.1, 1.5, 0.7, 1, 0}, {2, 0.1, 1.5, 1.2, 1, 0}, FOCUSES, "erpt", false},	  /* bdpt has a mean */
 		{{1, 0.1, 1.5, 0.5, 1, 0},
 		 {2, 0.1, 1.5, 1.0, 1, 0},
 		 FOCUSES,
 		 "erpt",
-		 false}, /* however heavy the other */
+		 false}, /* however heavy the other tail */
 		{{1, 0.06, 1.5, 0.7, 1, 0},
 		 {2, 0.01, 1.5, 0.7, 1, 0},
 		 FOCUSES,
 		 "erpt",
-		 false},								   /* nearly all is there */
-		{{1, 0, 1.1, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 1, 0}, FOCUSES, "erpt4", false}, /* a range with an end */
-		{{1, 0, 2, 4, 0.3, 0}, {2, 0, 3, 3, 0.1, 0}, FLAT, "erpt4", false},	   /* never path by that */
+		 false}, /* nearly all light is found */
+		{{1, 0, 1.1, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 1, 0}, FOCUSES, "erpt4", false}, /* a bounded range */
+		{{1, 0, 2, 4, 0.3, 0}, {2, 0, 3, 3, 0.1, 0}, FLAT, "erpt4", false},	   /* bounded, but never path */
 		{{1, 0, 1.1, 1.9, 0.6, 0}, {2, 0, 1.9, 2, 0.1, 0}, FLAT, "erpt", true},
 		{{2.1, 0, 1.1, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 1, 0}, FLAT, "erpt", false},
 		{{1, 0, 0.9, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 1, 0}, FLAT, "erpt4", false},
 		{{1, 0, 2.2, 1.9, 0.6, 0}, {2, 0, 1.9, 2, 1, 0}, FLAT, "path", false}, /* one of the two is enough */
 		{{1, 0, 1.1, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 1, 0}, MISSES, "erpt", false},
 		{{INFINITY, 0, 1, 1, 1, 0}, {INFINITY, 0, 1, 1, 1, 0}, MISSES, "hslt", false},
-		{{1, 0.05, 1.1, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 0.1, 0}, FLAT, "erpt", false}, /* rare light is no end */
-		{{1, 0, 4, 4, 1, 0}, {2, 0, 3, 3, 1, 0}, MISSES, "erpt", false}, /* what is missed has no part in it */
+		{{1, 0.05, 1.1, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 0.1, 0}, FLAT, "erpt", false}, /* rare light: no bound */
+		{{1, 0, 4, 4, 1, 0}, {2, 0, 3, 3, 1, 0}, MISSES, "erpt", false}, /* missed light is not in it */
 		{{1, 0, 1.9, 1.5, 1, 0}, {2, 0, 3, 3, 1, 0}, MISSES, "erpt", false},
-		{{1, 0, 3, 3, 1, 0}, {2, 0.9, 0.5, 0.9, 1, 0}, MISSES, "hslt", false}, /* what path says is nothing */
+		{{1, 0, 3, 3, 1, 0}, {2, 0.9, 0.5, 0.9, 1, 0}, MISSES, "hslt", false}, /* path's figures do not count */
 		{{1, 0, 0.3, 0.3, 1, 0}, {2, 0.9, 0.5, 3, 1, 0}, MISSES, "erpt", false},
-		{{INFINITY, 0, 1, 1, 1, 0},
-		 {1, 0, 3, 3, 1, 0},
-		 MISSES,
-		 "erpt",
-		 false}, /* all of it, and bdpt does not */
+		{{INFINITY, 0, 1, 1, 1, 0}, {1, 0, 3, 3, 1, 0}, MISSES, "erpt", false}, /* bdpt finds all light */
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		const double *p = cases[i].path, *b = cases[i].bdpt;
@@ -95,13 +92,13 @@ static void the_rule(void **state)
 					  .focuses = cases[i].scene != FLAT};
 		assert_string_equal(render_choice_of(&c), cases[i].name);
 		assert_int_equal(render_choice_is_settled(&c), cases[i].settled);
-		c.media_shine = true; /* the next best */
+		c.media_shine = true; /* emitting media: the next best */
 		assert_string_equal(render_choice_of(&c), strcmp(cases[i].name, "hslt") ? cases[i].name : "erpt");
 	}
 }
 
-/* In half of the brief pilots of demo no sample is a firefly, and bdpt8 needs five times the time of erpt4 for a lamp
- * behind frosted glass that a pilot missed. */
+/* In half of the brief pilots of the demo scene no sample is a firefly; and bdpt8 takes five times as long as erpt4
+ * for a lamp behind frosted glass that the pilot missed. */
 static void a_brief_pilot_and_glass_are_not_left_to_samples_alone(void **state)
 {
 	(void)state;
@@ -116,7 +113,8 @@ static void a_brief_pilot_and_glass_are_not_left_to_samples_alone(void **state)
 	assert_string_equal(render_choice_of(&c), "path");
 }
 
-/* A point light and a mirror ball in a room: one sample in four is enough for the little that path cannot find. */
+/* A point light and a mirror ball in a room: one sample in four with a light sub-path suffices for the little light
+ * that path cannot find. */
 static void little_that_path_misses_needs_few_light_paths(void **state)
 {
 	(void)state;
@@ -124,20 +122,20 @@ static void little_that_path_misses_needs_few_light_paths(void **state)
 		.path = {1, 0, 4, 4, 1, 0}, .bdpt = {2, 0, 3, 3, 1, 0}, .found = 0.98, .misses = true, .focuses = true};
 	struct render_choice c = easy;
 	assert_string_equal(render_choice_of(&c), "erpt4");
-	c.found = 0.85; /* not so little */
+	c.found = 0.85; /* more light is missed */
 	assert_string_equal(render_choice_of(&c), "erpt");
 	c = easy;
-	c.bdpt.tail = 1.9; /* nor is it found evenly, */
+	c.bdpt.tail = 1.9; /* the found light is uneven */
 	assert_string_equal(render_choice_of(&c), "erpt");
 	c = easy;
-	c.bdpt.most = 0.04; /* or a sample of it is a firefly, */
+	c.bdpt.most = 0.04; /* one of its samples is a firefly */
 	assert_string_equal(render_choice_of(&c), "erpt");
 	c = easy;
-	c.path.cost = 2.1; /* or all of it costs as much. */
+	c.path.cost = 2.1; /* all of the light is as costly */
 	assert_string_equal(render_choice_of(&c), "erpt");
 }
 
-/* Whatever the others say; not a share as in scenes where bdpt is the best. */
+/* The shares decide, whatever the other figures say; a share as small as in scenes where bdpt is the best does not. */
 static void light_that_is_rare_by_merging_needs_chains(void **state)
 {
 	(void)state;
@@ -159,7 +157,8 @@ static void light_that_is_rare_by_merging_needs_chains(void **state)
 	}
 }
 
-/* What looks rare to path is not to bdpt where photons see most of the light and merging finds hardly any that is. */
+/* Light that is rare for path is not rare for bdpt where photons find most of the light and merging finds hardly any
+ * rare light. */
 static void light_that_photons_see_is_not_rare(void **state)
 {
 	(void)state;
@@ -167,9 +166,9 @@ static void light_that_photons_see_is_not_rare(void **state)
 		double share, seen, bdpt_rare;
 		const char *name;
 	} cases[] = {{0.005, 0.6, 0.05, "erpt"},
-		     {0.005, 0.1, 0.05, "erpt"}, /* hardly a photon arrives, but bdpt finds it all */
+		     {0.005, 0.1, 0.05, "erpt"}, /* few photons arrive, but bdpt finds all light */
 		     {0.02, 0.6, 0.05, "erpt"},
-		     {0.005, 0.6, 0.5, "hslt"}}; /* bdpt's own samples say so */
+		     {0.005, 0.6, 0.5, "hslt"}}; /* rare by bdpt's own samples */
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		struct render_choice c = {.path = {1, 0.9, 0.5, 0.5, 1, 0},
 					  .bdpt = {2, cases[i].bdpt_rare, 0.9, 0.8, 1, 0},
@@ -183,7 +182,7 @@ static void light_that_photons_see_is_not_rare(void **state)
 	}
 }
 
-/* What path alone settles, nothing that bdpt could say would change. */
+/* Where path alone settles the choice, no figures of bdpt change it. */
 static void what_is_settled_is_the_same_with_bdpt(void **state)
 {
 	(void)state;
@@ -197,7 +196,7 @@ static void what_is_settled_is_the_same_with_bdpt(void **state)
 	}
 }
 
-/* The sentence is for people; figures are in the JSON. */
+/* The sentence is for people; the figures are in the JSON. */
 static void the_reason_is_a_sentence_without_figures(void **state)
 {
 	(void)state;

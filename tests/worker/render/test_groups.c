@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Groups are independent replicates, or the error that their spread tells is none (docs/design.md, rules 2). The linker
- * puts a wrapper around the random number generator (Makefile), which notes all numbers that a lease asks for: no two
- * groups ask for the same one, each starts its chains from its own part of the bootstrap, and independent proposals
- * that carry no light are counted. Nothing here is left to chance but the number of pssmlt's independent proposals.
+ * Groups are independent replicates; otherwise the error estimated from their spread would be wrong (docs/design.md,
+ * rules 2). The linker puts a wrapper around the random number generator (Makefile), which records all numbers that a
+ * lease asks for: no two groups ask for the same number, each starts its chains from its own part of the bootstrap,
+ * and independent proposals that carry no light are counted. Everything is deterministic except the number of
+ * pssmlt's independent proposals.
  */
 #include "common/estimate/merge.h"
 #include "common/plan/resample.h"
@@ -26,7 +27,7 @@
 
 enum { GROUPS = 4, PARTS = 2, CHAINS = 16, BOOTSTRAP = 2048, ROUNDS = 2, SPP_EPOCH = 2, EPOCH = 150 };
 
-/* ---- what was asked for */
+/* ---- recorded numbers ---- */
 
 struct number {
 	uint64_t stream, index, step, block, owner;
@@ -89,7 +90,7 @@ static int by_number(const void *a, const void *b)
 	return memcmp(a, b, sizeof(struct number));
 }
 
-/* ---- renders */
+/* ---- renders ---- */
 
 /* About half of the paths find light. */
 static struct world *lit_world(void)
@@ -142,8 +143,8 @@ static struct plan plan_of(const struct world *w, const struct render_integrator
 	return p;
 }
 
-/* All leases of a job, what they ask for noted by group; `look` sees each batch. The map of brightness is the plan's:
- * all groups share it, and none of their numbers. It is noted as that of one group more. */
+/* Runs all leases of a job, recording their numbers by group; `look` sees each batch. The brightness map belongs to
+ * the plan: all groups share it, but none of its numbers. It is recorded as one more group. */
 static void run_all(const struct world *w, const struct plan *p, void (*look)(void *user, const struct batch *b),
 		    void *user)
 {
@@ -220,8 +221,8 @@ static void groups_share_no_random_number(void **state)
 	world_free(w);
 }
 
-/* A render as hslt-render makes it: what begins a chain is a path of the bootstrap that is looked at again, one of its
- * own group's range; each group has some. */
+/* A render as hslt-render does it: a chain starts from a bootstrap path that is evaluated again and belongs to the
+ * range of the chain's group; each group has some. */
 static void chains_start_from_their_groups_bootstrap(void **state)
 {
 	(void)state;
@@ -243,7 +244,7 @@ static void chains_start_from_their_groups_bootstrap(void **state)
 				looks[noted.all[n].index]++;
 		record_numbers(false);
 		for (uint64_t n = 0; n < BOOTSTRAP; n++) {
-			assert_true(looks[n] > 0); /* all groups together have drawn all of it */
+			assert_true(looks[n] > 0); /* all groups together have drawn every sample */
 			started[n / (BOOTSTRAP / GROUPS)] += looks[n] > 1;
 		}
 		for (uint32_t g = 0; g < GROUPS; g++)
@@ -252,7 +253,7 @@ static void chains_start_from_their_groups_bootstrap(void **state)
 	world_free(w);
 }
 
-/* What is looked at again is what had the weight. */
+/* The evaluated sample is the one with the weight. */
 static void chains_start_from_the_samples_that_were_chosen(void **state)
 {
 	(void)state;
@@ -287,7 +288,7 @@ static void chains_start_from_the_samples_that_were_chosen(void **state)
 	world_free(w);
 }
 
-/* A room that no light leaves, in which sub-paths end by roulette alone, or after 40 edges. */
+/* A closed room, in which sub-paths end only by Russian roulette or after 40 edges. */
 static struct world *closed_room(void)
 {
 	/* clang-format off */
@@ -306,7 +307,7 @@ static struct world *closed_room(void)
 	/* clang-format on */
 }
 
-/* Blocks of a bootstrap sample's numbers that were asked for, as bits. */
+/* Finds the blocks of a bootstrap sample's numbers that were asked for, and returns their number. */
 enum { BLOCKS_MOST = 4096 };
 static size_t blocks_of(uint64_t index, bool asked[BLOCKS_MOST])
 {
@@ -323,8 +324,8 @@ static size_t blocks_of(uint64_t index, bool asked[BLOCKS_MOST])
 	return count;
 }
 
-/* A chain of paths starts from the very sample that had the weight, with sub-paths of the same length: it asks for the
- * same numbers, and for those that choose one of the sample's paths. */
+/* A chain of full paths starts from the very sample that had the weight, with sub-paths of the same length: it asks
+ * for the same numbers, and for those that choose one of the sample's paths. */
 static void a_start_is_the_sample_again(void **state)
 {
 	(void)state;
@@ -371,7 +372,8 @@ static void a_start_is_the_sample_again(void **state)
 	world_free(w);
 }
 
-/* Resampling's own random number differs, too, or all groups would take seeds at the same quantiles. */
+/* The random number for resampling differs between groups, too; otherwise all groups would take seeds at the same
+ * quantiles. */
 static void groups_resample_by_themselves(void **state)
 {
 	(void)state;
@@ -396,7 +398,7 @@ static void count(void *user, const struct batch *b)
 		c->bootstrap += b->counters[COUNT_INDEPENDENT];
 		return;
 	}
-	if (b->state_count) /* of two chains no run of rejections is half of all */
+	if (b->state_count) /* with two chains, no run of rejections is half of all */
 		assert_true(2 * b->counters[COUNT_LONGEST_STUCK] <
 			    b->counters[COUNT_SAMPLES] - b->counters[COUNT_ACCEPTED]);
 	c->samples += b->counters[COUNT_SAMPLES];
@@ -405,9 +407,9 @@ static void count(void *user, const struct batch *b)
 		c->proposed += b->strategy[c->strategy][STRATEGY_PROPOSED];
 }
 
-/* Half of what is sampled is dark, less where emitters are joined to the lens, and counted: by the bootstrap and by
- * samples all of it, by strategies all that they propose, by pssmlt 0.3 of the steps within five standard errors
- * (without the dark ones it would be 6 of them less). */
+/* About half of the samples are dark (fewer if emitters are connected to the lens), and must be counted: all of them
+ * by the bootstrap and by samples; all proposals by strategies; and by pssmlt 0.3 of the steps, within five standard
+ * errors (without the dark ones, the share would be 6 standard errors lower). */
 static void zeros_are_counted(void **state)
 {
 	(void)state;
@@ -438,7 +440,7 @@ static void zeros_are_counted(void **state)
 	world_free(w);
 }
 
-/* b of a group is its own sum over all of its own samples; those of all the pooled one. */
+/* The b of a group is its own sum over all of its own samples; the pooled b is that of all groups. */
 static void each_group_has_its_own_b(void **state)
 {
 	(void)state;

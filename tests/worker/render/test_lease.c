@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Leases: a result depends on the plan and the key alone, in any order; a lease can be stopped; bad input is refused; a
- * crop has the pixels of the whole image, and borders their energy; memory may run out.
+ * Leases: a result depends only on the plan and the key, in any order; a lease can be stopped; bad input is refused;
+ * a crop has the pixels of the whole image, and borders keep their energy; memory may run out.
  */
 #include "common/base/liveness.h"
 #include "common/base/mem.h"
@@ -103,7 +103,7 @@ static struct lease_key make_key(enum lease_kind kind, uint32_t group, uint32_t 
 	return (struct lease_key){1, kind, group, part, epoch};
 }
 
-/* Seeds that carry light, for one lease of chains. */
+/* Finds seeds that carry light, for one lease of chains. */
 static void find_seeds(const struct world *w, const struct plan *p, uint32_t group, uint64_t *seeds, uint32_t count)
 {
 	struct batch b = lease_done(w, p, make_key(LEASE_BOOTSTRAP, group, 0, 0), NULL);
@@ -116,7 +116,7 @@ static void find_seeds(const struct world *w, const struct plan *p, uint32_t gro
 	batch_fini(&b);
 }
 
-/* All leases of a job of samples or bootstraps, forwards and backwards: the same bytes each. */
+/* All leases of a job of samples or bootstraps, forwards and backwards: the same bytes for each. */
 static void test_any_order(void **state)
 {
 	(void)state;
@@ -138,7 +138,7 @@ static void test_any_order(void **state)
 	world_free(w);
 }
 
-/* Chains from seeds, and from states that went through another run. */
+/* Chains from seeds, and from states saved by another run. */
 static void test_chains(void **state)
 {
 	(void)state;
@@ -167,8 +167,8 @@ static void test_chains(void **state)
 	world_free(w);
 }
 
-/* Light so weak that contributions are denormal or zero, and as strong as a scene may have: every lease is a batch that
- * passes its checks (run asks), whatever the integrator. */
+/* Light so weak that contributions are denormal or zero, and light as strong as a scene may have: every lease gives a
+ * batch that passes its checks (lease_done() verifies them), with each integrator. */
 static void test_extreme_light(void **state)
 {
 	(void)state;
@@ -224,14 +224,14 @@ static void test_refused(void **state)
 	struct lease_key k0 = make_key(LEASE_RENDER, 0, 0, 0), k1 = make_key(LEASE_RENDER, 0, 0, 1);
 	struct lease_input in = {.chain_count = 2, .seeds = seeds};
 	struct batch b = lease_done(w, &p, k0, &in);
-	/* Counts, and nothing at all. */
+	/* Wrong counts, and no input at all. */
 	assert_int_equal(end_of(w, &p, k0, NULL), -EINVAL);
 	for (uint32_t n = 0; n < 4; n++)
 		if (n != 2)
 			assert_int_equal(end_of(w, &p, k0, &(struct lease_input){.chain_count = n, .seeds = seeds}),
 					 -EINVAL);
 	assert_int_equal(end_of(w, &p, k0, &(struct lease_input){.chain_count = 2}), -EINVAL);
-	/* States: another chain's, cut, lengthened, noise. */
+	/* States: of another chain, truncated, too long, random bytes. */
 	struct chain_state s[2] = {b.states[1], b.states[0]};
 	assert_int_equal(end_of(w, &p, k1, &(struct lease_input){.chain_count = 2, .states = s}), -EILSEQ);
 	struct dice d = dice_of("hostile states");
@@ -252,14 +252,14 @@ static void test_refused(void **state)
 		memcpy(exact, bytes, size);
 		struct chain_state hostile[2] = {{exact, size}, b.states[1]};
 		int rc = end_of(w, &p, k1, &(struct lease_input){.chain_count = 2, .states = hostile});
-		/* Other numbers in [0,1) may make another path that carries light: a state like any. */
+		/* Other numbers in [0,1) may give another path that carries light: a valid state. */
 		assert_true(rc == -EILSEQ || (rc == 0 && i % 3 == 2));
 		good += rc == 0;
 		free(exact);
 		free(bytes);
 	}
 	print_message("%zu of the noisy states are states\n", good);
-	/* Dark seeds: such a chain looks for light. */
+	/* Dark seeds: such a chain searches for light. */
 	struct batch boot = lease_done(w, &p, make_key(LEASE_BOOTSTRAP, 0, 0, 0), NULL);
 	for (uint64_t i = 0; i < boot.weight_count; i++)
 		if (!(boot.weights[i] > 0)) {
@@ -270,7 +270,7 @@ static void test_refused(void **state)
 			break;
 		}
 	batch_fini(&boot);
-	/* Plans that are not this world's. */
+	/* Plans that do not belong to this world. */
 	other = p;
 	other.width++;
 	assert_int_equal(end_of(w, &other, k0, &in), -EINVAL);
@@ -290,7 +290,7 @@ static void test_refused(void **state)
 	assert_int_equal(end_of(w, &other, k0, &in), -EINVAL);
 	batch_fini(&b);
 	world_free(w);
-	/* Where media scatter. */
+	/* A scene with scattering media. */
 	w = world_of_text(8, 8,
 			  SENSOR("0,0,5", "0,0,0") "<emitter type='constant'/><shape type='sphere'><bsdf type='null'/>"
 						   "<medium type='homogeneous' name='interior'/></shape>");
@@ -301,8 +301,8 @@ static void test_refused(void **state)
 	world_free(w);
 }
 
-/* A camera that looks nowhere makes 0/0 in the first path of every kind of lease: an error that says where, and nothing
- * of it is left in the thread or the world. */
+/* A camera without a direction computes 0/0 in the first path of every kind of lease: an error names the place, and
+ * neither the thread nor the world keeps any effect of it. */
 static void test_invalid_operation(void **state)
 {
 	(void)state;
@@ -372,8 +372,8 @@ static void test_stop(void **state)
 	world_free(w);
 }
 
-/* However few pixels there are: a worker whose lease does not tick for long has hung, and one that does not look ends
- * late. */
+/* A lease ticks however few pixels there are: a worker whose lease does not tick for long counts as hung, and one
+ * that does not poll stops late. */
 static void test_ticks(void **state)
 {
 	(void)state;
@@ -422,8 +422,8 @@ static float *film_of(const struct world *w, const struct plan *p)
 	return film;
 }
 
-/* The crop draws the full render's samples. Film points are put together from the crop's own corner: they differ by
- * roundings of double, which a path through glass can make larger, and sums are rounded to float in other strips. */
+/* A crop draws the samples of the full render. Film points are computed from the crop's own corner: they differ by
+ * roundings of double, which a path through glass can magnify, and sums are rounded to float in other strips. */
 static void test_crop(void **state)
 {
 	(void)state;
@@ -451,16 +451,16 @@ static void test_crop(void **state)
 		print_message("%s: %zu of %u values differ\n", filters[f], differ,
 			      crop.crop_width * crop.crop_height * 3);
 		assert_true(light > 0);
-		assert_true(differ <= 12); /* an edge that a rounding crosses, once */
+		assert_true(differ <= 12); /* one edge crossed by a rounding */
 		free(whole);
 		free(part);
 		world_free(w);
 	}
 }
 
-/* Constant light stays constant to the border, whatever the filter: sampling extends beyond the film. Each pixel's mean
- * is within what so many samples allow: the kernel's weights vary, a border that lost energy would be darker by 10 %
- * and more. */
+/* Constant light remains constant to the border with every filter, because sampling extends beyond the film. Each
+ * pixel's mean must lie within the noise of its samples, since the kernel's weights vary; a border that lost energy
+ * would be darker by at least 10 %. */
 static void test_borders(void **state)
 {
 	(void)state;
@@ -482,7 +482,8 @@ static void test_borders(void **state)
 				bool edge = x == 0 || y == 0 || x + 1 == p.width || y + 1 == p.height;
 				*(edge ? &border : &inner) += v;
 				*(edge ? &borders : &inners) += 1;
-				/* Weights k / mean k of 1024 stratified samples: deviation below 3 %; seven of them. */
+				/* Weights k / mean k of 1024 stratified samples: standard deviation below 3 %; the
+				 * limit is seven of them. */
 				assert_true(fabs(v - 1) < 0.2);
 			}
 		print_message("%s: border %.5f, inside %.5f\n", filters[f], border / (double)borders,
@@ -494,7 +495,7 @@ static void test_borders(void **state)
 	}
 }
 
-/* The n-th allocation fails, for each n: an error or a result, nothing else; leaks are for the sanitizer to see. */
+/* The n-th allocation fails, for each n: an error or a result, nothing else; the sanitizer finds leaks. */
 static void test_no_memory(void **state)
 {
 	(void)state;

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What leases say besides pixels. Classes of paths: every technique that makes a path gives it the same class; path,
- * bdpt, and the chains of pssmlt and hslt find the same energy in each class. Moments: what they say of a tile is what
- * the film says of it.
+ * Results of leases other than pixels. Classes of paths: every technique that makes a path gives it the same class;
+ * path, bdpt, and the chains of pssmlt and hslt find the same energy in each class. Moments: the sums of a tile equal
+ * those of the film.
  *
- * Level of the comparisons: 1e-6 a class that holds 1 % of the energy or more, by Student's t between 16 groups. Power:
- * the smallest difference of the classes that hold 10 % or more, found with 95 % probability, is printed; 15 % at most
- * between path and bdpt, 25 % for chains. HSLT_TEST_SCALE: smaller samples, no demand on the power. FULL=1: chains in a
- * prism, too. About 30 s of CPU time.
+ * Level of the comparisons: 1e-6 for each class that holds 1 % of the energy or more, by Student's t between 16
+ * groups. Power: the smallest difference that is found with 95 % probability, among classes that hold 10 % or more,
+ * is printed; it must be at most 15 % between path and bdpt, 25 % for chains. HSLT_TEST_SCALE: smaller samples, no
+ * requirement on the power. FULL=1: also chains in a prism. About 30 s of CPU time.
  */
 #include "common/estimate/merge.h"
 #include "tests/support/dice.h"
@@ -33,7 +33,7 @@
 
 #define LEVEL 1e-6
 enum { GROUPS = 16 };
-/* t at 1e-6 and 15 degrees, and the 95 % quantile: what is found with 95 %. */
+/* t at level 1e-6 with 15 degrees of freedom, plus the 95 % quantile for the power. */
 #define FOUND 9.4
 
 /* ---- one path, many techniques ---- */
@@ -43,7 +43,7 @@ static bool same_place(const struct path_vertex *a, const struct path_vertex *b)
 	return a->x.p.x == b->x.p.x && a->x.p.y == b->x.p.y && a->x.p.z == b->x.p.z;
 }
 
-/* Technique s of the sub-paths in c makes x. */
+/* Returns whether technique s, from the sub-paths in c, makes x. */
 static bool is_made(const struct path_context *c, const struct full_path *x, unsigned s)
 {
 	unsigned k = x->edges;
@@ -58,10 +58,11 @@ static bool is_made(const struct path_context *c, const struct full_path *x, uns
 
 struct seen {
 	uint64_t paths, again;
-	uint32_t techniques, classes; /* bits */
+	uint32_t techniques, classes; /* as bits */
 };
 
-/* x was made by technique `from`; a pair of sub-paths around it is drawn that another technique may have made. */
+/* x was made by technique `from`. Draws a pair of sub-paths around x, and compares the class with that found by each
+ * other technique that makes x. */
 static void check_around(struct path_context *c, struct full_path *x, unsigned from, uint64_t index, struct dice *d,
 			 struct seen *seen)
 {
@@ -70,7 +71,7 @@ static void check_around(struct path_context *c, struct full_path *x, unsigned f
 	const double u[3] = {dice_throw(d), 0, 0};
 	unsigned class = path_class_whole(x);
 	sampler_random_init(&s, 17, RNG_CHAIN, index, 1);
-	for (unsigned i = 0; i <= x->edges; i++) { /* nothing of other paths is left */
+	for (unsigned i = 0; i <= x->edges; i++) { /* clear the vertices of other paths */
 		memset(&c->camera[i].x.p, 0, sizeof c->camera[i].x.p);
 		memset(&c->light[i].x.p, 0, sizeof c->light[i].x.p);
 	}
@@ -123,7 +124,7 @@ static void check_techniques(const struct world *w, const char *name)
 			unsigned class = classes_joined(&classes, a->s, a->edges + 1 - a->s - a->passed, a->passed);
 			by_class[class] += a->intensity;
 			if (!full_path_from_subpaths(&c, a->s, a->passed, a->edges, &x))
-				continue; /* on the film's very border */
+				continue; /* on the very border of the film */
 			assert_int_equal(path_class_whole(&x), class);
 			seen.paths++;
 			seen.classes |= 1u << class;
@@ -179,7 +180,7 @@ static struct plan make_plan(const struct world *w, const char *integrator, cons
 	return p;
 }
 
-/* Each class's means by group, of independent samples. */
+/* Stores the means of each class by group, from independent samples. */
 static void sample_classes(const struct world *w, const char *integrator, const char *test,
 			   double mean[PATH_CLASSES][GROUPS])
 {
@@ -199,7 +200,7 @@ static void sample_classes(const struct world *w, const char *integrator, const 
 static void check_class(const char *test, unsigned class, double share, double difference_error, double p,
 			double *least)
 {
-	/* Of what independent samples hardly find, their means are far from normal. */
+	/* For classes that independent samples rarely find, the means are far from normally distributed. */
 	if (share >= 0.01 && p < LEVEL)
 		fail_msg("%s: the energies of class '%s', share %.3g, differ (p = %g)", test, path_class_name(class),
 			 share, p);
@@ -240,7 +241,7 @@ static void samples_agree(void **state)
 	}
 }
 
-/* All leases of a plan of chains into a canvas. seen: called with each batch of chains. */
+/* Merges all leases of a plan of chains into a canvas. seen: called with each batch of chains. */
 static struct canvas *run_chains(const struct world *w, const struct plan *p,
 				 void (*seen)(const struct plan *, const struct batch *))
 {
@@ -310,8 +311,8 @@ static void chains_agree(void **state)
 
 /* ---- moments against the film ---- */
 
-/* Films with a box filter of one pixel: a splat's light is all in its own pixel, so a tile's sum is its first moments'.
- */
+/* With a box filter of one pixel, the light of a splat lies in its own pixel, so that the sum of a tile equals its
+ * first moment. */
 static void film_agrees(const struct plan *p, const struct batch *b)
 {
 	uint32_t tiles = batch_film_tiles(p), sequences = batch_sequences(p),
@@ -329,7 +330,7 @@ static void film_agrees(const struct plan *p, const struct batch *b)
 		}
 		assert_true(fabs(first - film) <= 1e-5 * first);
 		assert_true(second <= first * (1 + 1e-6) && (first == 0 || second > 0));
-		/* A path lands at one point. */
+		/* A full path has one film point. */
 		assert_true(*p->mutations == 0 || fabs(second - first) <= 1e-6 * first);
 		time += first;
 	}
@@ -337,7 +338,7 @@ static void film_agrees(const struct plan *p, const struct batch *b)
 	for (int k = 0; k < PATH_CLASSES; k++)
 		classes += b->classes[k];
 	assert_true(fabs(classes / (double)b->counters[COUNT_SAMPLES] - 1) < 1e-9);
-	assert_true(time > 0.01 * classes && time < 0.99 * classes); /* the crop is a part of what is sampled */
+	assert_true(time > 0.01 * classes && time < 0.99 * classes); /* the crop is a part of the sampled area */
 }
 
 static void moments_are_the_films(void **state)
@@ -374,7 +375,7 @@ static void moments_are_the_films(void **state)
 		p.bootstrap = GROUPS * dice_count(4096);
 		p.epoch = dice_count(2000);
 		p.groups = GROUPS;
-		struct world moved = *w; /* a border wider than the filter asks for, so that chains leave the crop */
+		struct world moved = *w; /* a border wider than the filter needs, so that chains leave the crop */
 		moved.settings.border = p.border;
 		struct canvas *c = run_chains(&moved, &p, film_agrees);
 		assert_int_equal(canvas_image(c, false, &img, NULL), 0);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What is a mixture of mutations: the spelling that a plan holds comes back as it is, everything else is refused. */
+/* The syntax of mixtures of mutations: the spelling in a plan is read back unchanged, every other one is refused. */
 #include "worker/render/render.h"
 
 #include <setjmp.h>
@@ -20,7 +20,7 @@ static void the_canonical_spelling_stays(void **state)
 		assert_int_equal(render_mutations(texts[i], &summary, once, &e), 0);
 		assert_true(plan_strategy_count(once) >= 0);
 		assert_int_equal(render_mutations(once, &summary, twice, &e), 0);
-		assert_memory_equal(once, twice, sizeof once); /* zeros behind the text too */
+		assert_memory_equal(once, twice, sizeof once); /* the bytes after the text are zero as well */
 	}
 }
 

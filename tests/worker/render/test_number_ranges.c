@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Every number of every table of plug-ins has a range. What is beyond is refused with file, line, value and range; its
- * ends and what lies between render without an invalid operation, or are refused with a place by a rule of their own
- * (two numbers that contradict each other, a scene that is too large). Each trial is a whole scene in a process of its
- * own.
+ * Every number in every table of plug-ins has a range. Values beyond it are refused with file, line, value and range;
+ * the ends and values between them render without an invalid operation, or are refused with their place by a rule of
+ * their own (two numbers that contradict each other, a scene that is too large). Each trial is a whole scene in a
+ * process of its own.
  */
 #include "tests/support/measured_file.h"
 #include "tests/support/length.h"
@@ -28,11 +28,11 @@ static const char ply[] =
 	"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
 	"element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
 
-/* Two bytes along x. */
+/* A volume with two bytes along x. */
 static const char vol[] = "VOL\3\3\0\0\0\2\0\0\0\1\0\0\0\1\0\0\0\1\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0"
 			  "\0\0\200?\0\0\200?\0\0\200?\10\20";
 
-/* The property as XML; 0: the parameter takes no value of that type. */
+/* Prints the property as XML; returns 0 if the parameter takes no value of this type. */
 static int print_value(char *out, size_t size, const struct param *p, enum value_type type, double x)
 {
 	switch (type) {
@@ -52,7 +52,7 @@ static int print_value(char *out, size_t size, const struct param *p, enum value
 	}
 }
 
-/* Other properties without which this one has no meaning. */
+/* Returns other properties without which this one has no effect. */
 static const char *needed_beside(const struct plugin_decl *d, const struct param *p)
 {
 	if (strcmp(p->name, "displacement") == 0)
@@ -86,7 +86,7 @@ static const char *file_of(const struct plugin_decl *d)
 #define BALL \
 	"<shape type='sphere'><point name='center' x='0' y='0.5' z='0'/><float name='radius' value='0.4'/>%s</shape>"
 
-/* A scene in which the plug-in matters. */
+/* Prints a scene whose image depends on the plug-in. */
 static void print_scene(char *text, const struct plugin_decl *d, const char *companion, const char *property)
 {
 	char own[2048], sensor[2600], ball[2600] = "", light[2600] = "";
@@ -182,7 +182,7 @@ static void check_beyond(const struct plugin_decl *d, const struct param *p, enu
 		      end, said);
 }
 
-/* Integers reach from one whole number to the next. */
+/* Returns the next representable number towards `toward`; for integers the next whole number. */
 static double next_number(enum value_type type, double x, double toward)
 {
 	return type == VALUE_INT ? x + (toward > x ? 1 : -1) : x == 0 ? copysign(1e-6, toward) : nextafter(x, toward);
@@ -218,9 +218,9 @@ static void test_ranges(void **state)
 	(void)state;
 	struct counts c = {0};
 	const struct param *seen[256];
-	size_t seen_count = 0, numbers = 0; /* every fourth one when sanitized */
+	size_t seen_count = 0, numbers = 0; /* every fourth number under sanitizers */
 	for (const struct plugin_decl *d = render_plugins(); d->type; d++) {
-		bool again = false; /* tables that several plug-ins share */
+		bool again = false; /* tables shared by several plug-ins */
 		for (size_t i = 0; i < seen_count; i++)
 			again |= seen[i] == d->params;
 		assert_true(seen_count < 256);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Light that is rare to bdpt, and light that only looks so: the sun on the floor of a pool; a caustic that is bright on
- * few pixels, which light sub-paths find; a room where path alone finds next to nothing of what lies behind a mirror.
- */
+/* Light that is rare for bdpt, and light that only seems to be: the sun on the floor of a pool; a caustic that is
+ * bright on few pixels, which light sub-paths find; a room where only path finds next to no light behind a mirror.
+ * The measured shares must lie within bounds known for these scenes. */
 #include "tests/support/worlds.h"
 #include "worker/render/path/integrate_path.h"
 #include "worker/render/rare_light.h"
@@ -42,7 +42,8 @@ static double share_of(struct world *w, uint64_t seed)
 	return found.share;
 }
 
-/* Each seed lies within; those of the scene's own table (README of tests/bench) do by half as much again or more. */
+/* The share must lie within these bounds for each seed; the shares in the scene's own table (README of tests/bench)
+ * keep a distance from them of half as much again or more. */
 static void expect_share(const char *folder, const char *file, double least, double most)
 {
 	struct world *w = world_of_own_scene(folder, file, WIDTH, HEIGHT);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Rays that a pilot counts (worker/render/rays.h): as many as the render's own leases take, the same again for the same
- * request, not many more than it needs; and with them a render that time ends has a bootstrap of a quarter of it, in a
- * room that hardly loses light, too. Rays are counted, not seconds.
+ * Rays counted by a pilot (worker/render/rays.h): as many as the render's own leases take, the same count for the
+ * same request, and not many more rays than needed. A time-limited render with these counts has a bootstrap of one
+ * quarter of its time, even in a room that hardly loses light. Rays are counted, not seconds.
  */
 #include "tests/support/leases.h"
 #include "tests/support/length.h"
@@ -24,13 +24,13 @@ enum { SIZE = 64, SECONDS = 2, RAYS_A_SECOND = 2000000 };
 static const char *const names[] = {"hslt", "pssmlt", "bdpt", "bdpt8", "path"};
 enum { NAMES = sizeof names / sizeof *names };
 
-/* Of five integrators one when sanitized: hslt. */
+/* Under sanitizers, only hslt of the five integrators is tested. */
 static int next(void)
 {
 	return test_scaled() ? NAMES : 1;
 }
 
-/* A sphere around the camera that shines and reflects 99 %: paths hardly end. */
+/* A sphere around the camera that emits light and reflects 99 %, so that paths hardly end. */
 static struct world *bright_sphere(void)
 {
 	return world_of_text(
@@ -103,7 +103,7 @@ static double bootstrap_rays(const struct world *w, const struct plan *p)
 	return sum;
 }
 
-/* The plan without a pilot: 16,384 bootstrap samples, of 8,000 rays each with hslt. */
+/* Without a pilot, the plan would have 16,384 bootstrap samples, of 8,000 rays each with hslt. */
 static void a_bright_room_has_a_short_bootstrap(void **state)
 {
 	(void)state;
@@ -116,14 +116,14 @@ static void a_bright_room_has_a_short_bootstrap(void **state)
 		print_message("%s: %.0f rays a bootstrap sample, %.1f a step; %d samples, %.2f of a quarter\n",
 			      names[i], r.rays.bootstrap, r.rays.step, (int)p.bootstrap, rays / quarter);
 		assert_true(rays <= fmax(1.15 * quarter, 1.15 * 256 * r.rays.bootstrap));
-		assert_true(rays <= 3 * quarter); /* 256 are as few as there may be */
+		assert_true(rays <= 3 * quarter); /* 256 is the smallest bootstrap */
 		assert_true((double)p.chains * r.rays.bootstrap <= fmax(quarter / 2, 16 * r.rays.bootstrap));
 		assert_true(p.bootstrap < 16384 || r.kind == PLAN_SAMPLES);
 	}
 	world_free(w);
 }
 
-/* By the render's own random numbers. */
+/* The render's own random numbers give nearly the same counts. */
 static void the_pilot_counts_what_a_render_takes(void **state)
 {
 	(void)state;
@@ -160,7 +160,7 @@ static void the_pilot_counts_what_a_render_takes(void **state)
 	world_free(worlds[1]);
 }
 
-/* Another seed is another request. */
+/* A request with another seed gives other counts. */
 static void the_seed_counts(void **state)
 {
 	(void)state;

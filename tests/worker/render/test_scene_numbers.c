@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Whole scenes with one to three of their numbers made extreme (tests/support/scene_numbers.h): each is refused with
- * its place, file and line, or rendered by every integrator without an invalid operation. Each in a process of its own,
- * which no signal ends. The seed is the test's name; FULL=1 takes 8 times as many. With arguments it is the source of
- * tests/fuzz/numbers.sh: test_scene_numbers --write FOLDER FIRST COUNT writes the scenes FIRST ... FIRST + COUNT - 1 as
- * FOLDER/N/scene.xml with their files, and what was changed on stdout.
+ * file and line, or rendered by every integrator without an invalid operation. Each scene runs in a process of its
+ * own, which no signal may end. The seed is the test's name; FULL=1 takes 8 times as many scenes. With arguments the
+ * program is the source of tests/fuzz/numbers.sh: test_scene_numbers --write FOLDER FIRST COUNT writes the scenes
+ * FIRST ... FIRST + COUNT - 1 as FOLDER/N/scene.xml with their files, and prints the changes on stdout.
  */
 #include "tests/support/length.h"
 #include "tests/support/scene_numbers.h"
@@ -95,13 +95,12 @@ static void test_numbers(void **state)
 	print_message("%zu scenes: %zu refused with their place, %zu rendered, %zu neither\n", count, c.refused,
 		      c.rendered, c.bad);
 	assert_int_equal(c.bad, 0);
-	assert_true(count < 20 ||
-		    (c.refused > count / 10 &&
-		     c.rendered > count / 10)); /* the numbers are neither all harmless nor all hopeless */
+	assert_true(count < 20 || (c.refused > count / 10 &&
+				   c.rendered > count / 10)); /* the numbers are neither all harmless nor all fatal */
 }
 
-/* By long runs: rays beyond Embree's range from segments that floats cannot tell from points, lights that are points by
- * rounding, texture coordinates of 1e45. */
+/* Scenes found by long runs: rays beyond Embree's range from segments that floats cannot tell from points, lights
+ * that are points by rounding, texture coordinates of 1e45. */
 static void test_found(void **state)
 {
 	(void)state;

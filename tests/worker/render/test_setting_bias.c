@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Settings that must not bias, one at a time: mutations leave bdpt's distribution of paths as it is
- * (tests/support/stationary.h), and images by fewer wavelengths are those by four (tests/support/agree.h).
+ * Settings that must not cause bias, one at a time: mutations leave bdpt's distribution of paths unchanged
+ * (tests/support/stationary.h), and images with fewer wavelengths equal those with four (tests/support/agree.h).
  *
- * Level: 1e-6 a case; power: the smallest bias of a soft quarter of the image that is found with 95 % probability is
- * printed and 2 % at most. A tolerance as wide as the lobes is found to bias. About 25 s of CPU time.
+ * Level: 1e-6 per case; power: the smallest bias of a soft quarter of the image that is found with 95 % probability
+ * is printed and is at most 2 %. A tolerance as wide as the lobes is found to cause bias. About 25 s of CPU time.
  */
 #include "worker/render/render.h"
 #include "tests/support/agree.h"
@@ -83,7 +83,7 @@ static void test_bias_is_found(void **state)
 	assert_true(test_scaled() || !stationary_holds(&r));
 }
 
-/* Little noise but that of drawing wavelengths. */
+/* Almost all of the noise comes from drawing wavelengths. */
 static void test_wavelengths(void **state)
 {
 	(void)state;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Light that samples hardly ever find: a small lamp in a ball of glass, a fiftieth of whose light is reflected inside
- * the glass first. `path` meets it once in a million samples, `bdpt` often. In fog no connection is refracted, and path
- * misses all light of a lamp in glass. The independent way is to render: what a short render of path lacks is what bdpt
- * has more of.
+ * Light that samples hardly ever find: a small lamp in a glass ball, a fiftieth of whose light is reflected inside
+ * the glass first. `path` meets it once in a million samples, `bdpt` often. In fog no connection is refracted, and
+ * `path` misses all light of a lamp in glass. The independent check is a render: the light missing in a short render
+ * by path is the difference to bdpt.
  */
 #include "tests/support/length.h"
 #include "tests/support/worlds.h"
@@ -43,8 +43,8 @@ static void begin(struct looking *l, const struct world *w, uint64_t seed)
 		brightness_of_samples(&l->map, &l->context, path_trace_candidates, seed, RNG_TEST, 0, SAMPLES, &e), 0);
 }
 
-/* Mean contribution relative to the brightness of its place, brighter ones than any usual one left out: both
- * integrators have few fireflies here, and one of path's is as bright as all of the image. */
+/* Returns the mean contribution relative to the brightness at its position, without contributions brighter than usual
+ * ones: both integrators have few fireflies here, and one of path's is as bright as the whole image. */
 static double mean_of(struct looking *l, path_tracer *trace, uint64_t seed, uint64_t count)
 {
 	static struct path_sample sample;
@@ -82,7 +82,7 @@ static void what_path_lacks(void **state)
 		assert_true(by_bdpt.at[3] < 0.02 * by_path.at[3]);
 		for (int i = 1; i < PLAN_UNSEEN; i++)
 			assert_true(by_path.at[i] <= by_path.at[i - 1]);
-		assert_true(by_path.at[PLAN_UNSEEN - 1] < 0.01 * by_path.at[3]); /* 7 billion find it */
+		assert_true(by_path.at[PLAN_UNSEEN - 1] < 0.01 * by_path.at[3]); /* 7 billion samples find it */
 	}
 	assert_true(test_scaled() || (lacks > 0.01 && lacks < 0.04));
 	brightness_fini(&l.map);
@@ -105,9 +105,9 @@ static void what_path_lacks(void **state)
 	"<emitter type='area'><float name='radiance' value='1e6'/></emitter></shape>"
 /* clang-format on */
 
-/* The means of 131,072 samples each are known to a few per cent. Path lacks more than a tenth of the light, which lies
- * everywhere, so the root mean square of what is unseen is about that share, but for the light that events in the fog
- * bring to the camera, which is not looked at. */
+/* The means of 131,072 samples each are known to a few per cent. Path lacks more than a tenth of the light, which
+ * lies everywhere, so the root mean square of the unseen light is about this share; the light that events in the fog
+ * send to the camera is not measured. */
 static void what_path_lacks_in_fog(void **state)
 {
 	(void)state;
@@ -159,7 +159,7 @@ static void of_a_request(void **state)
 	double path = unseen_of(bulb, request_of("path", PLAN_SAMPLES));
 	assert_true(path > 5e-5);
 	assert_true(unseen_of(bulb, request_of("erpt", PLAN_SAMPLES)) < 0.1 * path);
-	/* Chains find what samples of bdpt find. */
+	/* Chains find the light that samples of bdpt find. */
 	double chains = unseen_of(bulb, request_of("hslt", PLAN_CHAINS));
 	assert_true(chains < 0.1 * path && chains == unseen_of(bulb, request_of("bdpt", PLAN_SAMPLES)));
 
