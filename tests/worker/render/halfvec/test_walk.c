@@ -145,7 +145,7 @@ static struct ray_end end_of(const struct path_vertex *v)
 /* Results of a run over one world. */
 struct tally {
 	size_t walks, arrived, strict, returned, ends[WALK_ITERATIONS + 1], back_ends[WALK_ITERATIONS + 1];
-	size_t stays, left, again, elsewhere; /* to its own half vectors; with half the tolerance */
+	size_t stays, left, again, elsewhere; /* walks to where the path is; walks with half the tolerance */
 	uint64_t iterations, rays, occluded, seams;
 	double worst;	   /* residual in tolerances */
 	double worst_stay; /* largest move of a walk to the path's own half vectors */

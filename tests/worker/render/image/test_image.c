@@ -189,8 +189,8 @@ static void refuses_png(unsigned side, int color, const char *text)
 	free(png);
 }
 
-/* A header that promises pixels with no data after it must not cost a gigabyte; nor may one with some data cost more
- * than the data can fill. */
+/* A header that promises pixels without data for them is refused before memory is allocated, and so is one with more
+ * pixels than a scene may have. */
 static void test_png_bomb(void **state)
 {
 	(void)state;

@@ -57,7 +57,7 @@ static void both_halves_have_their_brightness(void **state)
 	for (double y = 1; y < SIDE; y += 7)
 		for (double x = 1; x < SIDE; x += 5) {
 			double product = relative(&b, x, y) * halves(x, y);
-			assert_true(product > 0.98 && product < 1.02); /* a hundredth of the mean is added in squares */
+			assert_true(product > 0.98 && product < 1.02); /* 1 % of the mean is added in quadrature */
 		}
 	brightness_fini(&b);
 }
@@ -153,7 +153,7 @@ static void a_firefly_is_spread_over_its_neighbourhood(void **state)
 	double there = 1 / relative(&b, 40.25, 20.5), expected = 1 + (1e6 - 1) / (2 * 25 * 25);
 	assert_true(there > 0.999 * expected && there < 1.001 * expected);
 	double away = 1 / relative(&b, 60, 20.5), mean = 1 + (1e6 - 1) / SAMPLES;
-	expected = sqrt(1 + 0.01 * mean * 0.01 * mean); /* a hundredth of the mean is added in squares */
+	expected = sqrt(1 + 0.01 * mean * 0.01 * mean); /* 1 % of the mean is added in quadrature */
 	assert_true(away > 0.999 * expected && away < 1.001 * expected);
 	brightness_fini(&b);
 }

@@ -33,7 +33,7 @@
 	"<sensor type='orthographic'><float name='shutter_open' value='1'/><float name='shutter_close' value='3'/>" TO( \
 		"<lookat origin='0,0,5' target='0,0,0' up='0,1,0'/>") BOX_FILM "</sensor>"
 
-/* ---- what the camera sees */
+/* ---- what the camera sees ---- */
 
 /* Returns whether the card covers a point of the film at time t. The film spans 2 x 2 around the origin. */
 typedef bool covers_fn(double x, double y, double t);
@@ -121,7 +121,7 @@ static void test_seen(void **state)
 		   turns);
 }
 
-/* ---- all integrators */
+/* ---- all integrators ---- */
 
 enum { PARTS = 32 };
 
@@ -421,7 +421,7 @@ static void test_glow(void **state)
 	check_integrators(MEDIA, sides, test_full() ? 2 : 1);
 }
 
-/* ---- lights over a plane */
+/* ---- at rest ---- */
 
 /* A lamp whose transforms are all equal, and one that would move only while the shutter is closed, give the same bits
  * as static lamps. */

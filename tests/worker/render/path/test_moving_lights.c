@@ -21,7 +21,6 @@
 
 #define SHUTTER "<float name='shutter_open' value='1'/><float name='shutter_close' value='3'/>"
 #define SHINES(radiance) "<emitter type='area'><float name='radiance' value='" radiance "'/></emitter>"
-/* A card in front of the camera, a ball of glass that grows, a group of rough metal that turns, two lights. */
 
 /* The half sides, or the radius, and the position of the light at one time. */
 struct light_at {
@@ -66,7 +65,7 @@ static double of_card(const struct light_at *l, double x, double y)
 	return sum;
 }
 
-/* The edge of the beam falls off linearly. */
+/* 1 inside the beam and 0 outside: over time, the mean blurs the moving edge. */
 static double of_beam(const struct light_at *l, double x, double y)
 {
 	return fabs(x - l->x) < l->a && fabs(y) < l->b;

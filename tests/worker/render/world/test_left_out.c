@@ -122,7 +122,7 @@ static void test_without_triangles_in_gltf(void **state)
 	world_free(w);
 }
 
-/* Three shapes, and four that are too small for a world that contains them: the latter are left out. */
+/* Three shapes, and four that are too small for a world that contains the former: the four are left out. */
 static void test_too_small(void **state)
 {
 	(void)state;
