@@ -31,7 +31,7 @@ static void a_shared_file_comes_once(void **state)
 
 /* The job that asked for a file ends, then the other jobs do. The piece under way belongs to no job, and the next job
  * asks for it again. */
-static void whoever_asked_may_go(void **state)
+static void the_job_that_asked_may_end(void **state)
 {
 	(void)state;
 	coord_start(0);
@@ -112,7 +112,7 @@ static void old_leases_do_not_pile_up(void **state)
 
 /* A coordinator that has lost its spool grants a lease of another job 1 before the worker knows: the lease is
  * returned, and can be granted again. */
-static void another_job_of_that_number(void **state)
+static void another_job_with_the_same_number(void **state)
 {
 	(void)state;
 	coord_start(0);
@@ -137,7 +137,7 @@ static void another_job_of_that_number(void **state)
 }
 
 /* Pieces that were not requested, not requested now, or do not exist. */
-static void what_was_not_asked_for_is_refused(void **state)
+static void unrequested_pieces_are_refused(void **state)
 {
 	(void)state;
 	for (int i = 0; i < 3; i++) {
@@ -242,12 +242,12 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		TEST(a_shared_file_comes_once),
-		TEST(whoever_asked_may_go),
+		TEST(the_job_that_asked_may_end),
 		TEST(a_late_job_takes_over),
 		TEST(a_new_connection_goes_on),
 		TEST(old_leases_do_not_pile_up),
-		TEST(another_job_of_that_number),
-		TEST(what_was_not_asked_for_is_refused),
+		TEST(another_job_with_the_same_number),
+		TEST(unrequested_pieces_are_refused),
 		TEST(lies_are_noticed),
 		TEST(a_store_without_room_fails_each_once),
 		TEST(a_full_disk_is_its_own_fault),

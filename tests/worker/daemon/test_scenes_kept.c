@@ -128,7 +128,7 @@ static void the_restriction_ends(void **state)
 }
 
 /* After the period, both jobs are accepted again. */
-static void then_it_takes_any(void **state)
+static void both_scenes_are_accepted_afterwards(void **state)
 {
 	struct error e;
 	(void)state;
@@ -216,7 +216,7 @@ static void a_thread_that_has_yet_to_stop(void **state)
 }
 
 /* A worker that leaves has returned the leases of the waiting scene, and must not build it. */
-static void who_leaves_builds_no_more(void **state)
+static void a_leaving_worker_builds_no_more(void **state)
 {
 	struct job_cache *next;
 	(void)state;
@@ -258,9 +258,9 @@ int main(void)
 		TEST(one_scene_at_a_time_where_memory_was_short),
 		TEST(a_scene_makes_way_for_one_that_waits),
 		TEST(the_restriction_ends),
-		TEST(then_it_takes_any),
+		TEST(both_scenes_are_accepted_afterwards),
 		TEST(a_thread_that_has_yet_to_stop),
-		TEST(who_leaves_builds_no_more),
+		TEST(a_leaving_worker_builds_no_more),
 		TEST(a_lack_of_memory_is_no_jobs_fault),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

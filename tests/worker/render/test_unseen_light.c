@@ -150,7 +150,7 @@ static double unseen_of(const struct world *w, struct plan_request r)
 	return r.unseen.at[3];
 }
 
-static void of_a_request(void **state)
+static void light_unseen_by_a_request(void **state)
 {
 	(void)state;
 	struct error e;
@@ -180,6 +180,6 @@ static void of_a_request(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {cmocka_unit_test(what_path_lacks), cmocka_unit_test(what_path_lacks_in_fog),
-					   cmocka_unit_test(of_a_request)};
+					   cmocka_unit_test(light_unseen_by_a_request)};
 	return cmocka_run_group_tests_name("worker/render/unseen_light", tests, NULL, NULL);
 }

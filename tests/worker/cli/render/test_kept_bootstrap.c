@@ -319,7 +319,7 @@ static void test_bytes_stay(void **state)
 
 /* Truncated at each byte, one byte too long, each bit of the magic number and of the lease's position flipped, and
  * invalid weights. */
-static void test_bytes_of_none(void **state)
+static void test_damaged_bytes(void **state)
 {
 	(void)state;
 	enum { END = OLD_SIZE - 4, PART = 8 * (OLD_LEASE + 4) /* turns the lease into the other part of its group */ };
@@ -346,7 +346,7 @@ static void test_bytes_of_none(void **state)
 }
 
 /* If no file can be written beside the image, or no lease has finished, nothing is kept, and a message says so. */
-static void test_no_place(void **state)
+static void test_no_file_beside_the_image(void **state)
 {
 	(void)state;
 	struct world *w = lit_world();
@@ -373,9 +373,9 @@ int main(void)
 		cmocka_unit_test_setup_teardown(test_goes_on, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(test_of_another_command, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(test_damage, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(test_no_place, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(test_no_file_beside_the_image, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(test_bytes_stay, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(test_bytes_of_none, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(test_damaged_bytes, folder_set_up, folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

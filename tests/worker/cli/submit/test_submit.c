@@ -146,7 +146,7 @@ static void what_was_checked_is_sent(void **state)
 }
 
 /* Meshes in a library folder beside the scene's folder (--path) are sent under the same name. */
-static void what_is_elsewhere_is_sent_too(void **state)
+static void files_in_search_folders_are_sent(void **state)
 {
 	(void)state;
 	struct scene_files b;
@@ -200,7 +200,7 @@ static bool is_in(const struct scene_files *b, const char *name)
 
 /* Files named by included files lie in the folder of the included file, or in that of the scene. They are sent under
  * names by which a worker, which has only the sent files, finds them. */
-static void what_included_files_name_is_sent(void **state)
+static void files_of_included_files_are_sent(void **state)
 {
 	(void)state;
 	char path[256];
@@ -329,7 +329,7 @@ static void one_job_is_waited_for(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(what_was_checked_is_sent), cmocka_unit_test(what_is_elsewhere_is_sent_too),
-		cmocka_unit_test(what_included_files_name_is_sent), cmocka_unit_test(one_job_is_waited_for)};
+		cmocka_unit_test(what_was_checked_is_sent), cmocka_unit_test(files_in_search_folders_are_sent),
+		cmocka_unit_test(files_of_included_files_are_sent), cmocka_unit_test(one_job_is_waited_for)};
 	return cmocka_run_group_tests(tests, set_up, tear_down);
 }

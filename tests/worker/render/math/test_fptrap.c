@@ -22,7 +22,7 @@ static void invalid(void)
 	result = zero / zero;
 }
 
-static void ours_seen_at_the_door(void)
+static void ours_seen_on_entering_a_library(void)
 {
 	fptrap_watch();
 	invalid();
@@ -38,7 +38,7 @@ static void ours_seen_at_the_end(void)
 	fptrap_unwatch(before);
 }
 
-static void a_librarys(void)
+static void in_a_library(void)
 {
 	bool before = fptrap_watch();
 	unsigned left = fptrap_leave();
@@ -74,10 +74,10 @@ static void test_signals(void **state)
 {
 	(void)state;
 #if defined(__x86_64__)
-	assert_int_equal(signal_of(ours_seen_at_the_door), SIGFPE);
+	assert_int_equal(signal_of(ours_seen_on_entering_a_library), SIGFPE);
 	assert_int_equal(signal_of(ours_seen_at_the_end), SIGFPE);
 #endif
-	assert_int_equal(signal_of(a_librarys), 0);
+	assert_int_equal(signal_of(in_a_library), 0);
 	assert_int_equal(signal_of(not_watched), 0);
 }
 
@@ -110,7 +110,7 @@ static void test_caught(void **state)
 	assert_null(fptrap_catch(NULL)); /* once only: the next invalid operation raises a signal again */
 	assert_int_equal(signal_of(ours_within_the_watch), SIGFPE);
 #endif
-	assert_false(is_caught(a_librarys));
+	assert_false(is_caught(in_a_library));
 	assert_false(is_caught(not_watched));
 }
 

@@ -96,7 +96,7 @@ static void test_mirror(void **state)
 }
 
 /* The beam hits a wall behind the camera at (0, 0, 2), and this spot lights the plate at z = 0. */
-static void test_lit_from_there(void **state)
+static void test_plate_lit_by_the_spot(void **state)
 {
 	(void)state;
 	struct world *w = world_of_text(SIDE, SIDE,
@@ -188,8 +188,11 @@ static void test_refused(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_spot), cmocka_unit_test(test_mirror),  cmocka_unit_test(test_lit_from_there),
-		cmocka_unit_test(test_fog),  cmocka_unit_test(test_refused),
+		cmocka_unit_test(test_spot),
+		cmocka_unit_test(test_mirror),
+		cmocka_unit_test(test_plate_lit_by_the_spot),
+		cmocka_unit_test(test_fog),
+		cmocka_unit_test(test_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

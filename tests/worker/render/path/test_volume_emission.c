@@ -484,7 +484,7 @@ static void test_shared(void **state)
 }
 
 /* Chains over full paths would leave the emission out. */
-static void test_who_finds_it(void **state)
+static void test_integrators_that_miss_it(void **state)
 {
 	(void)state;
 	struct world *w = world_of_text(SIDE, SIDE, VIEW BALL(FOG("1", "0.5") NULL_FACES SHINES("1")));
@@ -539,10 +539,12 @@ static void test_dispersed(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_layer),	     cmocka_unit_test(test_furnace),	cmocka_unit_test(test_chains),
-		cmocka_unit_test(test_grid_furnace), cmocka_unit_test(test_grid_layer), cmocka_unit_test(test_colours),
-		cmocka_unit_test(test_ball),	     cmocka_unit_test(test_refused),	cmocka_unit_test(test_shared),
-		cmocka_unit_test(test_who_finds_it), cmocka_unit_test(test_dispersed),
+		cmocka_unit_test(test_layer),	   cmocka_unit_test(test_furnace),
+		cmocka_unit_test(test_chains),	   cmocka_unit_test(test_grid_furnace),
+		cmocka_unit_test(test_grid_layer), cmocka_unit_test(test_colours),
+		cmocka_unit_test(test_ball),	   cmocka_unit_test(test_refused),
+		cmocka_unit_test(test_shared),	   cmocka_unit_test(test_integrators_that_miss_it),
+		cmocka_unit_test(test_dispersed),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
