@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/* Statistics of accuracy measurements: Student's t against a printed table, a difference worked out by hand, the
+ * coverage of intervals on simulated groups, medians, and the front of settings that no other setting dominates. */
 #include "worker/cli/accuracy/accuracy_stats.h"
 
 #include "tests/support/dice.h"
@@ -36,9 +38,10 @@ static void a_difference_by_hand(void **unused)
 }
 
 /*
- * 4,000 differences of groups with unequal spread, at 95 %: the intervals contain the true value in 3,800 of them,
- * with standard deviation 14. A deviation of more than 75 (level 1e-6 by the normal approximation, plus 5 of 14 for
- * Welch's own) is a fault, such as ignoring the degrees of freedom (z instead of t at 7 degrees misses 9 %).
+ * Differences of groups with unequal spread, at 95 %: of 4,000 intervals 3,800 contain the true value, with standard
+ * deviation 14. A deviation of more than 75 (level 1e-6 by the normal approximation, with a margin for the error of
+ * Welch's approximation) is a fault, such as ignoring the degrees of freedom (z instead of t at 7 degrees misses 9
+ * %).
  */
 static void intervals_hold_the_truth(void **unused)
 {

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/* The sRGB curve against the image reader's inverse of it, exposure, and the counts of values that no screen can show;
+ * expected bytes are worked out by hand. */
 #include "worker/cli/image/tonemap.h"
 
 #include "worker/render/image/srgb.h"

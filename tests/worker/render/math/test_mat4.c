@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/* Transforms: products, rotations by known angles, inverses of random matrices, normals that stay perpendicular to the
+ * transformed surface, and look-at, against values worked out by hand. */
 #include "worker/render/math/mat4.h"
 
 #include "worker/render/math/rng.h"

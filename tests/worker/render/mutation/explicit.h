@@ -142,7 +142,7 @@ static inline double explicit_log_between(const struct path_context *c, const st
 	return sum;
 }
 
-/* Probability of b and c, where the strategy draws them by the heuristic. */
+/* Returns the logarithm of the probability of b and c, if the strategy draws them by the heuristic; otherwise 0. */
 static inline double explicit_log_choice(const struct path_context *c, const char *strategy,
 					 const struct mutation_setting *how, const struct full_path *x, unsigned b,
 					 unsigned c_end)

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/* Numbers in texts: accepted and refused notations, rounding against strtod(), lists of numbers, and snake case. */
 #include "worker/render/math/rng.h"
 #include "worker/render/text/number.h"
 #include "worker/render/text/snake_case.h"
