@@ -40,8 +40,7 @@ static void a_difference_by_hand(void **unused)
 /*
  * Differences of groups with unequal spread, at 95 %: of 4,000 intervals 3,800 contain the true value, with standard
  * deviation 14. A deviation of more than 75 (level 1e-6 by the normal approximation, with a margin for the error of
- * Welch's approximation) is a fault, such as ignoring the degrees of freedom (z instead of t at 7 degrees misses 9
- * %).
+ * Welch's approximation) is a fault, such as ignoring the degrees of freedom (at 7 degrees, z instead of t misses 9 %).
  */
 static void intervals_hold_the_truth(void **unused)
 {

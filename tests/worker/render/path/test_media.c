@@ -27,8 +27,8 @@
 	"<medium type='homogeneous' name='" side "'><rgb name='sigma_t' value='" sigma_t \
 	"'/><rgb name='albedo' value='" albedo "'/></medium>"
 
-/* Layers at z in (-1, 1), (-3, -2) and (-7, -3). The third begins where the second ends; if the first began there
- * too, one layer would have to state its exterior and another its interior, so a gap separates them. */
+/* Layers at z in (-1, 1), (-3, -2) and (-7.25, -3.25). A third layer that began where the second ends would need a
+ * stated exterior in one and a stated interior in the other; so a gap of 0.25 separates them. */
 static struct world *layers(void)
 {
 	return world_of_text(

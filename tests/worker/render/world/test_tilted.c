@@ -164,8 +164,8 @@ static void test_two_sides(void **state)
 }
 
 /* The distribution of sampled directions against the density, in the moments 1, x, y, z, xy and z^2 over the sphere:
- * 6 two-sided tests per case, at level 1e-6 each; an error of 2 % in a moment of size 0.3 is found with a power of 99
- * %. The values returned with a sample must equal those of eval and pdf_solid. */
+ * 6 two-sided tests per case, at level 1e-6 each; an error of 2 % in a moment of size 0.3 is found with a power
+ * of 99 %. The values returned with a sample must equal those of eval and pdf_solid. */
 static void check_sampling(const char *whole)
 {
 	enum { SAMPLES = 60000, MOMENTS = 6 };
