@@ -262,8 +262,9 @@ static double integrand(const double u[SAMPLER_BLOCK])
 	return smooth + corner + (u[0] - 0.5) * (u[4] - 0.5);
 }
 
-/* Means of 64 samples over many replicates; power: a bias of 1 % or less is found with 95 % probability, while one
- * of 2 % is found here. The variance between replicates is at most a third of that of independent samples. */
+/* Means of 64 samples over many replicates. Power: the smallest bias found with 95 % probability must be below 1 %, and
+ * a planted bias of 2 % must be found. The variance between replicates is at most a third of that of independent
+ * samples. */
 static void test_means(void **state)
 {
 	(void)state;
