@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * How a job ends, as transcripts of events and actions: by samples, by time, by its error, without any light, or
- * failed, with the exit code of each; and what its status says on the way: progress, rate, remaining time and forecast.
+ * How a job ends, as transcripts of events and actions: at its number of samples, its time limit or its target error,
+ * without any light, or by failing; the exit code of each end is checked. Also what the job's status says meanwhile:
+ * progress, rate, remaining time and forecast.
  */
 #include "tests/support/transcript.h"
 
@@ -42,7 +43,8 @@ static void by_time(void **state)
 			   START("rounds=inf seconds=5"),
 			   "[12] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
 			   "[14.9] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w1 gets j1 g0 p0 e1",
-			   /* the time is tested when a round is complete, and runs from the first bootstrap lease */
+			   /* The time limit is checked when a round is complete; the time runs from the first bootstrap
+			    * lease. */
 			   "[15.5] tick -> -",
 			   "[16] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, j1 publish 2, j1 is done (time)",
 			   NULL,
@@ -60,12 +62,14 @@ static void by_error(void **state)
 			START("rounds=inf target=0.1"),
 			"[12] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
 			"[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, j1 evaluate 1, w1 gets j1 g0 p0 e1",
-			/* what would change the prefix in question waits; so does an answer about another prefix */
+			/* Results that would change the prefix of rounds whose error is being estimated wait; so does
+			 * an estimate of another prefix. */
 			"[14] w1 batch j1 g0 p0 e1 -> refused: the job's error is being estimated, w1 gets j1 g0 p0 e1",
 			"[14] error j1 2 0.01 -> -",
 			"[14] error j1 1 nan -> -",
 			"[15] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, j1 evaluate 2, w1 gets j1 g0 p0 e2",
-			"[15] error j1 1 0.01 -> -", /* the same about an earlier one, however small */
+			"[15] error j1 1 0.01 -> -", /* An estimate of an earlier prefix is ignored, however small its
+						      * error is. */
 			"[15] error j1 2 0.5 -> -",
 			"[16] w1 batch j1 g0 p0 e2 -> merge, merged, j1 round 3, j1 evaluate 3, w1 gets j1 g0 p0 e3",
 			"[16] error j1 3 0.3 -> -",
@@ -96,8 +100,8 @@ static void bound_before_error(void **state)
 			   "[1] w1 batch j1 g1 p0 boot -> merge, merged, j1 prepare",
 			   "[1] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0, w1 gets j1 g1 p0 e0",
 			   "[3] w1 batch j1 g0 p0 e0 -> merge, merged, w1 gets j1 g0 p0 e1",
-			   /* the end is decided: nothing more is handed out or merged while the error is evaluated once
-			      more */
+			   /* The job is about to end: nothing more is handed out or merged while its error is evaluated
+			    * a last time. */
 			   "[4] w1 batch j1 g1 p0 e0 -> merge, merged, j1 round 1, w1 loses j1 g0 p0 e1, j1 evaluate 1",
 			   "[4] w1 batch j1 g0 p0 e1 -> refused: the job is ending",
 			   "[4] error j1 1 0.4 -> j1 publish 1, j1 is done (time)",
@@ -106,7 +110,8 @@ static void bound_before_error(void **state)
 	expect_end(f, JOB_DONE, END_TIME, 4);
 }
 
-/* Whatever bound ended it. Before its end, after a failure and of other jobs the word means nothing. */
+/* The warning that chains disagree is given for every bound that ends a job. The message has no effect before the job's
+ * end, after a failure, or on other jobs. */
 static void chains_disagree(void **state)
 {
 	(void)state;
@@ -166,7 +171,8 @@ static void no_light_in_the_bootstrap_ends_the_job(void **state)
 	expect_end(f, JOB_DONE, END_BLACK, 0);
 }
 
-/* 8 x 8 pixels of 8,000 samples a round: the second one makes a million. With another bound it goes on to that. */
+/* A round has 8 x 8 pixels of 8,000 samples, so two rounds make a million samples. A job with another bound goes on
+ * until then. */
 static void black_samples(void **state)
 {
 	(void)state;
@@ -263,7 +269,7 @@ static void progress_and_rate(void **state)
 	farm_free(f);
 }
 
-/* What a job did before others took its workers says nothing about when it will be done. */
+/* Progress that a job made before other jobs took its workers does not predict its end. */
 static void no_eta_without_leases(void **state)
 {
 	(void)state;
@@ -285,7 +291,7 @@ static void no_eta_without_leases(void **state)
 	assert_string_equal(s.waiting, "waits for j2 of higher priority (5)");
 	assert_true(s.rate > 0 && isnan(s.eta) && isnan(s.eta_low) && isnan(s.eta_high));
 	farm_free(f);
-	/* a time ends it all the same */
+	/* The time limit ends the job all the same. */
 	f = transcript_farm();
 	transcript_play(f, (const char *const[]){
 				   START("rounds=10 seconds=100"),
@@ -300,7 +306,8 @@ static void no_eta_without_leases(void **state)
 	farm_free(f);
 }
 
-/* Nor does its bootstrap, which may be so short that its rate is that of waiting. */
+/* Progress in the bootstrap does not predict the end either: a bootstrap may be so short that its rate only measures
+ * waiting. */
 static void no_eta_by_bootstrap(void **state)
 {
 	(void)state;
@@ -329,7 +336,7 @@ static void progress_of_errors(void **state)
 			   "[13] error j1 1 0.2 -> -",
 			   NULL,
 		   });
-	/* twice the error: four rounds; and when that turns out to be too few, progress stays */
+	/* Twice the target error needs four rounds; when these turn out to be too few, progress does not fall back. */
 	near(job_status_of(f, 13).progress, 1400.0 / 2600);
 	near(job_status_of(f, 13).eta, 1200 / 200.0);
 	transcript_play(
@@ -342,7 +349,7 @@ static void progress_of_errors(void **state)
 	farm_free(f);
 }
 
-/* A look below the target whose interval is not known ends nothing; the next one does. */
+/* An estimate below the target whose interval is unknown does not end the job; the next one with an interval does. */
 static void doubtful_looks_end_nothing(void **state)
 {
 	(void)state;
@@ -371,7 +378,7 @@ static void doubtful_looks_end_nothing(void **state)
 	farm_free(f);
 }
 
-/* With what the error is made of, the forecast of common/film takes over. */
+/* Once the parts of the error are known, the forecast of common/film replaces the simple rule. */
 static void looks_give_a_forecast(void **state)
 {
 	(void)state;
@@ -399,10 +406,11 @@ static void looks_give_a_forecast(void **state)
 	assert_true(forecast_error(s.looks, &error));
 	near(error.middle, sqrt(0.038));
 	near(error.high, 0.2);
-	/* Half of the error is four times the work: three times what was paid, at the present rate of 400 in 2.5 s. */
+	/* Half the error needs four times the work: three times the CPU time used so far, at the present rate of 400
+	 * mutations in 2.5 s. */
 	assert_true(fabs(s.halving_cpu.middle / 15 - 1) < 0.1);
 	assert_true(fabs(s.halving_seconds.middle / (1200 / s.rate) - 1) < 0.1);
-	/* Four rounds by the rule, three more to come; the interval says so. */
+	/* Four rounds by the rule, so three are still to come; the interval contains that estimate. */
 	assert_true(s.eta_low <= s.eta && s.eta <= s.eta_high && s.eta_low >= 400 / s.rate &&
 		    s.eta_high < 4000 / s.rate);
 	assert_true(s.eta >= 800 / s.rate - 1e-9 && s.eta <= 1600 / s.rate + 1e-9);
@@ -418,7 +426,7 @@ static void progress_of_time(void **state)
 	near(job_status_of(f, 15).eta, 15);
 	near(job_status_of(f, 100).progress, 0.99);
 	farm_free(f);
-	/* 400 mutations, a round, take two seconds: the tenth is complete a second after the time. */
+	/* A round of 400 mutations takes two seconds: the tenth is complete one second after the time limit. */
 	f = transcript_farm();
 	transcript_play(f, (const char *const[]){
 				   START("rounds=inf seconds=20"),

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Chain states that workers refuse, as transcripts: who is asked, who is to blame, and that no job fails by it. */
+/* Chain states that workers refuse, as transcripts: which worker is asked next, which one is to blame, and that no job
+ * fails because of it. */
 #include "coordinator/core/doubt.h"
 #include "coordinator/core/worker_registry.h"
 #include "tests/support/transcript.h"
@@ -11,7 +12,7 @@
 
 #include <cmocka.h>
 
-/* One slot; the first worker has made the states after epoch 0 and leaves the next lease to others. */
+/* Each worker has one slot; the first worker makes the states after epoch 0 and leaves the next lease to others. */
 /* clang-format off */
 #define START                                                                       \
 	"[0] submit groups=1 rounds=4 -> j1 submitted, j1 is queued",               \
@@ -40,7 +41,8 @@ static void without_what_came_before_the_chains_begin_anew(void **state)
 				   WORKER(2, "b"),
 				   WORKER(3, "c"),
 				   "[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
-				   /* Neither it nor who made them, though that one would. */
+				   /* Neither the worker that refused nor the one that made the states gets the lease,
+				    * though the maker would accept it. */
 				   "[4] w2 denies j1 g0 p0 e1 not mine -> -",
 				   "[4] w1 wants 1 -> -",
 				   NULL,
@@ -54,7 +56,7 @@ static void without_what_came_before_the_chains_begin_anew(void **state)
 				   "[5] w3 wants 1 -> w3 gets j1 g0 p0 e1",
 				   "[6] w3 denies j1 g0 p0 e1 not mine either -> anew, "
 				   "#1 wrong chain states: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e1 anew",
-				   /* From states again. */
+				   /* The lease is given with chain states again. */
 				   "[7] w2 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2",
 				   NULL,
 			   });
@@ -63,8 +65,8 @@ static void without_what_came_before_the_chains_begin_anew(void **state)
 	assert_int_equal(wrong_count(f, 2) + wrong_count(f, 3), 0);
 	assert_true(farm_peer(f, 2, &p) && p.failures == 0 && p.faults == 0);
 	assert_string_equal(doubt_maker(f, &(struct lease_key){1, LEASE_RENDER, 0, 0, 2}), "b");
-	/* Who made the states of other leases is not said: of an epoch before, of one that nobody has, of no states at
-	 * all. */
+	/* The maker of the states is unknown for other leases: of an earlier epoch, of one that no worker holds, or
+	 * without states. */
 	assert_string_equal(doubt_maker(f, &(struct lease_key){1, LEASE_RENDER, 0, 0, 1}), "?");
 	assert_string_equal(doubt_maker(f, &(struct lease_key){1, LEASE_RENDER, 0, 0, 3}), "?");
 	assert_string_equal(doubt_maker(f, &(struct lease_key){1, LEASE_BOOTSTRAP, 0, 0, 0}), "?");
@@ -95,7 +97,7 @@ static void a_third_that_goes_on_is_right(void **state)
 	farm_free(f);
 }
 
-/* One word against another: nobody is to blame, and the job goes on. */
+/* With one worker's word against another's nobody is to blame, and the job goes on. */
 static void without_a_third_the_chains_begin_anew(void **state)
 {
 	(void)state;
@@ -106,7 +108,8 @@ static void without_a_third_the_chains_begin_anew(void **state)
 				   "[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
 				   "[4] w2 denies j1 g0 p0 e1 no -> anew, w2 gets j1 g0 p0 e1 anew",
 				   "[5] w2 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w2 gets j1 g0 p0 e2",
-				   "[6] w2 denies j1 g0 p0 e2 my own -> -", /* made by itself: the other is asked */
+				   "[6] w2 denies j1 g0 p0 e2 my own -> -", /* The worker made the states itself: the
+									     * other worker is asked. */
 				   "[6] w1 wants 1 -> w1 gets j1 g0 p0 e2",
 				   "[7] w1 denies j1 g0 p0 e2 no -> anew, w2 gets j1 g0 p0 e2 anew",
 				   NULL,
@@ -115,7 +118,7 @@ static void without_a_third_the_chains_begin_anew(void **state)
 	farm_free(f);
 }
 
-/* The third leaves before it has said anything: the two are asked again. */
+/* The third worker leaves before it has answered: the first two are asked again. */
 static void a_third_that_leaves(void **state)
 {
 	(void)state;
@@ -134,7 +137,7 @@ static void a_third_that_leaves(void **state)
 	farm_free(f);
 }
 
-/* The worker that made the states may continue from them; its result is no third opinion. */
+/* The worker that made the states may continue from them; its result does not count as a third opinion. */
 static void the_maker_goes_on(void **state)
 {
 	(void)state;
@@ -155,8 +158,8 @@ static void the_maker_goes_on(void **state)
 	farm_free(f);
 }
 
-/* The epoch that the states are the end of is computed again, by somebody else; a round that it was in is open again.
- */
+/* The epoch that ended in the refused states is computed again, by another worker; if its round was complete, the round
+ * is open again. */
 static void a_second_refusal_takes_the_epoch_back(void **state)
 {
 	(void)state;
@@ -181,7 +184,8 @@ static void a_second_refusal_takes_the_epoch_back(void **state)
 	transcript_play(f, (const char *const[]){
 				   "[6] w1 batch j1 g0 p0 e1 -> refused: the epoch is not open",
 				   "[7] w2 wants 0 -> -",
-				   /* Not who made them, while there is another. */
+				   /* The lease does not go to the worker that made the states while there is another
+				    * one. */
 				   "[7] w2 returns j1 g0 p0 e0 -> w3 gets j1 g0 p0 e0",
 				   "[7] w2 wants 1 -> -",
 				   "[7] w3 wants 0 -> -",
@@ -195,7 +199,8 @@ static void a_second_refusal_takes_the_epoch_back(void **state)
 	farm_free(f);
 }
 
-/* Its grant crossed with the refusal of states that are gone: it has the lease still, and nobody is to blame. */
+/* The grant crossed with the refusal of states that are now discarded: the worker still has the lease, and nobody is to
+ * blame. */
 static void a_late_refusal_is_of_no_consequence(void **state)
 {
 	(void)state;
@@ -220,8 +225,8 @@ static void a_late_refusal_is_of_no_consequence(void **state)
 	farm_free(f);
 }
 
-/* A copy of the lease is out with the states that are given up: it is taken back, and what its worker says of them is
- * late. */
+/* A copy of the lease is at another worker, with the states that are discarded: it is taken back, and what that worker
+ * then says about these states comes too late. */
 static void who_has_states_that_are_given_up_loses_them(void **state)
 {
 	(void)state;
@@ -240,8 +245,8 @@ static void who_has_states_that_are_given_up_loses_them(void **state)
 				   "[12] w3 heartbeat -> w4 gets j1 g0 p0 e1",
 				   "[13] w4 denies j1 g0 p0 e1 no -> w3 loses j1 g0 p0 e1, anew, "
 				   "#1 wrong chain states: j1 render group 0 part 0 epoch 0, w4 gets j1 g0 p0 e1 anew",
-				   "[13] w3 refuses j1 g0 p0 e1 no -> -", /* what it had before */
-				   "[13] w4 refuses j1 g0 p0 e1 no -> -", /* the same */
+				   "[13] w3 refuses j1 g0 p0 e1 no -> -", /* about the lease it held before */
+				   "[13] w4 refuses j1 g0 p0 e1 no -> -", /* also about the earlier lease */
 				   "[14] w4 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w3 gets j1 g0 p0 e2",
 				   NULL,
 			   });
@@ -261,11 +266,12 @@ static void after_four_times_the_chains_begin_anew(void **state)
 			   });
 	for (int i = 0; i < 4; i++)
 		transcript_play(f, (const char *const[]){
-					   /* Made by the other one. */
+					   /* The states were made by the other worker. */
 					   "[4] w2 refuses j1 g0 p0 e1 no -> back j1 g0 p0 e0, w2 gets j1 g0 p0 e0",
 					   "[4] w2 wants 0 -> -",
 					   "[4] w2 returns j1 g0 p0 e0 -> -",
-					   "[4] w1 wants 1 -> -", /* whose epoch it is, while another is here */
+					   "[4] w1 wants 1 -> -", /* it made the epoch's states, and another worker is
+								   * connected */
 					   "[4] w2 leaves -> w1 gets j1 g0 p0 e0",
 					   "[5] w1 wants 0 -> -",
 					   "[5] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1",
@@ -282,7 +288,7 @@ static void after_four_times_the_chains_begin_anew(void **state)
 	farm_free(f);
 }
 
-/* One worker made several epochs in a row, and only the last states were looked at so far. */
+/* One worker made several epochs in a row, and so far only the last states were checked. */
 static void one_epoch_after_the_other_is_taken_back(void **state)
 {
 	(void)state;
@@ -328,7 +334,7 @@ static void one_epoch_after_the_other_is_taken_back(void **state)
 	farm_free(f);
 }
 
-/* Whoever refuses what others can go on from is quarantined after three times. */
+/* A worker that refuses states which others can continue from is quarantined after three times. */
 static void a_liar_is_quarantined(void **state)
 {
 	(void)state;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Leases that workers cannot compute, as transcripts: who pauses, who tries next, when the job fails, and what the job
- * waits for meanwhile.
+ * Leases that workers cannot compute, as transcripts: which worker pauses, which one tries next, when the job fails,
+ * and what the job says it waits for meanwhile.
  */
 #include "tests/support/transcript.h"
 
@@ -47,7 +47,7 @@ static void never_a_success(void **state)
 	});
 }
 
-/* One worker that is out of order, however many leases it has, fails no job that others could make. */
+/* One broken worker, however many leases it holds, fails no job that others could compute. */
 static void out_of_order(void **state)
 {
 	(void)state;
@@ -72,7 +72,8 @@ static void out_of_order(void **state)
 	});
 }
 
-/* On all that there are, and three times; on three at once. */
+/* Leases fail on two workers, which are all: the job fails once a third worker fails, or when one of the two fails
+ * again after the pauses. */
 static void out_of_order_all(void **state)
 {
 	(void)state;
@@ -100,7 +101,7 @@ static void out_of_order_all(void **state)
 	});
 }
 
-/* What is made is not lost to one worker, however often it fails and calls again: the job waits, and says for what. */
+/* Finished work is not lost to one worker, however often it fails and reconnects: the job waits, and says what for. */
 static void one_bad_worker(void **state)
 {
 	(void)state;
@@ -112,7 +113,7 @@ static void one_bad_worker(void **state)
 				   "[2] w1 fails j1 g0 p0 e0 sorry -> -",
 				   "[3] w1 wants 1 -> -",
 				   "[3] w1 leaves -> -",
-				   /* its pause is its own, not its connection's */
+				   /* the pause belongs to the worker, not to its connection */
 				   "[3] w3 joins A threads=1 name=a home=a start=1 -> -",
 				   "[3] w3 wants 1 -> w3 gets j1 g0 p0 e0",
 				   "[4] w3 fails j1 g0 p0 e0 sorry -> -",
@@ -146,7 +147,7 @@ static void one_bad_worker(void **state)
 	farm_free(f);
 }
 
-/* Three machines with full disks end no job that a fourth can compute, whatever comes first. */
+/* Three machines with full disks do not fail a job that a fourth can compute, in whatever order they come. */
 static void three_full_disks(void **state)
 {
 	(void)state;
@@ -162,8 +163,8 @@ static void three_full_disks(void **state)
 				   "[1] w1 lacks j1 g0 p0 boot disk full -> -",
 				   "[1] w2 lacks j1 g1 p0 boot disk full -> -",
 				   "[1] w3 lacks j1 g2 p0 boot disk full -> -",
-				   /* they pause as others that failed, and it goes on like that for as long as nobody
-				      else comes */
+				   /* they pause like other failed workers, and this repeats for as long as no other
+				    * worker comes */
 				   "[1] wake -> 11",
 				   "[11] tick -> w1 gets j1 g3 p0 boot, w2 gets j1 g4 p0 boot, w3 gets j1 g0 p0 boot",
 				   "[12] w1 lacks j1 g3 p0 boot disk full -> -",
@@ -189,7 +190,8 @@ static void three_full_disks(void **state)
 	farm_free(f);
 }
 
-/* It takes nothing away from what others say of the job: for its end who lacks something is not here. */
+/* A full disk does not cancel what others report about the job: for its failure, a worker that lacks something counts
+ * as absent. */
 static void full_disks_and_a_bad_scene(void **state)
 {
 	(void)state;
@@ -220,7 +222,8 @@ static void full_disks_and_a_bad_scene(void **state)
 	});
 }
 
-/* Names cost nothing, certificates do: where the farm knows three, three names of one are not three workers. */
+/* Names are free, certificates are not: where the farm knows three certificates, three names with one certificate do
+ * not count as three workers. */
 static void made_up_names(void **state)
 {
 	(void)state;
@@ -255,8 +258,9 @@ static void made_up_names(void **state)
 	});
 }
 
-/* Another scene is in its memory: no failure, however often, and no longer pause. Meanwhile it gets what it has leases
- * of, and no third job is tried; once it has none of that, there is room. */
+/* A worker whose memory is taken by another scene postpones the lease: this never counts as a failure, and its pause
+ * does not grow. Meanwhile the worker gets leases of the jobs that it already has leases of, and no third job is tried;
+ * once it has none of those, there is room. */
 static void no_room_now(void **state)
 {
 	(void)state;
@@ -274,11 +278,12 @@ static void no_room_now(void **state)
 				"[12] w1 batch j1 g2 p0 boot -> merge, merged, w1 gets j2 g1 p0 boot",
 				"[12] w1 postpones j2 g1 p0 boot full -> w1 gets j1 g4 p0 boot",
 				"[13] w1 batch j1 g3 p0 boot -> merge, merged",
-				/* the last of them: there is room at once */
+				/* its last lease: there is room at once */
 				"[14] w1 batch j1 g4 p0 boot -> merge, merged, j1 prepare, w1 gets j2 g0 p0 boot, "
 				"w1 gets j2 g1 p0 boot",
 				"[16] w1 batch j2 g0 p0 boot -> merge, merged",
-				/* it makes way itself, or has what is not known here */
+				/* the job that it postpones is one it already holds, or a lease that is not known here
+				 */
 				"[17] w1 postpones j2 g1 p0 boot full -> -",
 				"[26.9] tick -> -",
 				"[27] tick -> w1 gets j2 g1 p0 boot, j3 is bootstrap, w1 gets j3 g0 p0 boot",

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Workers that take what they can get and give nothing: what they hold is little, and others get it soon. */
+/* Workers that take as many leases as they can get and return nothing: they hold few leases, and others soon get
+ * copies. */
 #include "tests/support/transcript.h"
 
 #include <setjmp.h>
@@ -11,7 +12,8 @@
 	"w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot, w1 gets j1 g2 p0 boot, w1 gets j1 g3 p0 boot, " \
 	"w1 gets j1 g4 p0 boot, w1 gets j1 g5 p0 boot, w1 gets j1 g6 p0 boot, w1 gets j1 g7 p0 boot"
 
-/* Two copies after 30 s though nobody knows how long leases take, the next ones 1.5 medians after they were sent. */
+/* The first copy goes out after 30 s though the duration of leases is unknown, the next ones 1.5 medians after the
+ * lease was sent. */
 static void one_hoarder_stalls_nothing(void **state)
 {
 	(void)state;
@@ -43,14 +45,13 @@ static void what_is_held_grows_with_what_is_given(void **state)
 		"[5] w1 batch j1 g0 p0 boot -> merge, merged, w1 gets j1 g8 p0 boot, w1 gets j1 g9 p0 boot, w1 gets j1 g10 p0 boot, "
 		"w1 gets j1 g11 p0 boot, w1 gets j1 g12 p0 boot, w1 gets j1 g13 p0 boot, w1 gets j1 g14 p0 boot, "
 		"w1 gets j1 g15 p0 boot, w1 gets j1 g16 p0 boot",
-		/* it comes again under its name, and has not lost it */
 		"[6] w1 leaves -> -",
 		NULL,
 	});
 }
 
-/* Both copies are held by such: the older one is given up after two minutes, not after ten, and only for who has
- * nothing to do. */
+/* Both copies are held by such workers: the older copy is given up after two minutes instead of ten, and only for a
+ * worker that has nothing to do. */
 static void two_hoarders_stall_it_for_minutes(void **state)
 {
 	(void)state;
@@ -80,7 +81,7 @@ static void two_hoarders_stall_it_for_minutes(void **state)
 	});
 }
 
-/* Long leases of honest workers: where nobody is idle nothing is given up before ten minutes. */
+/* Honest workers with long leases: where no worker is idle, nothing is given up before ten minutes. */
 static void long_leases_are_waited_for(void **state)
 {
 	(void)state;
@@ -107,7 +108,8 @@ static void long_leases_are_waited_for(void **state)
 	});
 }
 
-/* It holds half as many after each that others had to answer, and twice as many again once it gives something. */
+/* A worker's limit is halved after each lease that others had to answer for it, and doubled again once it returns a
+ * result. */
 static void who_is_overtaken_holds_less(void **state)
 {
 	(void)state;

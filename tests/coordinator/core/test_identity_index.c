@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The index against a list that is searched from end to end, and the length of its chains. */
+/* Checks the index against a linear search of the same list, and the length of its chains. */
 #include "coordinator/core/identity_index.h"
 
 #include "common/base/mem.h"
@@ -31,20 +31,20 @@ static struct identity *find(struct both *b, enum identity_key by, uint64_t id, 
 		if (!b->used[i] || (by == IDENTITY_BY_ID ? k->id != id : strcmp(k->certificate, certificate) != 0))
 			continue;
 		if (by == IDENTITY_BY_ID || strcmp(by == IDENTITY_BY_HOME ? k->home : k->name, text) == 0)
-			found = k; /* the last one */
+			found = k; /* the last match */
 	}
 	return found;
 }
 
-/* Few names, so that many entries have the same one, and what is one's certificate and name may be, put together, what
- * is another's. */
+/* Few names, so that many entries share one; and one entry's certificate and name joined may equal those of another,
+ * joined. */
 static void begin(struct both *b, uint32_t i)
 {
 	struct identity *k = &b->all[i];
 	*k = (struct identity){.place = i, .id = ++b->last_id};
 	snprintf(k->certificate, sizeof k->certificate, "%.*s", rand() % 3, "ab");
 	snprintf(k->name, sizeof k->name, "%s%d", rand() % 2 ? "b" : "", rand() % 40);
-	snprintf(k->home, sizeof k->home, "%llu", (unsigned long long)b->last_id); /* homes are never alike */
+	snprintf(k->home, sizeof k->home, "%llu", (unsigned long long)b->last_id); /* no two homes are equal */
 	identity_index_add(&b->index, k);
 	b->used[i] = true;
 }
@@ -65,7 +65,7 @@ static void finds_what_a_search_finds(void **state)
 		} else {
 			begin(b, i);
 		}
-		const struct identity *like = &b->all[rand() % ENTRIES]; /* there, gone, or never there */
+		const struct identity *like = &b->all[rand() % ENTRIES]; /* present, removed, or never added */
 		if (!like->id)
 			continue;
 		assert_ptr_equal(identity_index_id(&b->index, like->id), find(b, IDENTITY_BY_ID, like->id, NULL, NULL));
@@ -82,7 +82,10 @@ static void finds_what_a_search_finds(void **state)
 static void chains_are_short(void **state)
 {
 	(void)state;
-	enum { MANY = 16384, LONGEST = 12 }; /* of as many at random more than 10 in 1e5 runs */
+	enum {
+		MANY = 16384,
+		LONGEST = 12
+	}; /* with as many random entries, a chain is longer than 10 in 1 of 1e5 runs */
 	struct identity_index x;
 	struct identity *all = mem_alloc(MANY, sizeof *all);
 	assert_non_null(all);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Workers that go while they hold leases: which of that is held against a job and its owner, as transcripts. */
+/* Workers that disconnect while they hold leases, as transcripts: which of these losses count against a job and its
+ * owner. */
 #include "tests/support/transcript.h"
 
 #include <setjmp.h>
@@ -22,7 +23,7 @@ static void play_line(struct farm *f, const char *line)
 	transcript_play(f, (const char *const[]){line, NULL});
 }
 
-/* Leases that end with their worker's connection are counted, once, whoever ended it. */
+/* A lease that ends with its worker's connection is counted once, whichever side closed the connection. */
 static void lost_leases_are_counted(void **state)
 {
 	(void)state;
@@ -46,10 +47,9 @@ static void lost_leases_are_counted(void **state)
 	farm_free(f);
 }
 
-/* The process that renders ends, the worker connects again after a restart and says which lease it was: a failure, as
- * if it had held the lease still, once. Three workers, and the job is over; its owner's next job gets one lease at a
- * time.
- */
+/* The render process dies, and the worker reconnects after a restart and reports the lease that it held: this counts
+ * once as a failure, as if the worker still held the lease. The job fails after three workers, and its owner's next job
+ * gets one lease at a time. */
 static void told_after_a_restart(void **state)
 {
 	(void)state;
@@ -66,7 +66,7 @@ static void told_after_a_restart(void **state)
 			"[2] w4 joins A threads=1 name=d home=a start=2 -> -",
 			"[2] w4 fails j1 g0 p0 boot SIGSEGV -> -",
 			"[2] w4 fails j1 g0 p0 boot SIGSEGV -> -", /* reported once */
-			"[2] w4 wants 1 -> -",			   /* and pauses */
+			"[2] w4 wants 1 -> -",			   /* and the worker pauses */
 			"[2] w2 wants 1 -> w2 gets j1 g0 p0 boot",
 			/* the restarted worker connects before the old connection is known to be cut */
 			"[3] w5 joins A threads=1 home=b start=2 -> close w2",
@@ -78,7 +78,7 @@ static void told_after_a_restart(void **state)
 			"[3] submit groups=2 parts=2 owner=ann -> j2 submitted, j2 is queued, j2 is bootstrap, w4 gets j2 g0 p0 boot",
 			"[3] w6 wants 1 -> -",
 			"[3] w5 wants 1 -> -",
-			/* whose jobs ended nobody has all */
+			/* ann, whose job failed, does not get all workers: the others go to bob */
 			"[3] submit groups=2 parts=1 owner=bob -> j3 submitted, j3 is queued, j3 is bootstrap, "
 			"w6 gets j3 g0 p0 boot, w5 gets j3 g1 p0 boot",
 			"[4] w5 batch j3 g1 p0 boot -> merge, merged",
@@ -87,12 +87,12 @@ static void told_after_a_restart(void **state)
 	struct job_status s;
 	assert_int_equal(state_of(f, 2, 4, &s), JOB_BOOTSTRAP);
 	assert_int_equal(s.leases, 1);
-	/* something is made of it: it is as good as any */
+	/* a result was merged: the job is as good as any other */
 	play_line(f, "[5] w4 batch j2 g0 p0 boot -> merge, merged, w5 gets j2 g0 p1 boot, w4 gets j2 g1 p0 boot");
 	farm_free(f);
 }
 
-/* The limit ends by itself, and says why while it lasts. */
+/* The limit on an owner expires, and the status gives the reason while it lasts. */
 static void limit_ends(void **state)
 {
 	(void)state;
@@ -131,8 +131,8 @@ static void limit_ends(void **state)
 	farm_free(f);
 }
 
-/* Workers vanish without a reason and do not return: eight in a row on one lease, with nothing merged in between, fail
- * the job. */
+/* Workers vanish without a reason and do not return: the job fails after eight in a row on one lease, with nothing
+ * merged in between. */
 static void never_heard_again(void **state)
 {
 	(void)state;
@@ -154,8 +154,8 @@ static void never_heard_again(void **state)
 	farm_free(f);
 }
 
-/* The same worker over and over is one, and has come back each time: killed and started again, cut off and connected
- * again. */
+/* One worker that vanishes again and again counts once, and comes back each time: killed and restarted, or cut off and
+ * reconnected. */
 static void back_again(void **state)
 {
 	(void)state;
@@ -177,8 +177,8 @@ static void back_again(void **state)
 	farm_free(f);
 }
 
-/* Racks of four workers lose their power again and again in the middle of all leases; they come back, or others do.
- * What is merged in between begins the count anew. */
+/* Racks of four workers lose power again and again in the middle of all leases; then they, or others, connect. Each
+ * merged result restarts the count. */
 static void racks_that_lose_power_fail_no_job(void **state)
 {
 	(void)state;
@@ -198,7 +198,7 @@ static void racks_that_lose_power_fail_no_job(void **state)
 				  &(struct event){
 					  .kind = EVENT_REQUEST, .time = rack, .peer = (uint64_t)(peer + i), .want = 1},
 				  &u);
-		if (rack % 7 == 6) /* something of each is made */
+		if (rack % 7 == 6) /* one result of each lease is merged */
 			for (uint32_t g = 0; g < 4; g++)
 				for (uint64_t i = 1; i <= 4; i++) {
 					struct lease_status l;

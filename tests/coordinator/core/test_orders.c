@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What people do to existing jobs, as transcripts: hold and release, change the priority, extend while the job runs,
+ * Orders to existing jobs, as transcripts: hold and release, change of priority, and extension while the job runs,
  * while it ends and after it has ended. Leases that are out when the order arrives still count, time on hold does not,
- * and damaged files are nobody's fault.
+ * and failures caused by damaged files count against nobody.
  */
 #include "tests/support/transcript.h"
 
@@ -19,7 +19,7 @@ static struct job_status status_of(const struct farm *f, uint64_t job, double no
 	return s;
 }
 
-/* No more leases go out, those that are out count; the other job has the workers. */
+/* No more leases go out, and those that are out count; the other job gets the workers. */
 static void hold_and_release(void **state)
 {
 	(void)state;
@@ -29,7 +29,7 @@ static void hold_and_release(void **state)
 				   "[0] w1 joins A threads=2 -> -",
 				   "[0] w1 wants 2 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot",
 				   "[1] hold order j1 held by ann -> -",
-				   "[1] hold order j1 held by bob -> -", /* whoever came last */
+				   "[1] hold order j1 held by bob -> -", /* the last one to give the order */
 				   "[2] w1 batch j1 g0 p0 boot -> merge, merged",
 				   NULL,
 			   });
@@ -52,8 +52,8 @@ static void hold_and_release(void **state)
 	farm_free(f);
 }
 
-/* Leases from before the files were right again fail without them, whenever the failure is reported; later ones count.
- */
+/* Leases that were sent before the files were repaired do not count when they fail, whenever the failure is reported;
+ * later ones do. */
 static void damaged_files_are_nobodys_fault(void **state)
 {
 	(void)state;
@@ -111,7 +111,7 @@ static void two_reasons(void **state)
 	farm_free(f);
 }
 
-/* A bound in seconds does not run out while nobody may work: 3 s of 8 before the hold, 90 of it, and then five more. */
+/* A time limit does not run down while the job is on hold: 3 s of 8 before the hold, 90 s on hold, then five more. */
 static void the_clock_stands_still(void **state)
 {
 	(void)state;
@@ -153,14 +153,14 @@ static void a_priority_moves_a_job_ahead(void **state)
 			"[0] submit groups=4 -> j3 submitted, j3 is queued",
 			"[0] w1 joins A threads=1 -> -",
 			"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
-			"[1] priority j3 1 -> -", /* the lease that is out stays */
+			"[1] priority j3 1 -> -", /* the lease that is out stays with its worker */
 			"[1] w1 batch j1 g0 p0 boot -> merge, merged, j3 is bootstrap, w1 gets j3 g0 p0 boot",
 			"[2] priority j2 1 -> -",
-			/* The older one. */
+			/* The older job comes first. */
 			"[2] w1 batch j3 g0 p0 boot -> merge, merged, j2 is bootstrap, w1 gets j2 g0 p0 boot",
 			"[3] priority j2 -100 -> -",
 			"[3] priority j3 0 -> -",
-			/* As if it had never been. */
+			/* The order of leases is as if the priority had never changed. */
 			"[3] w1 batch j2 g0 p0 boot -> merge, merged, w1 gets j1 g1 p0 boot",
 			"[4] priority j3 100 -> -",
 			"[4] w1 batch j1 g1 p0 boot -> merge, merged, w1 gets j3 g1 p0 boot",
@@ -176,7 +176,7 @@ static void a_priority_moves_a_job_ahead(void **state)
 	farm_free(f);
 }
 
-/* While it runs: rounds that were the last ones no longer are, and who waited for them has work. */
+/* While the job runs: its last rounds are no longer the last, and workers that waited for them get leases. */
 static void extend_while_it_runs(void **state)
 {
 	(void)state;
@@ -198,7 +198,7 @@ static void extend_while_it_runs(void **state)
 			NULL,
 		});
 	farm_free(f);
-	/* in the bootstrap, too */
+	/* during the bootstrap */
 	transcript((const char *const[]){
 		"[0] restore j1 boot 1,0 rounds=1 -> -",
 		"[0] w1 joins A threads=1 -> -",
@@ -212,7 +212,7 @@ static void extend_while_it_runs(void **state)
 	});
 }
 
-/* The error is estimated once more because a bound is met, and then it is not. */
+/* The error is estimated once more because a bound is met; after the extension the bound is no longer met. */
 static void extend_while_it_ends(void **state)
 {
 	(void)state;
@@ -224,12 +224,12 @@ static void extend_while_it_ends(void **state)
 		"[2] error j1 2 0.07 -> -",
 		"[3] w1 batch j1 g0 p0 e2 -> merge, merged, w1 gets j1 g1 p0 e2",
 		"[4] w1 batch j1 g1 p0 e2 -> merge, merged, j1 round 3, j1 evaluate 3",
-		/* another target alone: the rounds are over all the same */
+		/* another target alone: the rounds are done all the same */
 		"[5] extend j1 rounds=3 target=0.01 -> -",
 		"[6] error j1 3 0.05 -> j1 publish 3, j1 is done (mutations)",
 		NULL,
 	});
-	/* after nine rounds one long job would not have looked at all */
+	/* a single long job would not have estimated its error after nine rounds */
 	transcript((const char *const[]){
 		"[0] restore j1 render 9,9 elapsed=1 completed=1 rounds=9 target=0.1 -> j1 is running, j1 evaluate 9",
 		"[1] extend j1 rounds=12 target=0.1 -> -",
@@ -247,7 +247,7 @@ static void extend_while_it_ends(void **state)
 	});
 }
 
-/* A job that has ended is continued under its id; whoever stored its counters passes them in. */
+/* A job that has ended is continued under its id; the caller that stored its counters passes them in. */
 static void extend_when_it_has_ended(void **state)
 {
 	(void)state;
@@ -266,7 +266,7 @@ static void extend_when_it_has_ended(void **state)
 			"[3] w1 batch j1 g0 p0 e0 -> merge, merged, w1 gets j1 g1 p0 e0",
 			"[4] w1 batch j1 g1 p0 e0 -> merge, merged, j1 round 1, j1 publish 1, j1 is done (mutations)",
 			"[9] restore j1 render 1,1 fingerprint=A elapsed=4 completed=4 rounds=2 -> j1 is running, w1 gets j1 g0 p0 e1",
-			"[9] submit -> j3 submitted, j3 is queued", /* ids go on */
+			"[9] submit -> j3 submitted, j3 is queued", /* ids continue */
 			"[9] w1 batch j1 g1 p0 e0 -> repeat: merged already",
 			NULL,
 		});
@@ -276,7 +276,8 @@ static void extend_when_it_has_ended(void **state)
 	transcript_play(
 		f,
 		(const char *const[]){
-			"[10] w1 batch j1 g0 p0 e1 -> merge, merged, w1 gets j1 g1 p0 e1", /* the older one */
+			"[10] w1 batch j1 g0 p0 e1 -> merge, merged, w1 gets j1 g1 p0 e1", /* the older job comes first
+											    */
 			"[11] w1 batch j1 g1 p0 e1 -> merge, merged, j1 round 2, j1 publish 2, j1 is done (mutations), "
 			"j3 is bootstrap, w1 gets j3 g0 p0 boot",
 			NULL,

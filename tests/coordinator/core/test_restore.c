@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Jobs restored after a restart of the coordinator, as transcripts: in the bootstrap, in the middle of a round, with
- * stored results, at a bound that was met already, on hold, and more of them than may run at once. What was merged
- * before is a repeat, what was leased before is accepted when it arrives.
+ * stored results, at a bound that was already met, on hold, and more jobs than may run at once. A result that was
+ * merged before the restart is a repeat; a lease from before the restart is accepted when its result arrives.
  */
 #include "coordinator/core/doubt.h"
 #include "tests/support/transcript.h"
@@ -20,7 +20,7 @@ static void in_the_bootstrap(void **state)
 	transcript((const char *const[]){
 		"[0] restore j4 boot 1,0 fingerprint=A elapsed=3 -> -",
 		"[0] w1 joins B threads=1 -> -",
-		"[0] w1 wants 1 -> -", /* it belongs to A */
+		"[0] w1 wants 1 -> -", /* the job is pinned to fingerprint A */
 		"[0] w2 joins A threads=1 -> -",
 		"[0] w2 wants 1 -> w2 gets j4 g1 p0 boot",
 		"[1] w2 batch j4 g0 p0 boot -> repeat: merged already",
@@ -30,8 +30,8 @@ static void in_the_bootstrap(void **state)
 	});
 }
 
-/* Two rounds are open, as they were: what is merged is a repeat, what was out counts when it comes, asked for or not.
- */
+/* Two rounds are open as before: merged results are repeats, and results of leases that were out count when they
+ * arrive, whether the lease was handed out again or not. */
 static void in_a_round(void **state)
 {
 	(void)state;
@@ -47,7 +47,7 @@ static void in_a_round(void **state)
 			   "[1] w1 batch j7 g0 p0 e5 -> refused: the epoch is not open",
 			   "[2] w1 batch j7 g1 p0 e3 -> merge, merged, j7 round 4, w1 gets j7 g1 p0 e4",
 			   "[3] w1 batch j7 g1 p0 e4 -> merge, merged, j7 round 5, w1 gets j7 g2 p0 e5",
-			   /* ids go on */
+			   /* ids continue */
 			   "[3] submit -> j8 submitted, j8 is queued",
 			   NULL,
 		   });
@@ -60,7 +60,7 @@ static void in_a_round(void **state)
 	farm_free(f);
 }
 
-/* A stored result from before the restart that waits for an earlier epoch: it counts once that is merged; only the
+/* A result stored before the restart waits for an earlier epoch: it counts once that epoch is merged, and only the
  * worker that holds its lease is told. */
 static void stored_results(void **state)
 {
@@ -70,7 +70,7 @@ static void stored_results(void **state)
 		"[0] w1 joins A threads=2 -> -",
 		"[0] w1 stored j7 g0 p0 e1 -> -",
 		"[0] w1 stored j7 g1 p0 e0 -> -",
-		"[0] w1 stored j7 g1 p0 e2 -> -", /* not yet, merged, not open */
+		"[0] w1 stored j7 g1 p0 e2 -> -", /* too early, already merged, or not open */
 		"[0] w1 wants 2 -> w1 gets j7 g0 p0 e0, w1 gets j7 g2 p0 e0",
 		"[1] w1 batch j7 g0 p0 e0 -> merge, merged, w1 gets j7 g1 p0 e1",
 		"[1] w1 stored j7 g0 p0 e1 -> merge",
@@ -100,8 +100,8 @@ static void before_anything(void **state)
 	farm_free(f);
 }
 
-/* Bounds that the last complete round had met are met after the restart: the number of rounds, the error, and the time
- * at that round, not what was used since. */
+/* Bounds that were met at the last complete round are still met after the restart: the number of rounds, the error, and
+ * the time as of that round rather than the time used since. */
 static void bounds_that_were_met_stay_met(void **state)
 {
 	(void)state;
@@ -164,7 +164,7 @@ static void a_job_on_hold_gets_no_leases(void **state)
 	farm_free(f);
 }
 
-/* All of them live, and no new one before there are fewer. */
+/* All jobs from before the restart run, and no new job starts before their number is below the limit. */
 static void more_than_are_taken(void **state)
 {
 	(void)state;
@@ -206,8 +206,8 @@ static void more_than_are_taken(void **state)
 	farm_free(f);
 }
 
-/* A job that is extended brings back what its makers reported then: what is known of those that are connected stays,
- * and of the others the latest counts. */
+/* An extended job brings back what its workers had reported: for connected workers the present report stays, for others
+ * the latest report counts. */
 static void makers_reports_are_restored(void **state)
 {
 	(void)state;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The rules for one lease, as transcripts: what is merged, what counts as a repeat, what is refused, and when a lease
- * is handed out again, because its worker left, fell silent, returned it, or is much slower than others. Also limits on
- * what a worker may ask for and on names.
+ * The rules for one lease, as transcripts: which results are merged, count as repeats or are refused, and when a lease
+ * is handed out again because its worker left, fell silent, returned it, or is much slower than others. Also limits on
+ * names and on what a worker may ask for.
  */
 #include "tests/support/transcript.h"
 
@@ -57,7 +57,7 @@ static void a_lease_counts_once(void **state)
 		"[2] w1 batch j1 g0 p0 e0 -> merge, merged, w1 gets j1 g0 p0 e1",
 		"[2] w1 batch j1 g0 p0 e0 -> repeat: merged already",
 		"[2] w2 batch j1 g0 p0 e0 -> repeat: merged already",
-		/* whoever holds the lease: the first valid answer is the one */
+		/* the first valid result counts, whichever worker holds the lease */
 		"[2] w2 batch j1 g0 p0 e1 -> merge, merged, w1 loses j1 g0 p0 e1",
 		"[2] w1 batch j1 g0 p0 e1 -> repeat: merged already",
 		NULL,
@@ -91,10 +91,10 @@ static void quarantined_after_faults(void **state)
 			"[3] w1 batch j1 g7 p0 e0 -> refused: not a lease of this job",
 			"[4] w1 batch j1 g0 p0 e0 bad torn -> refused: torn, #1 quarantined",
 			"[5] w1 wants 1 -> -",
-			/* its last lease is somebody else's now */
+			/* its last lease now belongs to another worker */
 			"[5] w2 batch j1 g1 p0 e0 -> merge, merged, w2 gets j1 g0 p0 e0",
 			"[6] w2 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w2 gets j1 g1 p0 e1",
-			/* silence and a word do not wash it clean */
+			/* silence followed by one heartbeat does not clear the worker's record */
 			"[33] w2 heartbeat -> -",
 			"[36] tick -> -",
 			"[40] w1 wants 1 -> -",
@@ -119,7 +119,7 @@ static void worker_gone(void **state)
 		"[2] w3 joins A threads=1 -> -",
 		"[2] w3 wants 1 -> -",
 		"[2.4] w1 leaves -> w3 gets j1 g0 p0 e0",
-		/* silent: taken back, but what it made is still good */
+		/* the worker was silent: its lease is taken back, but its result is still valid */
 		"[20] w3 heartbeat -> -",
 		"[31] tick -> -",
 		"[31] w3 wants 2 -> w3 gets j1 g1 p0 e0",
@@ -128,7 +128,7 @@ static void worker_gone(void **state)
 	});
 }
 
-/* Who reads late what was said in time misses nobody for it: not for being silent, not for a lease that is overdue. */
+/* If the coordinator reads late what workers sent in time, no worker is taken for silent and no lease for overdue. */
 static void read_late(void **state)
 {
 	(void)state;
@@ -138,7 +138,8 @@ static void read_late(void **state)
 		"[700] unread=690 tick -> -",
 		"[700] unread=690 w2 heartbeat -> -",
 		"[702] unread=692 w1 batch j1 g0 p0 e0 -> merge, merged, w1 gets j1 g0 p0 e1",
-		/* now all has been read: the third has said nothing, and the second's lease is overdue */
+		/* now all input has been read: the third worker has sent nothing, and the second one's lease is overdue
+		 */
 		"[703] tick -> close w3, w2 gets j1 g1 p0 e0",
 		NULL,
 	});
@@ -168,7 +169,7 @@ static void an_overdue_lease_is_given_again(void **state)
 		"[0] w1 wants 3 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot, w1 gets j1 g2 p0 boot",
 		"[1] w1 batch j1 g0 p0 boot -> merge, merged",
 		"[1] w1 batch j1 g1 p0 boot -> merge, merged",
-		/* nothing was known of durations when it was sent: 600 s */
+		/* durations of leases were unknown when this one was sent: its timeout is 600 s */
 		"[599] w1 heartbeat -> -",
 		"[600] tick -> w1 gets j1 g2 p0 boot",
 		"[601] w1 batch j1 g2 p0 boot -> merge, merged, j1 prepare",
@@ -190,7 +191,7 @@ static void timeout_after_median(void **state)
 		"[2] w1 batch j1 g1 p0 boot -> merge, merged, w1 gets j1 g2 p0 boot",
 		"[30] w1 heartbeat -> -",
 		"[59] w1 heartbeat -> -",
-		/* ten medians are 10 s, so the least of 60 s; the second time 120 s */
+		/* ten medians are 10 s, so the minimum of 60 s holds; the second timeout is 120 s */
 		"[62] tick -> w1 gets j1 g2 p0 boot",
 		"[62] wake -> 89",
 		"[85] w1 heartbeat -> -",
@@ -217,7 +218,7 @@ static void a_late_lease_gets_a_second_worker(void **state)
 			"[1] w3 wants 1 -> -",
 			"[3] w2 batch j1 g1 p0 e0 -> merge, merged, w3 gets j1 g1 p0 e1",
 			"[3] w3 batch j1 g1 p0 e1 -> merge, merged",
-			/* the median is 2 s: after 3 s a second worker, never a third */
+			/* the median is 2 s: after 3 s a second worker gets a copy, and never a third */
 			"[3.9] tick -> -",
 			"[3.9] wake -> 4",
 			"[4] tick -> w2 gets j1 g0 p0 e0",
@@ -260,7 +261,7 @@ static void an_overtaken_worker_gets_half_as_many_leases(void **state)
 	farm_free(f);
 	f = transcript_farm();
 	transcript_play(f, before);
-	/* the first comes first all the same: nobody was late */
+	/* the first result counts all the same: no worker was late */
 	transcript_play(f,
 			(const char *const[]){
 				"[31] w1 batch j1 g0 p0 e0 -> merge, merged, w2 loses j1 g0 p0 e0, w1 gets j1 g0 p0 e1",
@@ -284,7 +285,7 @@ static void returned_lease(void **state)
 static void bounded_wish(void **state)
 {
 	(void)state;
-	/* leases are bounded by what the worker wants, and by its threads */
+	/* the number of leases is limited by the worker's request, and by its threads */
 	transcript((const char *const[]){
 		"[0] submit groups=8 parts=4 -> j1 submitted, j1 is queued",
 		"[0] w1 joins A threads=1 -> -",
@@ -304,7 +305,8 @@ static bool is_joined(struct farm *f, uint64_t id, const char *name)
 	return u.count == 0;
 }
 
-/* A name is kept as it is, whatever letters end where; who has none or a longer one than hello allows is no worker. */
+/* A name is kept byte by byte, even if it ends within a letter; a worker without a name, or with one longer than hello
+ * allows, is refused. */
 static void long_names(void **state)
 {
 	(void)state;

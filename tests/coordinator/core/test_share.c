@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What a priority means in machines, as the status says it. */
+/* What the status says about a priority: the number of machines that the job would get. */
 #include "tests/support/transcript.h"
 
 #include <math.h>
@@ -29,7 +29,7 @@ static void play_line(struct farm *f, const char *line)
 	transcript_play(f, (const char *const[]){line, NULL});
 }
 
-/* Eight machines that take two leases each, whose wishes come once the jobs are there. */
+/* Eight machines that take two leases each, and ask for work only once the jobs are there. */
 static struct farm *eight(void)
 {
 	struct farm *f = transcript_farm();
@@ -51,7 +51,7 @@ static void by_priority_and_owner(void **state)
 	play_line(f, "[0] restore j1 boot 1,1,1,1,1,1,1,1,1,1,1,1,0,0,0,0 fingerprint=A groups=16 owner=ann -> "
 		     "j1 is bootstrap, w1 gets j1 g12 p0 boot, "
 		     "w2 gets j1 g13 p0 boot, w3 gets j1 g14 p0 boot, w4 gets j1 g15 p0 boot");
-	has_share(f, 1, 2); /* it has a use for four leases */
+	has_share(f, 1, 2); /* the job can use only four leases */
 	assert_int_equal(status_of(f, 1).workers, 4);
 	assert_string_equal(status_of(f, 1).place, "4 of 8 machines");
 	play_line(
@@ -61,7 +61,7 @@ static void by_priority_and_owner(void **state)
 	assert_string_equal(status_of(f, 1).place, "");
 	farm_free(f);
 
-	/* nobody asks for work yet: what they would have stays the same */
+	/* no worker asks for work yet: the shares that the jobs would get are the same */
 	f = transcript_farm();
 	for (int i = 1; i <= 8; i++) {
 		char line[64];
@@ -78,7 +78,7 @@ static void by_priority_and_owner(void **state)
 	assert_string_equal(status_of(f, 2).place, "0 of 8 machines");
 	play_line(f, "[0] submit groups=16 owner=bob -> j3 submitted, j3 is queued");
 	play_line(f, "[0] submit groups=1 owner=bob -> j4 submitted, j4 is queued");
-	has_share(f, 1, 2.5); /* half of five is ann's; bob's other job leaves him the rest */
+	has_share(f, 1, 2.5); /* half of five is ann's; bob's other job leaves the remainder to this one */
 	has_share(f, 3, 1.5);
 	has_share(f, 4, 1);
 	assert_string_equal(status_of(f, 3).place, "0 of 8 machines; j2 comes first; by turns with j1 and j4");
@@ -93,14 +93,14 @@ static void by_priority_and_owner(void **state)
 	has_share(f, 1, 4);
 	has_share(f, 3, 3);
 	play_line(f, "[0] hold order j3 held by bob -> -");
-	has_share(f, 1, 7); /* bob has a use for one */
+	has_share(f, 1, 7); /* bob can use only one */
 	play_line(f, "[0] priority j5 1 -> -");
 	has_share(f, 5, 8);
 	has_share(f, 1, 0);
 	farm_free(f);
 }
 
-/* Machines of another kind are nobody's who cannot use them. */
+/* Machines of another fingerprint count for no job that cannot use them. */
 static void by_fingerprint(void **state)
 {
 	(void)state;
@@ -119,7 +119,7 @@ static void by_fingerprint(void **state)
 	transcript_play(f, (const char *const[]){
 				   "[30] tick -> -",
 				   NULL,
-			   }); /* all are silent */
+			   }); /* all workers are silent */
 	has_share(f, 1, 0);
 	assert_string_equal(status_of(f, 2).place, "0 of 0 machines");
 	farm_free(f);
@@ -137,7 +137,7 @@ static void who_comes_first(void **state)
 				   NULL,
 			   });
 	assert_string_equal(status_of(f, 1).waiting, "waits for j2 of higher priority (7)");
-	assert_string_equal(status_of(f, 1).owners_waiting, status_of(f, 1).waiting); /* both are his own */
+	assert_string_equal(status_of(f, 1).owners_waiting, status_of(f, 1).waiting); /* j2 has the same owner */
 	assert_int_equal(status_of(f, 2).workers, 1);				      /* one machine, two leases */
 	assert_string_equal(status_of(f, 2).place, "1 of 1 machine");
 	play_line(f, "[0] submit groups=4 owner=ann -> j3 submitted, j3 is queued");

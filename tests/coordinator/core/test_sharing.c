@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * How several jobs share several workers, as transcripts: higher priorities first, then equal shares by owner and by
- * job; numeric fingerprints, which pin a job to one kind of worker; limits on jobs, workers and memory; and the reason
- * that the status gives for a job that waits.
+ * How several jobs share several workers, as transcripts: higher priorities come first, then equal shares by owner and
+ * by job; numeric fingerprints pin a job to one kind of worker; jobs, workers and memory are limited; and the status
+ * gives the reason why a job waits.
  */
 #include "tests/support/failing_memory.h"
 #include "tests/support/transcript.h"
@@ -55,7 +55,7 @@ static void higher_priorities_are_served_first(void **state)
 	farm_free(f);
 }
 
-/* Owner and leases decide among jobs of one priority only. */
+/* Equal shares by owner and by number of leases apply only among jobs of one priority. */
 static void priority_before_shares(void **state)
 {
 	(void)state;
@@ -70,8 +70,8 @@ static void priority_before_shares(void **state)
 	});
 }
 
-/* If workers of two fingerprints could begin a job, the one that has waited longest does, whichever fingerprint was
- * seen first. */
+/* If workers of two fingerprints could begin a job, the one that has waited longest begins it, whichever fingerprint
+ * connected first. */
 static void first_to_wait(void **state)
 {
 	(void)state;
@@ -108,7 +108,8 @@ static void fair_sharing(void **state)
 	});
 }
 
-/* A result that waits to be looked at keeps no worker waiting, as far as its table goes; the lease stays its own. */
+/* A delivered result that waits to be checked does not count against the number of leases that its worker may hold, as
+ * long as the worker's table has room; the lease stays the worker's. */
 static void delivered_is_not_held(void **state)
 {
 	(void)state;
@@ -125,7 +126,7 @@ static void delivered_is_not_held(void **state)
 		"[4] w1 delivers j1 g1 p0 boot -> w1 gets j1 g3 p0 boot",
 		"[4] w1 delivers j1 g3 p0 boot -> w1 gets j1 g4 p0 boot",
 		"[4] w1 delivers j1 g4 p0 boot -> w1 gets j1 g5 p0 boot",
-		"[4] w1 delivers j1 g5 p0 boot -> -", /* four places, all taken */
+		"[4] w1 delivers j1 g5 p0 boot -> -", /* all four entries of the table are taken */
 		"[5] w1 batch j1 g3 p0 boot -> merge, merged, w1 gets j1 g6 p0 boot",
 		"[6] w1 leaves -> -",
 		"[7] w2 batch j1 g2 p0 boot -> merge, merged, w2 gets j1 g7 p0 boot",
@@ -133,7 +134,7 @@ static void delivered_is_not_held(void **state)
 	});
 }
 
-/* By owner first: of nine leases bob's one job has half, ann's two share the other. */
+/* Shares go by owner first: of nine leases bob's one job gets half, and ann's two jobs share the other half. */
 static void owners_share_first(void **state)
 {
 	(void)state;
@@ -147,11 +148,12 @@ static void owners_share_first(void **state)
 			"[0] w1 joins A threads=9 -> -",
 			"[0] w1 wants 9 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, j3 is bootstrap, w1 gets j3 g0 p0 boot, "
 			"j2 is bootstrap, w1 gets j2 g0 p0 boot, w1 gets j3 g1 p0 boot, w1 gets j1 g1 p0 boot, w1 gets j3 g2 p0 boot, "
-			"w1 gets j2 g1 p0 boot, w1 gets j3 g3 p0 boot", /* more when it has given something */
-			/* whoever has fewest, not whose was done */
+			"w1 gets j2 g1 p0 boot, w1 gets j3 g3 p0 boot", /* more leases once the worker has returned a
+									 * result */
+			/* the lease goes to the job with the fewest leases, not to the one whose result came */
 			"[1] w1 batch j3 g0 p0 boot -> merge, merged, w1 gets j3 g4 p0 boot, w1 gets j1 g2 p0 boot",
 			"[1] w1 batch j2 g0 p0 boot -> merge, merged, w1 gets j2 g2 p0 boot",
-			/* what an owner has of another priority counts, too: one lease is bob's j4 */
+			/* an owner's leases of another priority count too: one lease is bob's j4 */
 			"[2] submit groups=1 priority=1 owner=bob -> j4 submitted, j4 is queued",
 			"[2] w1 batch j1 g0 p0 boot -> merge, merged, j4 is bootstrap, w1 gets j4 g0 p0 boot",
 			"[3] w1 batch j1 g1 p0 boot -> merge, merged, w1 gets j1 g3 p0 boot",
@@ -164,8 +166,8 @@ static void owners_share_first(void **state)
 	farm_free(f);
 }
 
-/* An owner without a name is one as any other, however many they are; a job from before a restart still has its owner.
- */
+/* Jobs without an owner's name share one owner's part, however many they are; a job restored after a restart keeps its
+ * owner. */
 static void the_nameless_and_the_restored(void **state)
 {
 	(void)state;
@@ -299,7 +301,7 @@ static void limits_of_jobs_and_workers(void **state)
 		});
 	struct job_counts counts;
 	assert_true(!farm_counts(f, 7, &counts) && farm_counts(f, 8, &counts) && farm_counts(f, 9, &counts));
-	/* both ended in the same moment: the one that ends now stays */
+	/* both jobs ended at the same moment: the one that ends now is kept */
 	transcript_play(f,
 			(const char *const[]){
 				"[1] cancel j8 -> j8 cancelled, j8 is cancelled (cancelled: cancelled), j9 forgotten",

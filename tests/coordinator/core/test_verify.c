@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Verified leases, as transcripts: a result counts once two workers returned the same numbers, a third decides where
- * they differ, and a worker that was outvoted too often is quarantined with everything it has noted. Also who counts as
- * the same worker after restarts, reconnections and changes of name.
+ * Verified leases, as transcripts: a result counts once two workers have returned the same numbers, a third worker
+ * decides where they differ, and a worker that was outvoted too often is quarantined and all its unconfirmed results
+ * are dropped. Also which connections count as the same worker after restarts, reconnections and changes of name.
  */
 #include "coordinator/core/worker_registry.h"
 #include "tests/support/transcript.h"
@@ -108,7 +108,7 @@ static void one_worker_twice(void **state)
 				   "[0] submit groups=2 verify=1 -> j1 submitted, j1 is queued",
 				   "[0] w1 joins A threads=1 name=a -> -",
 				   "[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
-				   /* other work goes on, and it does not get the same again */
+				   /* the worker gets other leases, and not this one again */
 				   "[1] w1 batch j1 g0 p0 boot says x -> noted, w1 gets j1 g1 p0 boot",
 				   "[1] w1 batch j1 g0 p0 boot says x -> repeat: the result waits for another worker's",
 				   "[1] w1 batch j1 g1 p0 boot says x -> noted",
@@ -128,7 +128,7 @@ static void one_worker_twice(void **state)
 			"[1] w3 wants 1 -> -",
 			"[1] w3 batch j1 g0 p0 boot says x -> repeat: the result waits for another worker's",
 			"[1] w3 batch j1 g0 p0 boot says y -> refused: the result differs from the same worker's earlier one",
-			/* of another certificate it is another one */
+			/* with another certificate it is another worker */
 			"[1] w4 joins A threads=1 certificate=d name=a -> -",
 			"[1] w4 wants 1 -> w4 gets j1 g0 p0 boot",
 			"[2] w4 batch j1 g0 p0 boot says x -> merge, merged, w4 gets j1 g1 p0 boot",
@@ -147,7 +147,7 @@ static void leaves_between(void **state)
 		"[2] w1 leaves -> -",
 		"[2] w2 leaves -> -",
 		"[3] w3 joins A threads=1 name=a -> -",
-		"[3] w3 wants 1 -> -", /* it is back, and has answered */
+		"[3] w3 wants 1 -> -", /* the worker is connected again, and has already answered */
 		"[4] w4 joins A threads=1 name=c -> -",
 		"[4] w4 wants 1 -> w4 gets j1 g0 p0 e0",
 		"[5] w4 batch j1 g0 p0 e0 says x -> merge, merged, j1 round 1, w3 gets j1 g0 p0 e1, w4 gets j1 g0 p0 e1",
@@ -159,7 +159,7 @@ static void a_restart_computes_unverified_leases_anew(void **state)
 {
 	(void)state;
 	transcript((const char *const[]){
-		/* notes are gone: the lease is computed anew, by two */
+		/* unconfirmed results are lost: two workers compute the lease anew */
 		"[0] restore j1 render 1 fingerprint=A elapsed=5 groups=1 rounds=9 verify=1 -> j1 is running",
 		"[0] w1 joins A threads=1 name=a -> -",
 		"[0] w2 joins A threads=1 name=b -> -",
@@ -171,7 +171,8 @@ static void a_restart_computes_unverified_leases_anew(void **state)
 	});
 }
 
-/* A share: the same leases whoever computes them, about as many as were asked for. */
+/* A share of the leases is verified: the same leases whichever workers compute them, and about as many as were asked
+ * for. */
 static void a_share_of_the_leases_is_verified(void **state)
 {
 	(void)state;
@@ -191,7 +192,7 @@ static void a_share_of_the_leases_is_verified(void **state)
 		k.job = 3;
 		assert_false(farm_verifies(f, &k));
 	}
-	assert_in_range(chosen, 2760, 3240); /* 5.2 sigma of a fair draw each side; the draw is fixed */
+	assert_in_range(chosen, 2760, 3240); /* within 5.2 sigma of a fair draw; the draw is fixed */
 	farm_free(f);
 }
 
@@ -218,12 +219,12 @@ static void outvoted_three_times_is_quarantined(void **state)
 			"[2] w1 batch j1 g0 p0 e0 says x -> noted: the result differs from another worker's, w2 gets j1 g0 p0 e0",
 			"[2] w2 batch j1 g0 p0 e0 says x -> merge, merged, #3 wrong result: j1 render group 0 part 0 epoch 0, j1 round 1, "
 			"w3 gets j1 g0 p0 e1, w1 gets j1 g0 p0 e1",
-			"[3] w3 batch j1 g0 p0 e1 says 1 -> noted, w2 gets j1 g0 p0 e1", /* it straggles at w1 */
+			"[3] w3 batch j1 g0 p0 e1 says 1 -> noted, w2 gets j1 g0 p0 e1", /* its copy at w1 is late */
 			"[3] w1 batch j1 g0 p0 e1 says x -> noted: the result differs from another worker's",
 			"[3] w2 batch j1 g0 p0 e1 says x -> merge, merged, "
 			"#3 wrong result: j1 render group 0 part 0 epoch 1, #3 quarantined, j1 round 2, "
 			"w1 gets j1 g0 p0 e2, w2 gets j1 g0 p0 e2",
-			/* nothing of it counts, here or when it calls again, under whatever name */
+			/* none of its results count, now or when it reconnects, under whatever name */
 			"[4] w3 batch j1 g0 p0 e2 says x -> refused: the worker is quarantined: its results do not count",
 			"[4] w3 leaves -> -",
 			"[4] w5 joins A threads=1 name=d home=c start=5 -> -",
@@ -255,7 +256,7 @@ static void outvoted_three_times_is_quarantined(void **state)
 	farm_free(f);
 }
 
-/* What it noted elsewhere is worth nothing either. */
+/* Its unconfirmed results of other leases do not count either. */
 static void notes_of_a_liar(void **state)
 {
 	(void)state;
@@ -295,16 +296,16 @@ static void one_identity_is_one_worker_at_a_time(void **state)
 		"[0] submit groups=1 -> j1 submitted, j1 is queued",
 		"[0] w1 joins A threads=1 name=a home=a start=7 -> -",
 		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
-		/* started again: what it held before is free at once */
+		/* the worker was restarted: the leases that it held are free at once */
 		"[1] w2 joins A threads=1 name=b home=a start=8 -> close w1",
 		"[1] w2 wants 1 -> w2 gets j1 g0 p0 boot",
 		"[2] w3 joins A threads=1 name=a home=a start=7 -> rejected: this is start 7 of a, and its start 8 has connected before",
-		/* the same start on a new connection */
+		/* the same process on a new connection */
 		"[3] w4 joins A threads=1 name=b home=a start=8 -> close w2",
 		"[3] w4 wants 1 -> w4 gets j1 g0 p0 boot",
 		"[4] w4 leaves -> -",
 		"[4] w5 joins A threads=1 name=a home=a start=7 -> rejected: this is start 7 of a, and its start 8 has connected before",
-		/* one name on two machines, one home of two certificates: nobody is replaced */
+		/* one name on two machines, or one home with two certificates: no connection is replaced */
 		"[5] w6 joins A threads=1 name=a home=b start=1 -> -",
 		"[5] w7 joins A threads=1 name=a home=c start=1 -> -",
 		"[5] w8 joins A threads=1 certificate=d name=a home=c start=1 -> -",
@@ -313,7 +314,7 @@ static void one_identity_is_one_worker_at_a_time(void **state)
 	});
 }
 
-/* A job of which nothing is merged is not lost to the only worker of its kind. */
+/* The only worker of its kind cannot spoil a job of which nothing is merged yet. */
 static void odd_one_out(void **state)
 {
 	(void)state;
@@ -335,7 +336,7 @@ static void odd_one_out(void **state)
 	farm_free(f);
 }
 
-/* Where one answer is there and the other takes long, a third worker is asked. */
+/* If one result is there and the second takes long, a third worker gets the lease. */
 static void a_slow_second_answer_is_asked_of_a_third(void **state)
 {
 	(void)state;
@@ -369,7 +370,8 @@ static void give_faults(struct farm *f, uint64_t peer, const char *certificate, 
 	farm_step(f, &ev, &u);
 }
 
-/* Who gives himself name after name is remembered by the last of them, and pushes out nobody of another certificate. */
+/* A worker that changes its name again and again is remembered by the last names, and displaces no record of another
+ * certificate. */
 static void names_without_end(void **state)
 {
 	(void)state;

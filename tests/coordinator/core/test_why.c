@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Why a job waits is said in each state in which one can wait, and not while somebody works on it. Whose results may
- * come. */
+/* A waiting job gives its reason in each state in which a job can wait, and no reason while a worker computes for it.
+ * Also from which workers results may still arrive. */
 #include "tests/support/transcript.h"
 
 #include <setjmp.h>
@@ -13,8 +13,8 @@
 enum { LINES = 24 };
 
 static const struct {
-	const char *lines[LINES]; /* that lead there */
-	const char *why;	  /* of job 1 then; "": it does not wait */
+	const char *lines[LINES]; /* the events that lead to the state */
+	const char *why;	  /* the reason that job 1 gives then; "": it does not wait */
 } states[] = {
 	{{"[0] submit -> j1 submitted, j1 is queued"}, "no worker is connected"},
 	{{"[0] submit -> j1 submitted, j1 is queued", "[0] w1 joins A threads=1 -> -"}, "no worker asks for work"},
@@ -32,7 +32,8 @@ static const struct {
 	  "[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
 	  "[1] w1 batch j1 g0 p0 boot -> merge, merged, j1 prepare"},
 	 "the bootstrap is being evaluated"},
-	/* all leases are with one who gives nothing: not at once, but before others get copies */
+	/* all leases are held by a worker that returns nothing: the reason is not given at once, but before others get
+	 * copies */
 	{{"[0] submit groups=2 -> j1 submitted, j1 is queued", "[0] w1 joins A threads=64 -> -",
 	  "[0] w1 wants 65 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot", "[20] w1 heartbeat -> -"},
 	 ""},
@@ -52,7 +53,7 @@ static const struct {
 	  "[0] submit groups=1 -> j1 submitted, j1 is queued, j1 is bootstrap, w1 gets j1 g0 p0 boot",
 	  "[1] w1 fails j1 g0 p0 boot sorry -> -"},
 	 "no worker can compute it; worker w1 failed last: sorry"},
-	/* what another worker fails with for the third time does not end the job while one may have room again */
+	/* a third worker fails for another reason: the job does not fail while a worker may have room again */
 	{{"[0] submit groups=5 -> j1 submitted, j1 is queued", "[0] w1 joins A threads=1 -> -",
 	  "[0] w2 joins A threads=1 -> -", "[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
 	  "[1] w1 fails j1 g0 p0 boot sorry -> -", "[11] tick -> w1 gets j1 g1 p0 boot",
@@ -100,7 +101,7 @@ static const struct {
 	 "a third worker will decide whether the chain states of group 0 part 0 epoch 1 are wrong: a made them, b refused them"},
 };
 
-/* It is over once another scene has gone, and the job's last failure is another one. */
+/* The wait is over once the other scene has gone, and then the job shows its last real failure. */
 static void a_lack_of_room_is_no_failure(void **state)
 {
 	(void)state;
@@ -131,7 +132,7 @@ static void every_state(void **state)
 	}
 }
 
-/* Room on the disk is kept for jobs that have leases at workers, or lack nothing else. */
+/* Room on the disk is reserved for jobs that have leases at workers, or that lack nothing else. */
 static void whose_results_may_come(void **state)
 {
 	(void)state;

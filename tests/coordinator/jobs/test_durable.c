@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What the coordinator does while the disk is slow or refuses. A checkpoint waits before its last step, and meanwhile
- * its job is cancelled, or a lease fails. An end that cannot be written is written later. A job ends and is
- * extended while a flush of its journal goes on.
+ * What the coordinator does while the disk is slow or fails. A checkpoint is delayed before its last step while its job
+ * is cancelled, or while a lease fails. A job's end that cannot be written is written later. A job ends and is extended
+ * while its journal is being flushed.
  */
 #include "coordinator/jobs/durable.h"
 
@@ -25,7 +25,7 @@
 
 #include <cmocka.h>
 
-/* refusal: words of the answer; NULL: it is yes. */
+/* refusal: words that the answer contains; NULL: the extension is accepted. */
 static void extend(uint64_t job, uint64_t mutations, const char *refusal)
 {
 	Farm__Control c;
@@ -48,12 +48,12 @@ static void extend(uint64_t job, uint64_t mutations, const char *refusal)
 	assert_int_equal(plan_make(&longer, &staged.plan, &e), 0);
 }
 
-enum { BOOTSTRAP_AND_ROUND = 16 }; /* leases */
+enum { BOOTSTRAP_AND_ROUND = 16 }; /* number of leases */
 
 static unsigned sent, open_count;
-static struct lease_key open_leases[8]; /* not answered yet */
+static struct lease_key open_leases[8]; /* leases not answered yet */
 
-/* Answers leases until it has sent this many results in all, and this many have been acknowledged. */
+/* Answers leases until `results` results were sent in all, and `acks` of them acknowledged. */
 static void work_until(unsigned results, unsigned acks)
 {
 	for (;;) {
@@ -72,7 +72,7 @@ static void work_until(unsigned results, unsigned acks)
 	}
 }
 
-/* The end of the job comes while it is held because of the checkpoint. */
+/* The job is cancelled while it is held because its checkpoint failed. */
 static void cancelled_while_its_checkpoint_fails(void **state)
 {
 	(void)state;
@@ -86,7 +86,8 @@ static void cancelled_while_its_checkpoint_fails(void **state)
 	staged_end(SIGTERM, true);
 }
 
-/* Killed while the films of a cancelled job are still being read: its client was told that it is over. */
+/* The coordinator is killed while the films of a cancelled job are still being read, after its client was told that the
+ * job is over. */
 static void cancelled_and_killed(void **state)
 {
 	(void)state;
@@ -102,7 +103,7 @@ static void cancelled_and_killed(void **state)
 	staged_end(SIGTERM, true);
 }
 
-/* The failures that the job's record knows when the coordinator had its ticks after the failure, and after the
+/* Returns the failures in the job's record, when the coordinator had time for ticks after the failure and after the
  * checkpoint. */
 static uint64_t failures_after(useconds_t ticks_us)
 {
@@ -131,7 +132,7 @@ static uint64_t failures_after(useconds_t ticks_us)
 	return r.counts.failures;
 }
 
-/* On a machine that is busy enough no tick came: once more, with more time. */
+/* If the machine was so busy that no tick came, the test runs once more with more time. */
 static void counted_while_a_checkpoint_is_written(void **state)
 {
 	(void)state;
@@ -148,8 +149,8 @@ static void *copy_of(const void *bytes, size_t size)
 	return memcpy(copy, bytes, size);
 }
 
-/* It went on after its end, without films, and is cancelled: its earlier result is there, and nothing to make another
- * one of. */
+/* The job was extended after its end, without films, and is cancelled: its earlier result is there, and nothing to make
+ * another one from. */
 static void a_record_is_written_later(void **state)
 {
 	(void)state;
@@ -185,7 +186,7 @@ static void a_record_is_written_later(void **state)
 	usleep(STAGED_TICKS_US);
 	staged_await_state(job, "running");
 	staged_disk->fail_ledger = false;
-	staged_await_state(job, "done"); /* as before it was extended */
+	staged_await_state(job, "done"); /* as before the extension */
 	staged_end(SIGTERM, true);
 }
 
@@ -196,13 +197,14 @@ static int count_batch(void *user, const struct journal_item *item, struct error
 	return 0;
 }
 
-/* Of the whole job, with its bootstrap. */
+/* Returns the number of leases of the whole job, bootstrap included. */
 static unsigned leases_of_the_job(void)
 {
 	return staged.plan.groups * staged.plan.parts * (unsigned)(staged.plan.rounds + 1);
 }
 
-/* Results of the job wait for a slow flush when it ends; it is extended, and others come, while the flush goes on. */
+/* The job's results wait for a slow flush when it ends; then it is extended, and more results come while the flush goes
+ * on. */
 static void extended_during_a_flush(bool fails)
 {
 	unsigned first = leases_of_the_job(), more = first + 6, after = more + 4, there = 0;
@@ -245,7 +247,7 @@ static void extended_during_a_flush_that_fails(void **state)
 	extended_during_a_flush(true);
 }
 
-/* It is extended once its end is in the ledger, and the next start goes on with it. */
+/* The job is extended once its end is in the ledger, and the coordinator's next start continues it. */
 static void extended_after_its_end_was_written_late(void **state)
 {
 	(void)state;
@@ -269,7 +271,7 @@ static void extended_after_its_end_was_written_late(void **state)
 	staged_end(SIGKILL, false);
 }
 
-/* Done, with its films. */
+/* Makes a job that is done and keeps its films. */
 static uint64_t done_and_kept(void)
 {
 	staged.keep_bytes = 1 << 30;
@@ -281,7 +283,7 @@ static uint64_t done_and_kept(void)
 	return job;
 }
 
-/* What was kept of a job has chain states, for which another one leaves no room in memory. */
+/* The films of the ended job include chain states; another job takes so much memory that they do not fit. */
 static void extended_when_memory_has_room(void **state)
 {
 	(void)state;
@@ -305,7 +307,7 @@ static void extended_when_memory_has_room(void **state)
 	staged_end(SIGTERM, true);
 }
 
-/* Its films stay, and once there is room it is extended. */
+/* The job's films stay on the disk, and once there is room the job is extended. */
 static void extended_when_the_disk_has_room(void **state)
 {
 	(void)state;
@@ -317,7 +319,7 @@ static void extended_when_the_disk_has_room(void **state)
 	staged_end(SIGKILL, false);
 }
 
-/* The server, in this process, with a ledger that can be made to fail. */
+/* Opens the server in this process, with a ledger that can be made to fail. */
 static struct server *open_here(void)
 {
 	sqlite3_auto_extension((void (*)(void))staged_hook_commits);
@@ -327,7 +329,7 @@ static struct server *open_here(void)
 	return s;
 }
 
-/* Without a result its end waits in a list. */
+/* The end of a job without a result waits in a list. */
 static void a_row_ends_later(void **state)
 {
 	(void)state;
@@ -350,8 +352,8 @@ static void a_row_ends_later(void **state)
 	server_close(s);
 }
 
-/* An extension was refused, and so was the end that was to be written for it: the films stay for the next one. With
- * `extended`, that came before the end could be written. */
+/* An extension was refused, and the end that then had to be written failed as well: the films stay for the next
+ * extension. With `extended`, that extension came before the end could be written. */
 static void an_end_with_films_comes_later(bool extended)
 {
 	struct job_record r;
@@ -412,8 +414,8 @@ static uint64_t none_left(const char *path)
 	return 0;
 }
 
-/* Its journal is as long as its checkpoint, and the disk has no room for one: a job that was let go would be held by
- * its next result, again and again, with all the leases that are computed in between. */
+/* The job's journal is as long as its checkpoint, and the disk has no room for another checkpoint. If the job were
+ * released, its next result would hold it again and again, with all the leases that are computed in between. */
 static void held_until_a_checkpoint_fits(void **state)
 {
 	(void)state;

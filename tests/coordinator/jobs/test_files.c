@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Scenes' files are read again, which takes long: a submission and a worker's complaint wait for it, and nobody else
- * does.
+ * Files of scenes are read again, which takes long: a submission and a worker's complaint wait for the reading, and no
+ * other client does.
  */
 #include "common/base/log.h"
 #include "coordinator/jobs/files.h"
@@ -21,9 +21,9 @@
 
 #include <cmocka.h>
 
-static const char scene[] = "<scene/>"; /* the pool reads it, however small it is */
+static const char scene[] = "<scene/>"; /* even a scene as small as this is read by the pool's threads */
 
-/* A job whose scene has not been read since the start. */
+/* Returns a job whose scene has not been read since the start. */
 static uint64_t restart_with_a_job(void)
 {
 	staged_start();
@@ -71,7 +71,8 @@ static struct lease_key first_lease(void)
 	return k;
 }
 
-/* The scene is damaged, and a worker fails because of it: the job waits for the file, and is repaired. */
+/* The scene is damaged, and a worker fails because of it: the job waits for the file, and continues once the file is
+ * repaired. */
 static void complained_of(void **state)
 {
 	(void)state;
@@ -89,7 +90,7 @@ static void complained_of(void **state)
 	staged_end(SIGTERM, true);
 }
 
-/* It hangs up before the files are read: its failure counts. */
+/* The worker hangs up before the files are read: its failure counts. */
 static void failed_and_left(void **state)
 {
 	(void)state;
@@ -113,7 +114,7 @@ static void failed_and_left(void **state)
 	assert_int_equal(r.counts.failures, 1);
 }
 
-/* Whoever does not hold the lease it complains of makes nobody read anything. */
+/* A complaint from a worker that does not hold the lease starts no reading of files. */
 static void complained_of_by_others(void **state)
 {
 	(void)state;
@@ -129,8 +130,8 @@ static void complained_of_by_others(void **state)
 	staged_end(SIGTERM, true);
 }
 
-/* A worker asks for a file that no job has: no job's files are looked at. Who did would meet one without a submission.
- */
+/* A worker asks for a file that no job has: no job's files are looked at. A search through all jobs would meet one
+ * without a submission. */
 static void of_no_job(void **state)
 {
 	(void)state;

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What earlier coordinators kept in files of the spool is in the ledger after the next start, whatever of it is left.
- */
+/* Whatever is left of the files that earlier coordinators kept in the spool is in the ledger after the next start. */
 #include "coordinator/jobs/import.h"
 
 #include "common/base/checked_file.h"
@@ -53,7 +52,7 @@ static bool is_there(const char *file)
 
 /* ---- as an earlier coordinator wrote them */
 
-/* ended: the row knows that the job has. */
+/* ended: whether the row says that the job has ended. */
 static void old_row(uint64_t revision, bool ended)
 {
 	struct ledger *l;
@@ -126,7 +125,7 @@ static void old_file(const char *name, const char *text)
 
 /* ---- as it is now */
 
-/* Twice, as two starts. */
+/* Imports twice, as two starts would. */
 static void import(struct ledger_job *j)
 {
 	for (int i = 0; i < 2; i++) {
@@ -214,7 +213,7 @@ static void with_films(void **state)
 	assert_ended("copy");
 }
 
-/* The coordinator was stopped between the two. */
+/* The coordinator was stopped between the two writes. */
 static void ended_in_its_record_only(void **state)
 {
 	(void)state;
@@ -231,7 +230,7 @@ static void of_an_ended_job_the_record_is_left(void **state)
 	assert_ended("");
 }
 
-/* It runs again: the record is of its first end. */
+/* The job runs again: its record describes its first end. */
 static void an_extended_job(void **state)
 {
 	(void)state;
@@ -275,7 +274,7 @@ static void what_is_unknown_stays(void **state)
 	assert_true(is_there("job.json") && is_there("checkpoint"));
 }
 
-/* Both files of the ledger are gone, and of a job that waited nothing else than an empty journal is left. */
+/* Both files of the ledger are gone, and all that is left of a waiting job is an empty journal. */
 static void a_waiting_job_without_a_ledger_stays(void **state)
 {
 	(void)state;
@@ -294,7 +293,7 @@ static void a_waiting_job_without_a_ledger_stays(void **state)
 	assert_int_equal(ledger_next_id(jobs.ledger), JOB + 1);
 }
 
-/* The coordinator was stopped before the job got its row; the ledger knows others. */
+/* The coordinator was stopped before the job got its row; the ledger has rows of other jobs. */
 static void a_journal_without_a_row_goes(void **state)
 {
 	(void)state;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Any allocation of the coordinator may fail: while a result is merged, while an image is made, and while it starts.
- * The job goes on, at the latest when the coordinator starts again.
+ * Any allocation of the coordinator may fail: while a result is merged, while an image is made, and while the
+ * coordinator starts. The job goes on, at the latest when the coordinator starts again.
  */
 #include "common/base/mem.h"
 #include "coordinator/jobs/publish.h"
@@ -41,7 +41,7 @@ static void without_memory_for_a_result(void **state)
 	assert_true(ends > 0);
 }
 
-/* An image that could not be made is made later, whatever it is for; the job goes on. */
+/* An image that could not be made for lack of memory is made later, whatever it is needed for; the job goes on. */
 static void no_memory_for_an_image(void **state)
 {
 	(void)state;
@@ -63,7 +63,7 @@ static void no_memory_for_an_image(void **state)
 	server_close(s);
 }
 
-/* Whether the planned failure of an allocation has happened. */
+/* Returns whether the planned failure of an allocation has happened. */
 static bool has_failed(void)
 {
 	void *p = mem_alloc(1, 1);
@@ -89,7 +89,7 @@ static bool opens_without(long allocation)
 	return failed;
 }
 
-/* It starts with all its jobs or not at all. */
+/* The coordinator starts with all its jobs or not at all. */
 static void no_memory_for_a_start(void **state)
 {
 	(void)state;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A job's folder without a row is deleted only if it was read, and nothing was merged in it. */
+/* A job's folder without a row in the ledger is deleted only if the folder could be read and nothing was merged in it.
+ */
 #include "coordinator/jobs/reconcile.h"
 
 #include "common/base/disk.h"
@@ -19,7 +20,7 @@
 enum { JOB = 3 };
 static struct jobs jobs;
 static struct error e;
-static int folder_fault, file_fault; /* errno; 0: none */
+static int folder_fault, file_fault; /* errno of the fault; 0: none */
 
 static int set_up(void **state)
 {
@@ -92,7 +93,7 @@ static void a_file_that_cannot_be_read_stops_the_start(void **state)
 		assert_int_equal(start(0, faults[i]), -faults[i]);
 		assert_true(is_there("checkpoint"));
 	}
-	assert_int_equal(start(0, 0), -EBADMSG); /* read now: it is lost */
+	assert_int_equal(start(0, 0), -EBADMSG); /* the folder is read this time: the job is lost */
 	assert_true(is_there("checkpoint"));
 }
 

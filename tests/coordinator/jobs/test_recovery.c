@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A coordinator that reads the jobs from before its restart from a disk that gives out one piece when the test says so:
- * it lets peers in, says how far it is, answers what it can, and the rest in its order when the jobs are there; no
- * result that was acknowledged is asked for again.
+ * A restarted coordinator reads its jobs from a disk that returns one piece at a time, when the test allows it.
+ * Meanwhile it accepts peers, reports its progress, answers what it can, and answers the remaining requests in their
+ * order once the jobs are there. No acknowledged result is asked for again.
  */
 #include "common/base/disk.h"
 #include "coordinator/server/server.h"
@@ -31,14 +31,14 @@ enum {
 	FILES = 256,
 	ALL = 1 << 30,
 	RESULTS = 20,
-	LEASES = 8 + 4 * 8 /* of the job */
+	LEASES = 8 + 4 * 8 /* leases of the job */
 };
 
 /* Shared with the coordinator, which is another process. */
 static struct {
 	_Atomic int allowed, asked; /* pieces of journals and checkpoints */
 } * disk;
-static atomic_bool is_film[FILES]; /* by descriptor */
+static atomic_bool is_film[FILES]; /* indexed by descriptor */
 
 static struct plan plan;
 static uint64_t journal_most;
@@ -126,7 +126,7 @@ static bool is_done(const struct lease_key *k)
 	return false;
 }
 
-/* Sends so many results in all, until they are acknowledged, each once. */
+/* Sends results until there are `results` in all, and each of them is acknowledged, once. */
 static void work_until(size_t results)
 {
 	while (done_count < results) {
@@ -151,7 +151,7 @@ static void work_until(size_t results)
 	}
 }
 
-/* A job of which so much is stored, and the end of its coordinator. */
+/* Submits a job, has part of it computed, and stops the coordinator. */
 static uint64_t begin_a_job(void)
 {
 	done_count = sent = 0;
@@ -165,7 +165,7 @@ static uint64_t begin_a_job(void)
 	return job;
 }
 
-/* How much of the only job is read, percent; -1: all, and it goes on. */
+/* Returns the part of the only job that is read, in percent; -1 if all is read and the job goes on. */
 static int percent(void)
 {
 	int n = -1;
@@ -229,14 +229,14 @@ static int set_up(void **state)
 static void answers_while_it_reads(uint64_t job)
 {
 	int seen = 0, last = 0;
-	heartbeat = 2; /* no less: a busy machine keeps us from a word for seconds */
+	heartbeat = 2; /* s; not less: on a busy machine this process may be unable to send anything for seconds */
 	start(0);
 	call_while_it_reads(&client, FARM__ROLE__ROLE_CLIENT);
 	call_while_it_reads(&worker, FARM__ROLE__ROLE_WORKER);
 	say_job_get(job);
 	assert_true(scripted_want(worker, 3));
 	assert_int_equal(percent(), 0);
-	while (!seen) { /* piece by piece */
+	while (!seen) { /* one piece after the other */
 		disk->allowed++;
 		while (disk->asked <= disk->allowed)
 			usleep(1000);
@@ -247,7 +247,8 @@ static void answers_while_it_reads(uint64_t job)
 		last = n;
 	}
 	say_watch(job);
-	assert_true(scripted_has(client, PATIENCE)); /* a heartbeat: it is here, and the answer comes later */
+	assert_true(scripted_has(client, PATIENCE)); /* a heartbeat: the coordinator is alive, and the answer comes
+						      * later */
 	disk->allowed = ALL;
 	const Farm__Envelope *m = scripted_hear(client);
 	assert_true(m && m->body_case == FARM__ENVELOPE__BODY_JOB_STATUS &&
@@ -255,7 +256,7 @@ static void answers_while_it_reads(uint64_t job)
 	assert_true(client->heartbeats > 0);
 	m = scripted_hear(worker);
 	assert_true(m && m->body_case == FARM__ENVELOPE__BODY_JOB_INFO);
-	work_until(LEASES); /* none of those that were acknowledged */
+	work_until(LEASES); /* none of them acknowledged before */
 	end(SIGTERM, true);
 }
 
@@ -272,7 +273,7 @@ static void a_checkpoint(void **state)
 	answers_while_it_reads(begin_a_job());
 }
 
-/* It does not read to the end before it ends, and the next one has all. */
+/* The coordinator is told to stop before it has read all jobs, and the next one reads them all. */
 static void told_to_stop(void **state)
 {
 	(void)state;
@@ -281,7 +282,7 @@ static void told_to_stop(void **state)
 	while (disk->asked < 4)
 		usleep(1000);
 	kill(pid, SIGTERM);
-	while ((client = scripted_connect(port))) { /* until it has heard of that */
+	while ((client = scripted_connect(port))) { /* until the coordinator has seen the signal */
 		scripted_hang_up(client);
 		usleep(10000);
 	}
@@ -296,7 +297,7 @@ static void told_to_stop(void **state)
 	end(SIGTERM, true);
 }
 
-/* A client that asks for more than can wait gets an error; others are served. */
+/* A client that sends more requests than may wait gets an error; others are served. */
 static void too_much_is_asked(void **state)
 {
 	(void)state;

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The coordinator's shell and workers that answer every lease at once with what the test wants: results counted once,
- * late, useless, failed; extensions of what is done. Slow connections are in test_slow_links.c.
+ * The coordinator's shell with workers that answer every lease at once with whatever the test needs: results that count
+ * once, come late, are useless, or failed; and extensions of jobs that are done. Slow connections are in
+ * test_slow_links.c.
  */
 #include "tests/support/served.h"
 
@@ -53,7 +54,7 @@ static void a_black_job_ends(void **state)
 			continue;
 		}
 		struct batch b = black_batch(&d.keys[--d.count], &plan, 0);
-		if (first) { /* wrong ones; then the right ones; then a repeat */
+		if (first) { /* wrong results, then right ones, then a repeat */
 			b.weights[0] = NAN;
 			peer_send_batch(worker, &b, &plan);
 			assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_REFUSED);
@@ -82,7 +83,7 @@ static void a_black_job_ends(void **state)
 
 enum { PIECE = 1 << 20, FILE_SIZE = 2 * PIECE + 5 };
 
-/* As the coordinator makes it: whole, in place of the one before. */
+/* Makes the preview as the coordinator does: the whole file, renamed over the previous one. */
 static void make_preview(char letter)
 {
 	char path[96], temporary[112];
@@ -124,15 +125,15 @@ static void what_is_fetched_is_one_file(void **state)
 		assert_true(peer_hello(client[i], FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
 	}
 	make_preview('a');
-	assert_true(*fetch_piece(client[0], PIECE)->error); /* not begun */
+	assert_true(*fetch_piece(client[0], PIECE)->error); /* no fetch has begun */
 	expect_piece(client[0], 0, 'a');
 	make_preview('b');
 	expect_piece(client[1], 0, 'b');
 	expect_piece(client[0], PIECE, 'a');
 	expect_piece(client[0], 2 * PIECE, 'a');
-	assert_true(*fetch_piece(client[0], 2 * PIECE)->error); /* it was its last */
+	assert_true(*fetch_piece(client[0], 2 * PIECE)->error); /* that was the last piece */
 	expect_piece(client[1], PIECE, 'b');
-	/* Of two that may be under way the silent one gives way, and no other one. */
+	/* Of the two fetches that may be open, the silent one gives way, and no other. */
 	expect_piece(client[0], 0, 'b');
 	expect_piece(client[1], PIECE, 'b');
 	expect_piece(client[2], 0, 'b');
@@ -144,7 +145,7 @@ static void what_is_fetched_is_one_file(void **state)
 		scripted_hang_up(client[i]);
 }
 
-/* A lease of chains in the dark; of a bootstrap in even light. */
+/* Result of a lease: chains that find no light; a bootstrap in uniform light. */
 static struct batch counting_batch(const struct lease_key *k, const struct plan *plan)
 {
 	struct batch b = black_batch(k, plan, 4);
@@ -164,7 +165,7 @@ static struct batch counting_batch(const struct lease_key *k, const struct plan 
 	return b;
 }
 
-/* Finite, and more than all mutations of the job can bring. */
+/* The value is finite, and larger than all mutations of the job can add up to. */
 static void send_with_huge_pixel(struct scripted *worker, struct batch *b, const struct plan *plan)
 {
 	size_t count = (size_t)plan->crop_width * plan->crop_height * TILE_CHANNELS;
@@ -184,7 +185,7 @@ static void expect_counts_in_spool(const struct plan *plan)
 	struct error e;
 	char path[96], command[300];
 	struct ledger *l;
-	snprintf(path, sizeof path, "%s/read", served_folder()); /* the coordinator has locked its own */
+	snprintf(path, sizeof path, "%s/read", served_folder()); /* the coordinator has its own file locked */
 	snprintf(command, sizeof command, "mkdir '%s' && cp '%s/spool/jobs.db'* '%s'", path, served_folder(), path);
 	assert_int_equal(system(command), 0);
 	assert_int_equal(ledger_open(&l, path, &e), 0);
@@ -216,7 +217,7 @@ static void strategies_are_counted_once(void **state)
 	assert_int_equal(plan_make(&r, &plan, &e), 0);
 	assert_true(peer_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
 	peer_submit(client, r.mixture, "<scene/>", "s.xml", "s.xml");
-	assert_int_equal(peer_submit_answer(client)->job, 2); /* the scene is still there */
+	assert_int_equal(peer_submit_answer(client)->job, 2); /* the scene is still stored */
 	assert_true(peer_hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
 	peer_say_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
 	struct lease_queue d = {.count = 0};
@@ -229,7 +230,7 @@ static void strategies_are_counted_once(void **state)
 		struct batch b = counting_batch(&d.keys[--d.count], &plan);
 		bool wrong = first && b.key.kind == LEASE_RENDER;
 		if (wrong) {
-			b.strategy[0][STRATEGY_ACCEPTED] = 4; /* of 3 proposals */
+			b.strategy[0][STRATEGY_ACCEPTED] = 4; /* accepted, of 3 proposals */
 			peer_send_batch(worker, &b, &plan);
 			assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_REFUSED);
 			b.strategy[0][STRATEGY_ACCEPTED] = 0;
@@ -275,7 +276,8 @@ static const Farm__JobStatus *list_job(struct scripted *client, uint64_t job)
 	return NULL;
 }
 
-/* While nobody may look at the film only what would be merged waits, each once; all else is answered at once. */
+/* While the film may not be read, only results that would be merged wait, each once; all other messages are answered at
+ * once. */
 static void what_is_useless_does_not_wait(void **state)
 {
 	(void)state;
@@ -303,20 +305,20 @@ static void what_is_useless_does_not_wait(void **state)
 	assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_REPEATED);
 	send_bootstrap(other, &d.keys[0]);
 	assert_int_equal(peer_verdict(other, &none), FARM__VERDICT__VERDICT_REPEATED);
-	send_bootstrap(other, &d.keys[1]); /* it waits already */
+	send_bootstrap(other, &d.keys[1]); /* the result waits already */
 	assert_int_equal(peer_verdict(other, &none), FARM__VERDICT__VERDICT_REFUSED);
-	send_bootstrap(other, &d.keys[2]); /* open: perhaps it held it before it called again */
+	send_bootstrap(other, &d.keys[2]); /* open: the worker may have held the lease before it reconnected */
 	send_bootstrap(other, &d.keys[2]);
 	send_bootstrap(other, &d.keys[0]);
 	assert_int_equal(peer_verdict(other, &none), FARM__VERDICT__VERDICT_REPEATED);
-	served_at_once(); /* of other tests */
+	served_at_once(); /* from other tests */
 	served_set_busy(false);
 	assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
 	assert_int_equal(peer_verdict(other, &none), FARM__VERDICT__VERDICT_MERGED);
-	assert_int_equal(served_at_once(), 1); /* others are read in between */
-	send_bootstrap(worker, &d.keys[0]);    /* nothing else was kept */
+	assert_int_equal(served_at_once(), 1); /* other connections are read in between */
+	send_bootstrap(worker, &d.keys[0]);    /* no other result was kept */
 	assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_REPEATED);
-	assert_true(d.count >= 4); /* who goes takes along what waits for it */
+	assert_true(d.count >= 4); /* a worker that leaves takes its waiting results with it */
 	served_set_busy(true);
 	send_bootstrap(worker, &d.keys[3]);
 	scripted_hang_up(worker);
@@ -362,21 +364,21 @@ static void hear_done(struct scripted *p, bool ok, const char *text)
 		fail_msg("'%s' is not in '%s'", text, m->done->text);
 }
 
-/* The job that was done before: its films are read beside the loop, and each Extend gets one answer. */
+/* The job that ended before: its films are read outside the loop, and each Extend gets one answer. */
 static void extensions_wait_for_films(void **state)
 {
 	(void)state;
 	struct scripted *a = peer_call(), *b = peer_call();
 	assert_true(peer_hello(a, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
 	assert_true(peer_hello(b, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
-	say_extend(a, 2, 0, 1); /* not for that */
+	say_extend(a, 2, 0, 1); /* this is no reason to wait */
 	hear_done(a, false, "a bound is missing");
 	say_extend(a, 2, 8, 3);
 	say_extend(b, 2, 8, 1);
 	hear_done(a, false, "one extension at a time");
 	hear_done(a, false, "one extension at a time");
 	hear_done(a, true, "continues after");
-	hear_done(b, true, "continues after"); /* the job is running by then */
+	hear_done(b, true, "continues after"); /* the job runs by then */
 	say_extend(a, 1, 8, 1);
 	hear_done(a, false, "it is black");
 	scripted_hang_up(a);
@@ -407,7 +409,8 @@ static void say_failed(struct scripted *p, const struct lease_key *k, const char
 	peer_say(p, &m, NULL, 0);
 }
 
-/* A failure is the scene's, or the worker's; never the connection's, because of letters that a scene's author chose. */
+/* A failure counts against the scene or the worker, and never ends the connection because of bytes that a scene's
+ * author chose. */
 static void a_failure_counts_whatever_its_text(void **state)
 {
 	(void)state;
@@ -425,7 +428,7 @@ static void a_failure_counts_whatever_its_text(void **state)
 	while (!strstr(list_job(client, d.keys[0].job)->why, "scripted failed last: half a letter ? of a file"))
 		usleep(1000);
 	struct pollfd ready = {worker->fd, POLLIN, 0};
-	while (poll(&ready, 1, 200) == 1) /* neither a fault nor the end */
+	while (poll(&ready, 1, 200) == 1) /* neither an error nor the end of the connection */
 		assert_true(peer_attend(worker, &d) == FARM__VERDICT__VERDICT_NONE &&
 			    worker->env.message->body_case != FARM__ENVELOPE__BODY_FAULT);
 	scripted_hang_up(client);
@@ -441,7 +444,7 @@ static off_t size_of_log(uint64_t job)
 	return st.st_size;
 }
 
-/* A worker complains about a lease that it does not hold, as fast as it can. */
+/* A worker complains, as fast as it can, about a lease that it does not hold. */
 static void complaints_do_not_fill_the_log(void **state)
 {
 	(void)state;
@@ -453,14 +456,14 @@ static void complaints_do_not_fill_the_log(void **state)
 	assert_true(peer_hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
 	for (int i = 0; i < COMPLAINTS; i++)
 		say_failed(worker, &k, "I do not like it");
-	peer_say_job_get(worker, 1000); /* answered when all were read */
+	peer_say_job_get(worker, 1000); /* answered once all complaints were read */
 	while (!d.job_ended)
 		peer_attend(worker, &d);
 	assert_in_range(size_of_log(k.job) - before, 1, MOST);
 	scripted_hang_up(worker);
 }
 
-/* A client whose extension of job 2 has come. */
+/* Sends an extension of job 2 and waits until the coordinator has it. */
 static void send_extension(struct scripted *p)
 {
 	say_extend(p, 2, 8, 1);
@@ -498,13 +501,13 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(a_black_job_ends),
-		cmocka_unit_test(what_is_fetched_is_one_file), /* of that job */
+		cmocka_unit_test(what_is_fetched_is_one_file), /* uses that job */
 		cmocka_unit_test(strategies_are_counted_once),
 		cmocka_unit_test(what_is_useless_does_not_wait),
 		cmocka_unit_test(extensions_wait_for_films), /* continues the job of strategies_are_counted_once */
 		cmocka_unit_test(extensions_are_served_as_they_came),
 		cmocka_unit_test(a_failure_counts_whatever_its_text),
-		cmocka_unit_test(complaints_do_not_fill_the_log), /* of that job */
+		cmocka_unit_test(complaints_do_not_fill_the_log), /* uses that job */
 	};
 	return cmocka_run_group_tests(tests, set_up, served_stop);
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Which jobs go on where the disk, or memory, has not room for all: some job always does, and those that do have room
- * together.
+ * Which jobs may go on when the disk or memory has not enough room for all: at least one always does, and the jobs that
+ * go on have room together.
  */
 #include "coordinator/jobs/room.h"
 
@@ -21,7 +21,7 @@
 
 enum { JOBS = 4 };
 
-/* Of jobs 1 to 4, their bytes and priorities; `going`: those that go on, in order. */
+/* Bytes and priorities of jobs 1 to 4; `going`: those that go on, in order. */
 static const struct {
 	uint64_t bytes[JOBS];
 	int priority[JOBS];
@@ -33,9 +33,9 @@ static const struct {
 	{{60, 60, 40, 1}, {0}, 100, "13"},
 	{{60, 60, 60, 40}, {0, 0, 5, -5}, 100, "34"},
 	{{60, 30, 60, 20}, {0, 5, 5, 5}, 100, "23"},
-	/* the first has too little room beside what others have written: one of them ends first */
+	/* the first job does not fit beside what others have written: one of them must end first */
 	{{60, 30, 60, 60}, {9, 0, 0, 0}, 40, "2"},
-	/* nobody's: the first must see whether it needs all that it claims */
+	/* the room stays unused: the first job must see whether it needs all that it claims */
 	{{60, 50, 41, 90}, {0, 0, 1, 1}, 40, "3"},
 	{{0, 0, 1, 0}, {0}, 0, "124"},
 	{{UINT64_MAX, UINT64_MAX, UINT64_MAX, UINT64_MAX}, {0}, UINT64_MAX - 1, "1"},
@@ -60,8 +60,8 @@ static void some_go_on(void **state)
 	room_share(NULL, 0, 100);
 }
 
-/* Jobs of random sizes, each of which fits alone, write up to their claims and release all of it at their ends, and
- * others come meanwhile: all end. */
+/* Jobs of random sizes, each of which fits alone, write up to their claims and release all of it at their ends while
+ * others arrive: all of them end. */
 static void all_end(void **state)
 {
 	(void)state;
@@ -77,7 +77,7 @@ static void all_end(void **state)
 		for (; ended < JOBS && steps < 1000; steps++) {
 			struct room_claim claims[JOBS];
 			size_t count = 0;
-			for (int k = 0; k < JOBS && k <= steps / 5; k++) /* one after the other arrives */
+			for (int k = 0; k < JOBS && k <= steps / 5; k++) /* jobs arrive one after the other */
 				if (left[k])
 					claims[count++] = (struct room_claim){(uint64_t)k, left[k], priority[k], false};
 			room_share(claims, count, free_bytes);
@@ -105,8 +105,8 @@ static uint64_t next_draw(uint64_t *draw)
 	return *draw >> 33;
 }
 
-/* Jobs whose chain states grow as far as they may, end and are followed by others: memory is bounded, and there is
- * always one whose states may grow. */
+/* Jobs whose chain states grow to their limit end and are followed by others: memory is bounded, and the states of at
+ * least one job may always grow. */
 static void states_are_bounded(void **state)
 {
 	(void)state;
@@ -143,8 +143,8 @@ static void states_are_bounded(void **state)
 	assert_true(largest > MOST && largest <= MOST + MOST / 2 + MOST / 4 && waited);
 }
 
-/* One job has all that it may have, and is held: others that need little go on, and if they are too many, memory is
- * bounded all the same. Who needs more waits for it. */
+/* One job has all the memory that it may have, and is held: other jobs that need little go on, and memory stays bounded
+ * however many they are. A job that needs more waits for the large one. */
 static void small_jobs_pass_a_large_one(void **state)
 {
 	(void)state;
@@ -164,10 +164,10 @@ static void small_jobs_pass_a_large_one(void **state)
 		}
 	assert_int_equal(total, MOST + MOST / ROOM_SMALL_JOBS);
 	assert_int_equal(room_for_states(&jobs, &live[COUNT], 1), 1);
-	assert_int_equal(room_for_states(&jobs, &live[0], MOST), 0); /* and it can end */
+	assert_int_equal(room_for_states(&jobs, &live[0], MOST), 0); /* and the large job can end */
 }
 
-static unsigned sent, refused, ended; /* results, those refused since memory had no room, and jobs */
+static unsigned sent, refused, ended; /* results, results refused for lack of memory, and jobs */
 
 static void work_until(const unsigned *count, unsigned most)
 {
@@ -197,7 +197,7 @@ static uint64_t four_thousand(const char *path)
 	return 4000;
 }
 
-/* What will be free some day counts: the films of a job that ended, and the files of scenes. */
+/* Space that will become free counts: films of jobs that ended, and files of scenes. */
 static void what_no_end_makes_room_for(void **state)
 {
 	(void)state;
@@ -231,7 +231,8 @@ static void what_no_end_makes_room_for(void **state)
 	jobs.ended_count = 1;
 	assert_int_equal(room_could_hold(&jobs, 7300, &e), 0);
 	assert_int_equal(room_could_hold(&jobs, 7301, &e), -ENOSPC);
-	jobs.found = (struct recovering_job *)&jobs; /* not known yet: jobs from before the restart are being read */
+	jobs.found = (struct recovering_job *)&jobs; /* free space is unknown: jobs from before the restart are still
+						      * being read */
 	assert_int_equal(room_could_hold(&jobs, 7301, &e), 0);
 	disk_use(NULL);
 	blob_store_close(jobs.blobs);
@@ -251,8 +252,8 @@ static void send_order(uint64_t job, Farm__Verb verb)
 	staged_order(&m);
 }
 
-/* The bootstrap and the first round of one job are done, then one comes that has the worker to itself. Each may have
- * all that there is, so together they may not: the second waits until the first has ended. */
+/* One job finishes its bootstrap and first round, then a second one gets the worker to itself. Each job may take all
+ * the memory there is, so both together may not: the second waits until the first has ended. */
 static void jobs_with_many_chains_take_turns(void **state)
 {
 	(void)state;

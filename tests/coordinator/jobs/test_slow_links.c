@@ -22,8 +22,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-/* A worker that is silent for six heartbeats, 3 s, is disconnected: on a busy machine this test may be silent for one.
- */
+/* A worker that is silent for six heartbeats, 3 s, is disconnected. On a busy machine this process may be silent for
+ * one. */
 #define QUICK 0.5
 
 static int set_up_quick(void **state)
@@ -32,7 +32,8 @@ static int set_up_quick(void **state)
 	return served_start(60, QUICK, 60);
 }
 
-/* A worker with a lease of a new job, and its result. The keys of what came stay in the lease queue. */
+/* Returns a worker that holds a lease of a new job, and makes its result. The keys of granted leases stay in the queue.
+ */
 static struct scripted *worker_with_result(struct scripted *client, struct lease_queue *d, unsigned char **frame,
 					   size_t *size)
 {
@@ -60,7 +61,7 @@ static struct scripted *worker_with_result(struct scripted *client, struct lease
 	return worker;
 }
 
-/* false: we stood still for so long that the coordinator may hang up on the worker. */
+/* Returns false if this process stood still for so long that the coordinator may hang up on the worker. */
 static bool sends_slowly(struct scripted *worker, const unsigned char *frame, size_t size)
 {
 	enum { PIECES = 24 };
@@ -85,7 +86,7 @@ static bool sends_slowly(struct scripted *worker, const unsigned char *frame, si
 	return true;
 }
 
-/* Sending it takes longer than a worker may be silent, and the worker can send nothing else meanwhile; the coordinator
+/* Sending the result takes longer than a worker may be silent, and nothing else can be sent meanwhile; the coordinator
  * answers with heartbeats. */
 static void a_slow_result_counts(void **state)
 {

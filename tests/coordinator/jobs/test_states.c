@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The coordinator's shell and a worker that says by digest which chain states it made and which it refuses: a refusal
- * counts against the states that it names and no others; states that are not those of their digest are refused before
- * they are stored.
+ * The coordinator's shell and a worker that names by digest the chain states that it made or refuses: a refusal counts
+ * only against the states that it names, and states that do not match their digest are refused before they are stored.
  */
 #include "tests/support/served.h"
 
@@ -22,10 +21,10 @@ enum { STATE_BYTES = 16 };
 static struct fixture {
 	struct plan plan;
 	struct scripted *client, *worker;
-	struct grant grant;    /* the last one */
-	bool granted;	       /* it has come and was not looked at */
-	Farm__Verdict verdict; /* the last one */
-	char text[256];	       /* of it */
+	struct grant grant;    /* the last grant */
+	bool granted;	       /* a grant has arrived and was not looked at */
+	Farm__Verdict verdict; /* the last verdict */
+	char text[256];	       /* text of the verdict */
 } t;
 
 static int set_up(void **state)
@@ -56,7 +55,7 @@ static int tear_down(void **state)
 	return served_stop(state);
 }
 
-/* Grants may come before the verdict on what was sent before them. */
+/* Handles one message. Grants may arrive before the verdict on a result that was sent earlier. */
 static void hear_message(void)
 {
 	struct error e;
@@ -91,7 +90,7 @@ static struct batch make_result(uint8_t mark)
 	return b;
 }
 
-/* Its states end with this byte. */
+/* Sends a result, whose chain states end with this byte, that is to be merged. */
 static void send_merged(uint8_t mark)
 {
 	struct batch b = make_result(mark);
@@ -114,7 +113,7 @@ static void come_to_states(void)
 		send_merged(1);
 }
 
-/* Answers others until it holds this one. */
+/* Answers other leases until this one is granted. */
 static void come_to(const struct lease_key *k)
 {
 	for (hear_grant(); !lease_key_equal(&t.grant.key, k); hear_grant())
@@ -140,8 +139,8 @@ static void refuse(const struct lease_key *k, const struct blob_hash *states)
 	peer_say(t.worker, &m, NULL, 0);
 }
 
-/* The worker refuses the states of a lease, the epoch that they are the end of is computed again, with other states,
- * and the lease is given with these: the same refusal, come again or late, says nothing about them. */
+/* The worker refuses the states of a lease; the epoch that produced them is computed again, with other states, and the
+ * lease is given with the new ones. The same refusal, repeated or late, does not count against the new states. */
 static void a_refusal_is_of_the_states_that_it_names(void **state)
 {
 	(void)state;
@@ -158,15 +157,15 @@ static void a_refusal_is_of_the_states_that_it_names(void **state)
 	assert_false(blob_hash_equal(&t.grant.digest, &first));
 	assert_int_equal(t.grant.states[0].bytes[STATE_BYTES - 1], 2);
 	refuse(&k, &first);
-	send_merged(3); /* else it would be refused: its epoch is not open */
-	/* The ones that are there now can be refused. */
+	send_merged(3); /* otherwise it would be refused: its epoch is not open */
+	/* The present states can be refused. */
 	come_to(&after);
 	refuse(&after, &t.grant.digest);
 	come_to(&k);
 	send_merged(3);
 }
 
-/* Damaged after the digest was made, or without one. */
+/* Sends states that were damaged after the digest was made, or (`without`) that have no digest. */
 static void send_damaged(bool without)
 {
 	struct batch b = make_result(5);

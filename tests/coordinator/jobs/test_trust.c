@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Who was quarantined is known after a restart, however long the list has become; a damaged list stops no farm. */
+/* The quarantine survives a restart, however long the list has become; a damaged list does not stop the farm. */
 #include "common/base/mem.h"
 #include "coordinator/server/server.h"
 #include "coordinator/server/server_options.h"
@@ -34,7 +34,7 @@ static struct server *start(void)
 	server_config_init(&c);
 	c.listen = "127.0.0.1:0";
 	c.spool = spool;
-	int shown = dup(2), nowhere = open("/dev/null", O_WRONLY); /* a line for each who is quarantined */
+	int shown = dup(2), nowhere = open("/dev/null", O_WRONLY); /* one line is logged for each quarantined worker */
 	dup2(nowhere, 2);
 	int rc = server_open(&s, &c, &e);
 	dup2(shown, 2);
@@ -55,8 +55,8 @@ static FILE *begin(void)
 	return f;
 }
 
-/* Far more than 64 KB, as an earlier version could leave it. Of one certificate the last 64 are remembered, and none of
- * another is forgotten for them. */
+/* A list far longer than 64 KB, as an earlier version could leave it. The last 64 names of one certificate are
+ * remembered, and no name of another certificate is forgotten for them. */
 static void a_long_list(void **state)
 {
 	(void)state;
@@ -92,7 +92,7 @@ static void a_damaged_list(void **state)
 	FILE *f = begin();
 	fputs("{\"schema\":1,\"workers\":[{\"cert", f);
 	assert_int_equal(fclose(f), 0);
-	for (int i = 0; i < 2; i++) { /* as the first start left it, too */
+	for (int i = 0; i < 2; i++) { /* also as the first start left the list */
 		struct server *s = start();
 		struct error e;
 		char *text;
@@ -105,7 +105,8 @@ static void a_damaged_list(void **state)
 	assert_int_equal(access(path_of("aside"), F_OK), -1);
 }
 
-/* One name has changed: whoever was meant is not guessed. In one file it is restored from the other. */
+/* One name has been changed in both files: the coordinator does not guess the original. Changed in one file, it is
+ * restored from the other. */
 static void a_list_that_somebody_changed(void **state)
 {
 	(void)state;

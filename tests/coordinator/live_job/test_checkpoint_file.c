@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The file of a checkpoint has the same bytes from build to build, whatever the machine; of version 004 it is read;
- * bytes that are no checkpoint are refused, though their checksum fits, and nothing is allocated for what they claim.
- */
+/* A checkpoint file has the same bytes in every build and on every machine; version 004 is read; bytes that are no
+ * checkpoint are refused even if their checksum fits, and nothing is allocated for the sizes that they claim. */
 #include "coordinator/live_job/checkpoint_file.h"
 
 #include "common/base/bytes.h"
@@ -24,7 +23,7 @@
 
 enum { JOB = 5, GENERATION = 7, CHAINS = 4, HEAD = 12, FILE_MOST = 1 << 20 };
 
-/* Behind the head: four seeds, no state of the first part, two of the second, the version of the films. */
+/* After the head: four seeds, no chain states of the first part, two of the second, the version of the films. */
 static const unsigned char middle[] = {
 	8, 7, 6, 5, 4, 3, 2, 1, 9, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 10, 0, 0, 0,
 	0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 3, 0, 0, 0, 'a',  'b',  'c',  1,	0,    0,    0,	  'd',	2,  0, 0, 0,
@@ -66,7 +65,7 @@ static struct chain_state state_of(const char *text)
 	return s;
 }
 
-/* Writes a checkpoint and reads its bytes. The size of the part before the seeds. */
+/* Writes a checkpoint and reads its bytes; sets *size. Returns the size of the part before the seeds. */
 static size_t write_file(size_t *size)
 {
 	static const uint64_t seeds[CHAINS] = {0x0102030405060708, 9, UINT64_MAX, 10};
@@ -91,7 +90,7 @@ static size_t write_file(size_t *size)
 	return HEAD + get32(bytes + 8);
 }
 
-/* Loads `size` of the bytes; *job is what came of it, to be freed. */
+/* Loads the first `size` bytes; *job is the loaded job, which the caller frees. */
 static int load(struct live_job **job, size_t size)
 {
 	struct checked_file f;
@@ -151,7 +150,7 @@ static void files_stay_as_they_are(void **state)
 	assert_int_equal(load(&job, size), 0);
 	assert_loaded(job, 1.5);
 	live_job_free(job);
-	/* In place of the head that of version 004, whose first 16 bytes are magic number, size and worker_count. */
+	/* Replaces the head by that of version 004, whose first 16 bytes are magic number, size and worker_count. */
 	enum { OLD = 16 + STORED_OLD_HEAD };
 	memmove(bytes + OLD, bytes + seeds, size - seeds);
 	memset(bytes, 0, OLD);
@@ -184,7 +183,7 @@ static void cut_and_longer_files_are_refused(void **state)
 	}
 }
 
-/* Every bit before the head is another version or another size; sizes of states that no chain has. */
+/* Any flipped bit before the head gives another version or another size. Also sizes of states that no chain has. */
 static void other_files_are_refused(void **state)
 {
 	(void)state;

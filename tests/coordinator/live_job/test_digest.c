@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What decides bits is in the digest of a batch, and the time that it took is not. */
+/* The digest of a batch covers everything that decides bits of the image, and not the time that the batch took. */
 #include "coordinator/live_job/digest.h"
 
 #include <setjmp.h>
@@ -63,7 +63,7 @@ static void every_number_counts(void **state)
 	begin(&s);
 	check(&s, true);
 	s.batch.cpu_seconds = 2;
-	s.batch.strategy[2][0] = 1; /* beyond those that the plan has */
+	s.batch.strategy[2][0] = 1; /* beyond the strategies of the plan */
 	check(&s, true);
 	CHANGED(s.batch.key.job = 8);
 	CHANGED(s.batch.key.kind = LEASE_BOOTSTRAP);

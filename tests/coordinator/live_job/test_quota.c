@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Quotas at their edges: what is exactly allowed passes, one more does not, and what overflows is more than anything.
+/* Quotas at their edges: the exact limit passes, one more does not, and a product that overflows exceeds every limit.
  */
 #include "common/film/canvas.h"
 #include "coordinator/live_job/quota.h"
@@ -37,7 +37,7 @@ static int check(const struct quota *q, uint64_t jobs, uint64_t bytes, uint64_t 
 	return rc;
 }
 
-/* The sentence names the limit, not what is there: more jobs may be live if the limit was lowered. */
+/* The sentence names the limit and not the number of live jobs, which may exceed a limit that was lowered. */
 static void says_the_limit(void **state)
 {
 	(void)state;
@@ -71,7 +71,7 @@ static void each_quota_at_its_limit(void **state)
 	assert_int_equal(check(&(struct quota){.film_bytes = films - 1}, 0, 0, 0), -EDQUOT);
 	plan.groups = 17;
 	assert_int_equal(check(&(struct quota){.film_bytes = films}, 0, 0, 0), -EDQUOT);
-	plan.crop_width = 50; /* of a film as large */
+	plan.crop_width = 50; /* the crop of a film as large */
 	assert_int_equal(check(&(struct quota){.film_bytes = films}, 0, 0, 0), 0);
 	plan.groups = 16;
 	plan.crop_width = 100;
@@ -79,7 +79,7 @@ static void each_quota_at_its_limit(void **state)
 	assert_int_equal(check(&(struct quota){.mutations = all - 1}, 0, 0, 0), -EDQUOT);
 	plan.rounds = UINT64_MAX / 2; /* the product overflows */
 	assert_int_equal(check(&(struct quota){.mutations = UINT64_MAX - 1}, 0, 0, 0), -EDQUOT);
-	plan.rounds = UINT64_MAX; /* until the time is up */
+	plan.rounds = UINT64_MAX; /* until the time limit */
 	assert_int_equal(check(&(struct quota){.mutations = UINT64_MAX}, 0, 0, 0), -EDQUOT);
 	plan.rounds = 3;
 }

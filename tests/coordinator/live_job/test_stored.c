@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What is stored of a job comes back; what another version wrote is refused; what earlier ones wrote is read. */
+/* The stored parts of a job are read back unchanged; those of a later version are refused; those of earlier versions
+ * are read. */
 #include "coordinator/live_job/stored.h"
 
 #include "common/base/bytes.h"
@@ -68,7 +69,7 @@ static void looks_come_back(void **state)
 	assert_int_equal(stored_unpack_look(bytes, size + sizeof unknown, &back, &e), -EPROTO);
 }
 
-/* Of which every number is another. */
+/* All numbers differ from each other. */
 static struct checkpoint_head make_head(void)
 {
 	struct checkpoint_head h = {.job = 12,
@@ -114,7 +115,7 @@ static void heads_come_back(void **state)
 	assert_memory_equal(&back.counts, &h.counts, sizeof h.counts);
 	assert_int_equal(stored_unpack_head(bytes, size - 1, &back, &e), -EPROTO);
 	assert_int_equal(stored_unpack_head(bytes, 0, &back, &e), -EPROTO);
-	/* More than a job has: a 65th group, a 65th look. More than is known: of the head, of its last look. */
+	/* Too many entries: a 65th group, a 65th estimate. Unknown fields: in the head, in its last estimate. */
 	static const unsigned char more[][12] = {{0x52, 8}, {0x72, 0}, {0xc0, 0x0c, 1}, {0x72, 3, 0xc0, 0x0c, 1}};
 	static const size_t sizes[] = {10, 2, 3, 5};
 	h.looks.count--;
@@ -126,7 +127,7 @@ static void heads_come_back(void **state)
 	}
 }
 
-/* ---- as earlier versions wrote it: little endian, one number behind the other ---- */
+/* ---- as earlier versions wrote it: little endian, numbers without padding ---- */
 
 static size_t put_all(size_t at, const double *v, size_t count)
 {
@@ -192,7 +193,7 @@ static void old_heads_are_read(void **state)
 	stored_old_head(bytes, 3, &back);
 	assert_head(&back);
 	assert_old_counts(&back.counts);
-	memset(bytes + 600, 0xff, 4); /* no more looks than there can be */
+	memset(bytes + 600, 0xff, 4); /* more estimates than there can be */
 	memset(bytes + at, 'a', 256);
 	stored_old_head(bytes, 3, &back);
 	assert_int_equal(back.looks.count, 64);

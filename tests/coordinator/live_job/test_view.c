@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A job as JSON, as status and records show it: counters of strategies, the estimated error or the reason why none is
- * stated, the forecast, the share of the work that is done, and the core's numbers instead of the record's while the
- * job is not over.
+ * A job as JSON, as the status and records show it: counters of strategies, the estimated error or the reason why none
+ * is stated, the forecast, and the share of the work that is done. While the job is not over, the core's numbers
+ * replace those of its record.
  */
 #include "coordinator/live_job/view.h"
 
@@ -78,7 +78,7 @@ static void json_of_other_jobs_has_none(void **state)
 	json_decref(o);
 }
 
-/* An error that is not stated is null, and why stands beside it, until an image has one that is. */
+/* An error that is not stated is null, with the reason beside it, until an image has an error that is stated. */
 static void json_says_why_no_error_is_stated(void **state)
 {
 	(void)state;
@@ -122,7 +122,7 @@ static void json_shows_the_forecast(void **state)
 	assert_true(json_number_value(json_object_get(json_object_get(o, "etaRange"), "low")) == 20);
 	assert_int_equal(json_array_size(json_object_get(o, "looks")), 8);
 	json_decref(o);
-	strcpy(v.record.state, "done"); /* what has ended has no future */
+	strcpy(v.record.state, "done"); /* an ended job has no forecast */
 	o = view_to_json(&v, true);
 	assert_true(json_is_null(json_object_get(o, "nextHalving")) && json_is_null(json_object_get(o, "etaRange")));
 	assert_int_equal(json_array_size(json_object_get(o, "looks")), 8);
@@ -171,7 +171,7 @@ static void shows_the_share(void **state)
 	json_decref(o);
 }
 
-/* While a job is not over, the core's numbers replace those of its record; the rest of the record stays. */
+/* While a job is not over, the core's numbers replace those of its record; all other fields of the record stay. */
 static void shows_what_the_core_says(void **state)
 {
 	(void)state;
@@ -210,7 +210,7 @@ static void shows_what_the_core_says(void **state)
 	assert_true(v.eta == -1 && v.eta_low == -1 && v.eta_high == -1);
 }
 
-/* As hslt-submit --estimate gets them. */
+/* The estimates as hslt-submit --estimate receives them. */
 static void looks_travel(void **state)
 {
 	(void)state;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Orders whose records are flushed slowly, and lists of many jobs, asked for as fast as a client can: others are
- * answered meanwhile, and the requests of one client in their order.
+ * One client sends orders whose records are flushed slowly, or asks for lists of many jobs, as fast as it can: other
+ * clients are answered meanwhile, and the requests of one client are answered in their order.
  */
 #include "tests/support/served.h"
 
@@ -74,7 +74,7 @@ static void send_order(struct scripted *client, Farm__Verb verb, int priority)
 	peer_say(client, &m, NULL, 0);
 }
 
-/* The priority of the first job, if there are so many. */
+/* Returns the priority of the first job; the list must have `jobs` jobs. */
 static int hear_list(struct scripted *client, unsigned jobs)
 {
 	const Farm__Envelope *m = scripted_hear(client);
@@ -114,12 +114,12 @@ static void who_gives_orders_stops_nobody(void **state)
 	for (int i = 1; i <= ORDERS; i++)
 		send_order(master, FARM__VERB__VERB_PRIORITY, i);
 	peer_say_empty(master, FARM__ENVELOPE__BODY_JOB_LIST);
-	for (int last = 0; last < ORDERS; looks++) { /* some of which are in the middle */
+	for (int last = 0; last < ORDERS; looks++) { /* some looks come in the middle of the orders */
 		int now = ask_for_list(other, 1);
 		assert_in_range(now, last, ORDERS);
 		last = now;
 	}
-	assert_true(looks > 1); /* a server that first answers all of one client: 0, or 1 */
+	assert_true(looks > 1); /* a server that first answers all orders of one client would give 0 or 1 */
 	assert_in_range(commits->count - before, ORDERS, 3 * ORDERS);
 	for (int i = 0; i < ORDERS; i++)
 		hear_done(master);
@@ -128,7 +128,7 @@ static void who_gives_orders_stops_nobody(void **state)
 	scripted_hang_up(other);
 }
 
-/* The lists take some hundred milliseconds together, in fewer bytes than may wait for a client. */
+/* The lists take some hundred milliseconds together, and fewer bytes than may wait for a client. */
 static void who_asks_for_lists_stops_nobody(void **state)
 {
 	(void)state;
@@ -147,7 +147,7 @@ static void who_asks_for_lists_stops_nobody(void **state)
 	while (ask_for_list(other, JOBS) != PRIORITY)
 		looks++;
 	print_message("%u lists for another client during %d\n", looks, LISTS);
-	assert_true(looks > 1); /* a server that first answers all of one client: 0, or 1 */
+	assert_true(looks > 1); /* a server that first answers all requests of one client would give 0 or 1 */
 	for (int i = 0; i < LISTS; i++)
 		assert_true(hear_list(master, JOBS) != PRIORITY);
 	hear_done(master);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The coordinator against bad peers, over real sockets: bytes that are no messages, too many connections, peers that
- * never say hello, read nothing, send too slowly or submit what cannot be. Each is refused or disconnected with a
+ * The coordinator against bad peers, over real sockets: bytes that are no messages, too many connections, and peers
+ * that never say hello, read nothing, send too slowly or submit invalid jobs. Each is refused or disconnected with a
  * reason, others are served meanwhile, and the coordinator's memory stays bounded.
  */
 #include "tests/support/served.h"
@@ -52,7 +52,7 @@ static void rubbish_is_disconnected(void **state)
 		struct scripted *p = peer_call();
 		peer_say_bytes(p, rubbish[i].bytes, rubbish[i].size);
 		const Farm__Envelope *m = scripted_hear(p);
-		if (m) { /* who is understood is told what is wrong */
+		if (m) { /* a peer whose message was understood is told what is wrong */
 			assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_FAULT);
 			assert_null(scripted_hear(p));
 		}
@@ -67,7 +67,7 @@ static void stragglers_are_disconnected(void **state)
 	struct scripted *silent = peer_call(), *half = peer_call(), *client = peer_call();
 	peer_say_bytes(half, "\0\0\0\x20", 4);
 	assert_true(peer_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
-	peer_say_bytes(client, "\0\0\0\x20\0\0\0\0abc", 11); /* begun and never finished */
+	peer_say_bytes(client, "\0\0\0\x20\0\0\0\0abc", 11); /* a message that is never finished */
 	assert_null(scripted_hear(silent));
 	assert_null(scripted_hear(half));
 	assert_null(scripted_hear(client));
@@ -93,7 +93,7 @@ static void crowds_are_turned_away(void **state)
 	served_works_again();
 }
 
-/* Without memory for a connection nobody is accepted; once there is memory, all are. */
+/* Without memory for a connection no peer is accepted; once there is memory, all are. */
 static void a_caller_waits_for_memory(void **state)
 {
 	(void)state;
@@ -166,15 +166,15 @@ static void submissions_are_looked_at(void **state)
 	assert_true(*peer_submit_answer(p)->refusal);
 	peer_submit(p, NULL, "<scene/>", "s.xml", "s.xml");
 	assert_int_equal(peer_submit_answer(p)->n_missing, 1);
-	peer_send_blob(p, "<scene/>", "<SCENE/>"); /* other bytes than promised */
+	peer_send_blob(p, "<scene/>", "<SCENE/>"); /* the bytes do not match the hash */
 	const Farm__SubmitAnswer *a = peer_submit_answer(p);
 	assert_true(a->job == 0 && *a->refusal);
-	peer_send_blob(p, "<scene/>", "<scene/>"); /* nobody asked */
+	peer_send_blob(p, "<scene/>", "<scene/>"); /* a file that nobody asked for */
 	scripted_hang_up(p);
 	served_still_works();
 }
 
-/* A worker may send the longest states that there are: memory must have room for them. */
+/* A worker may send the longest chain states that there are: memory must have room for them. */
 static void chains_need_memory(void **state)
 {
 	(void)state;
@@ -194,11 +194,11 @@ static void chains_need_memory(void **state)
 	scripted_hang_up(p);
 }
 
-/* ---- who asks and does not read ---- */
+/* ---- peers that ask and do not read ---- */
 
 enum { PIECE = 1 << 20 };
 
-/* false: it hung up. */
+/* Returns false if the coordinator hung up. */
 static bool say_piece_gets(const struct scripted *p, const struct blob_hash *h, int count)
 {
 	Farm__Envelope m;
@@ -215,8 +215,8 @@ static bool say_piece_gets(const struct scripted *p, const struct blob_hash *h, 
 	return true;
 }
 
-/* A worker may ask for what all its jobs need at once, and gets it; what it does not read does not fill our memory, and
- * when it goes on asking it is disconnected. */
+/* A worker may ask at once for all files of all its jobs, and gets them. The answers that it does not read do not fill
+ * the coordinator's memory, and when it goes on asking it is disconnected. */
 static void the_deaf_cost_little(void **state)
 {
 	(void)state;
@@ -248,10 +248,11 @@ static void the_deaf_cost_little(void **state)
 	}
 	served_still_works();
 	assert_true(served_kilobytes() - before <
-		    500 * 1024); /* of 2,000 MB that were asked for; a sanitizer keeps 256 MB that were freed */
+		    500 * 1024); /* of 2,000 MB that were asked for; a sanitizer keeps up to 256 MB of freed memory */
 	for (int i = 0; i < 4; i++) {
 		const Farm__Envelope *m;
-		say_piece_gets(deaf[i], &h, 1000); /* too many, though the system may hold 100 MB of answers */
+		say_piece_gets(deaf[i], &h,
+			       1000); /* too many requests, though the system may buffer 100 MB of answers */
 		while ((m = scripted_hear(deaf[i])) && m->body_case == FARM__ENVELOPE__BODY_BLOB_CHUNK)
 			continue;
 		assert_true(!m || strstr(m->fault->text, "no worker needs so many"));

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A scene of many small files: the loop's thread flushes none of them, the job is acknowledged when all are flushed,
- * and what a client leaves behind that goes midway is removed. Room for files is had by those who send them: neither an
- * announcement nor a part of a file keeps others out for long.
+ * A scene of many small files: the loop's thread flushes none of them, the job is acknowledged once all are flushed,
+ * and what a client that disconnects midway has sent is removed. Room for files goes to the clients that send them:
+ * neither an announcement nor a part of a file keeps others waiting for long.
  */
 #include "common/base/disk.h"
 #include "coordinator/jobs/room.h"
@@ -26,11 +26,11 @@ enum { FILES = 400 };
 /* Shared with the server. */
 static struct flushes {
 	_Atomic unsigned on_loop, elsewhere;
-	_Atomic unsigned looks_at_once; /* most looks at files in one turn of the loop */
+	_Atomic unsigned looks_at_once; /* most file accesses in one turn of the loop */
 	_Atomic unsigned touched_at_once, removed_at_once, removed;
 	_Atomic bool hold;     /* flushes of files wait */
-	_Atomic unsigned from; /* those from this number on wait; 0: none */
-	_Atomic uint64_t room; /* bytes that the disk has; 0: those of the real one */
+	_Atomic unsigned from; /* flushes from this number on wait; 0: none */
+	_Atomic uint64_t room; /* free bytes that the disk reports; 0: those of the real disk */
 } * flushes;
 
 static int counted_fsync(int fd)
@@ -54,7 +54,7 @@ static int counted_stat(const char *path, struct stat *st)
 	return disk_system.stat(path, st);
 }
 
-/* Counts one more of what may be done often in one turn. */
+/* Counts one more call of a kind of which one turn of the loop may make only a few. */
 static void count_in_turn(unsigned *turn, unsigned *count, _Atomic unsigned *most)
 {
 	*count = *turn == served_turn() ? *count + 1 : 1;
@@ -98,7 +98,7 @@ static void count_flushes(const char *spool)
 	disk_use(&counted);
 }
 
-/* Files from before a restart, when the limit was higher: all but 64 exceed that of this one. */
+/* Files from before a restart, when the limit was higher: all but 64 of them exceed the new limit. */
 enum { STORED = 500, STORED_BYTES = 1 << 14, STORED_LEFT = (1 << 20) / STORED_BYTES };
 static void store_too_much(const char *spool)
 {
@@ -144,7 +144,7 @@ static int set_up_with_too_much(void **state)
 
 static int tear_down(void **state)
 {
-	flushes->hold = false; /* where a test failed, the server would wait for ever */
+	flushes->hold = false; /* a failed test would leave the server waiting for ever */
 	flushes->from = 0;
 	munmap(flushes, sizeof *flushes);
 	return served_stop(state);
@@ -157,7 +157,7 @@ static void text_of(int i, char text[32])
 	snprintf(text, 32, i ? "v %d 0 0\n" : "<scene/>", alike && i ? 7 : i);
 }
 
-/* A scene and FILES - 1 files of a few bytes. */
+/* Submits a scene file and FILES - 1 files of a few bytes. */
 static void submit_many(struct scripted *client)
 {
 	static Farm__File files[FILES], *list[FILES];
@@ -239,13 +239,13 @@ static void the_loop_flushes_no_file(void **state)
 	assert_int_equal(m->job_list_answer->n_jobs, 0);
 	send_files(client, FILES - 1, FILES);
 	assert_int_equal(peer_submit_answer(client)->job, 1);
-	assert_in_range(flushes->on_loop - before, 0, 20); /* of the job */
+	assert_in_range(flushes->on_loop - before, 0, 20); /* the files of the job itself */
 	assert_in_range(flushes->elsewhere, FILES, 3 * FILES);
 	submit_many(client);
-	assert_int_equal(peer_submit_answer(client)->job, 2); /* none is missing */
+	assert_int_equal(peer_submit_answer(client)->job, 2); /* no file is missing */
 	assert_in_range(flushes->looks_at_once, 1, FILES / 2);
 	assert_in_range(flushes->touched_at_once, 0, FILES / 2);
-	struct scripted *other = call_client(); /* and two at once, one of which gives up */
+	struct scripted *other = call_client(); /* and two clients at once, one of which gives up */
 	submit_many(client);
 	submit_many(other);
 	scripted_hang_up(other);
@@ -253,7 +253,7 @@ static void the_loop_flushes_no_file(void **state)
 	scripted_hang_up(client);
 }
 
-/* The loop answers between pieces of what has to go. */
+/* Files are deleted in pieces, and the loop answers peers between these. */
 static void a_smaller_limit_is_reached_in_pieces(void **state)
 {
 	(void)state;
@@ -295,7 +295,7 @@ static void who_goes_midway_leaves_nothing(void **state)
 	scripted_hang_up(client);
 }
 
-/* A client that has sent half a scene, of which the first file is being flushed: all but a few of the others will be
+/* Returns a client that has sent half a scene, the first file of which is being flushed; nearly all other files will be
  * flushed together. */
 static struct scripted *sends_half(void)
 {
@@ -309,7 +309,7 @@ static struct scripted *sends_half(void)
 	return client;
 }
 
-/* While the first file is flushed, all others of half a scene have arrived. */
+/* While the first file is flushed, all other files of half a scene have arrived. */
 static void the_loop_removes_few_files(void **state)
 {
 	(void)state;
@@ -323,14 +323,14 @@ static void the_loop_removes_few_files(void **state)
 	assert_int_equal(count_temporary_files(), 0);
 	served_still_works();
 	assert_in_range(flushes->removed, 0, 10);
-	/* What was flushed for nobody is in the store. */
+	/* The files whose client has gone are in the store. */
 	client = call_client();
 	submit_many(client);
 	assert_in_range(peer_submit_answer(client)->n_missing, FILES / 2, FILES - 1);
 	scripted_hang_up(client);
 }
 
-/* Whoever hangs up keeps no thread of the pool with the rest of thousands of files. */
+/* A client that hangs up does not keep a thread of the pool busy with the rest of thousands of files. */
 static void nobody_flushes_for_nobody(void **state)
 {
 	(void)state;
@@ -351,7 +351,7 @@ static void nobody_flushes_for_nobody(void **state)
 	served_still_works();
 }
 
-/* Each is sent once. */
+/* Each file is sent once. */
 static void a_file_that_was_sent_is_not_taken_again(void **state)
 {
 	(void)state;
@@ -366,7 +366,7 @@ static void a_file_that_was_sent_is_not_taken_again(void **state)
 	scripted_hang_up(client);
 }
 
-/* The disk has room for the films and both contents, or for one byte less. */
+/* The disk has room for the films and for both files, or for one byte less. */
 static void equal_files_need_room_once(void **state)
 {
 	(void)state;
@@ -405,7 +405,7 @@ static void send_part(struct scripted *p, const char *text, size_t from, size_t 
 	peer_say(p, &m, text + from, to - from);
 }
 
-/* However many clients stop midway, they hold no descriptors. */
+/* Clients that stop midway hold no file descriptors, however many they are. */
 static void half_a_file_is_not_open(void **state)
 {
 	(void)state;
@@ -414,7 +414,7 @@ static void half_a_file_is_not_open(void **state)
 	assert_true(peer_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
 	peer_submit(client, NULL, text, "s.xml", "s.xml");
 	assert_int_equal(peer_submit_answer(client)->n_missing, 1);
-	for (size_t i = 0; i < 5; i++) { /* the first has no bytes */
+	for (size_t i = 0; i < 5; i++) { /* the first client has sent no bytes */
 		send_part(client, text, i ? i - 1 : 0, i);
 		peer_say_empty(client, FARM__ENVELOPE__BODY_JOB_LIST);
 		assert_int_equal(scripted_hear(client)->body_case, FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
@@ -425,7 +425,7 @@ static void half_a_file_is_not_open(void **state)
 	scripted_hang_up(client);
 }
 
-/* A file of more than half of what there is room for; its first bytes are another for each letter. */
+/* Returns a file of more than half the free space; its first bytes depend on the letter. */
 static const char *large_file(char letter)
 {
 	static char text[(600 << 10) + 1];
@@ -463,7 +463,7 @@ static void announcements_take_no_room(void **state)
 	scripted_hang_up(idle);
 }
 
-/* Both are halfway, and only one has room to go on. */
+/* Both files are half sent, and there is room to complete only one. */
 static void who_came_first_has_room(void **state)
 {
 	(void)state;

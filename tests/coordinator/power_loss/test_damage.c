@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The spool is damaged while no coordinator runs. What is not known is never deleted; what can be known again is; what
- * was lost is said and computed again, to the same bits, and nothing else is. Each run: power is lost in the middle of
- * the work, something is damaged, and the next start, which another loss of power may end, continues. Results that were
- * acknowledged and are handed out again are counted.
+ * The spool is damaged while no coordinator runs. Files whose meaning is unknown are never deleted; what can be
+ * restored is restored; what was lost is reported and computed again, to the same bits, and nothing else is computed
+ * again. Each run: power is lost in the middle of the work, something is damaged, and the next start, which another
+ * loss of power may interrupt, continues. The acknowledged results that are handed out again are counted.
  */
 #include "tests/support/folder.h"
 #include "tests/support/length.h"
@@ -51,7 +51,7 @@ static void flip(const char *path, uint64_t at)
 	write_file(path, size);
 }
 
-/* Into path: the largest file of that name. 0: there is none. */
+/* Writes the path of the largest file of that name, and returns its size; 0: there is none. */
 static size_t largest(const char *name, char path[256])
 {
 	glob_t g;
@@ -73,7 +73,8 @@ static size_t largest(const char *name, char path[256])
 static void begin(uint64_t seed)
 {
 	snprintf(outage.running, sizeof outage.running, "seed %llu", (unsigned long long)seed);
-	/* On a busy machine more results share a flush, and all is done with fewer calls: then earlier. */
+	/* On a busy machine more results share a flush and the work needs fewer disk calls: then power is lost earlier.
+	 */
 	for (unsigned eighths = 3 + seed % 4;; eighths--) {
 		assert_true(eighths > 0);
 		outage_begin(&run, seed);
@@ -111,7 +112,8 @@ static void run_before_damage(uint64_t journal_bytes)
 	take_lost();
 }
 
-/* One bit anywhere in a journal of many results: one of them is computed again at most, and those behind it are not. */
+/* One bit flips anywhere in a journal of many results: at most one result is computed again, and none of those after
+ * it. */
 static void a_bit_of_a_journal(void **state)
 {
 	(void)state;
@@ -130,7 +132,7 @@ static void a_bit_of_a_journal(void **state)
 		uint64_t at = 40 + seed * 7919 * 131 % (size - 40 - BATCH_LEAST);
 		flip(path, at);
 		behind += (size - at) / (2 * BATCH_LEAST);
-		if (seed % 3 == 0) { /* and once more, before all that waits has been taken up */
+		if (seed % 3 == 0) { /* and power is lost again before all waiting results are taken up */
 			run.disk.lose_at = outage.quiet_calls / 6;
 			if (outage_start(&run))
 				outage_work(&run);
@@ -148,9 +150,9 @@ static void a_bit_of_a_journal(void **state)
 	}
 	printf("   %llu bits: %llu results computed again, %llu behind them were not\n", (unsigned long long)runs,
 	       (unsigned long long)all, (unsigned long long)behind);
-	/* Bits of the torn tail, or of what a checkpoint already has, cost nothing: from half of them (10 of 21, alone
-	 * on a machine) to three quarters (15 of 20, sanitized on a busy one). Some must, or no bit was tried that
-	 * matters. */
+	/* Bits in the torn tail, or in records that a checkpoint already covers, cost nothing: half of the bits (10 of
+	 * 21, alone on a machine) to three quarters (15 of 20, sanitized on a busy one). Some flips must cost a result,
+	 * or no bit that matters was tried. */
 	assert_true(runs > most / 3 && all > 0 && behind > 2 * runs);
 }
 
@@ -163,7 +165,7 @@ static void in_root(const char *command)
 	assert_int_equal(system(text), 0);
 }
 
-/* In one of the two files, which sql calls main; the other is `other`. */
+/* Runs the statement on one of the two files, which is `main` in the SQL; the other file is `other`. */
 static void change_rows(const char *file, const char *sql)
 {
 	char path[256], attach[300];
@@ -186,8 +188,8 @@ static void flip_in(const char *name, uint64_t seed)
 	flip(path, seed * 7919 * 104729 % size);
 }
 
-/* A job whose submission was under way when power was lost may be in one file alone. It was not acknowledged, and a
- * damaged row is all that is left of it: then the start is refused. So these are not damaged. */
+/* A job whose submission was under way when power was lost may be in one file only. It was not acknowledged, and if
+ * that file's row is damaged nothing else is left of it: the start is refused. So these rows are not damaged. */
 #define IN_BOTH "id IN (SELECT id FROM other.jobs)"
 
 /* All that was acknowledged is there afterwards, and nothing is computed again. */
@@ -228,7 +230,7 @@ static void damaged_database(void **state)
 				 "echo no database, and none that anybody would take for one >%s; rm %s", file, wal);
 			in_root(command);
 			break;
-		case 6: /* the wal goes into the database first */
+		case 6: /* the write-ahead log is moved into the database first */
 			change_rows(file,
 				    "UPDATE jobs SET plan = CAST(substr(plan, 1, length(plan) - 1) || x'07' AS BLOB) "
 				    "WHERE ended IS NULL AND " IN_BOTH);
@@ -254,8 +256,8 @@ static void damaged_database(void **state)
 	}
 }
 
-/* Neither file knows what a job is: the start is refused, and nothing is touched; then it is kept as damaged, and the
- * others go on. */
+/* Neither file can say what a job is: the start is refused, and nothing is touched; then the job is kept as damaged,
+ * and the others go on. */
 static void what_is_lost(void **state)
 {
 	(void)state;

@@ -1,21 +1,21 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Power is lost at a random call of the disk, again and again, while a coordinator takes jobs, merges, writes
- * checkpoints and results; each restart continues with what the disk kept (tests/support/faulty_disk.h). Whatever was
- * acknowledged is there: jobs, batches (a lease whose result was acknowledged is not handed out again), results that
- * were said to be there; and the image has the bits of an undisturbed run, which it has not if a batch is missing or
- * counted twice.
+ * Power is lost at a random disk call, again and again, while a coordinator takes jobs, merges results, and writes
+ * checkpoints and images; each restart continues with what the disk kept (tests/support/faulty_disk.h). All that was
+ * acknowledged must be there: jobs, results of leases (an acknowledged lease is not handed out again) and images that
+ * were announced. The final image must have the bits of an undisturbed run, which it would not have if a result were
+ * missing or counted twice.
  *
- * Then single calls fail, the n-th one of a run, in several ways: nothing crashes, what is refused is refused with a
- * sentence and taken later, what was acknowledged stays, and the images have the same bits. So do calls of a start that
- * finds jobs half done.
+ * Then single disk calls fail, the n-th one of a run, in several ways: nothing crashes, a refused request gets a
+ * sentence and succeeds later, what was acknowledged stays, and the images have the same bits. The same is done to the
+ * disk calls of a start that finds jobs half done.
  *
- * What must not be is counted, and each of the two tests ends with a line of what it did and counted:
- * tests/e2e/faults/disk.sh makes rows of a table of them.
+ * Violations are counted, and each of the two tests ends with a line of what it did and counted:
+ * tests/e2e/faults/disk.sh makes rows of a table from these lines.
  *
- * HSLT_POWER_SEEDS: so many runs (default 150; FULL=1: 4000). HSLT_POWER_SEED: this one alone, with the coordinator's
- * log. HSLT_FAULT, HSLT_FAULT_AT: this kind, at this call alone. HSLT_FAULT_STEP: every so many calls (default 72;
- * FULL=1: each).
+ * HSLT_POWER_SEEDS: the number of runs (default 150; FULL=1: 4000). HSLT_POWER_SEED: runs this seed alone, with the
+ * coordinator's log. HSLT_FAULT, HSLT_FAULT_AT: only this kind of failure, only at this call. HSLT_FAULT_STEP: distance
+ * between failing calls (default 72; FULL=1: 1).
  */
 #include "common/base/checked_file.h"
 #include "common/base/version.h"
@@ -39,10 +39,10 @@
 
 enum { STARTS_MAX = 12, KINDS = 4 /* of calls that fail */, TESTS = 4 /* that count */ };
 
-static struct sums { /* of all shares */
+static struct sums { /* over all shares of the work */
 	struct outage_found found;
 	_Atomic uint64_t losses, acks, taken, runs[KINDS], refused[KINDS], failed[KINDS];
-} * sums, *now; /* of the tests; of the one that runs */
+} * sums, *now; /* sums: one for each test; now: of the running test */
 static unsigned share;
 
 /* ---- runs ---- */
@@ -78,7 +78,8 @@ static void run_seed(uint64_t seed, uint64_t *losses, uint64_t *acks)
 	*acks += f.acks;
 }
 
-/* Calls fail, from the n-th on; then all is well again, power is lost, and all that was acknowledged is there. */
+/* Calls fail from the n-th on; then the disk works again, power is lost, and all that was acknowledged must be there.
+ */
 static void run_faults(uint64_t from, uint64_t count, int with, bool writes_only, uint64_t *refused, uint64_t *failed)
 {
 	static struct farm_run f;
@@ -98,7 +99,7 @@ static void run_faults(uint64_t from, uint64_t count, int with, bool writes_only
 		if (outage_gone(&f, true) == FAULTY_DISK_EXIT)
 			outage_swap_folders(&f);
 		else
-			f.refused++; /* it did not start, and said why */
+			f.refused++; /* it did not start, and gave the reason */
 		f.disk.fail_from = 0;
 	}
 	outage_cut_power(&f);
@@ -111,8 +112,9 @@ static void run_faults(uint64_t from, uint64_t count, int with, bool writes_only
 	*failed += f.failed;
 }
 
-/* Power is lost in the middle of the work; calls of the next start fail, from the n-th on. It starts or says why not;
- * no job fails of it, and all that was acknowledged is there, then or after another start. */
+/* Power is lost in the middle of the work; then calls of the next start fail, from the n-th on. The coordinator starts
+ * or says why not; no job fails because of it, and all that was acknowledged is there, after this start or another one.
+ */
 static bool begin_restart(struct farm_run *f, uint64_t from)
 {
 	outage_begin(f, from);
@@ -177,7 +179,7 @@ static void assert_no_harm(void)
 
 static void say_harm(const char *what, uint64_t times)
 {
-	if (share == 0) /* the last to come here */
+	if (share == 0) /* the last share to get here */
 		printf("   %s: times=%llu lost=%llu doubled=%llu images=%llu unequal=%llu\n", what,
 		       (unsigned long long)times, (unsigned long long)now->found.harm[LOST],
 		       (unsigned long long)now->found.harm[DOUBLED], (unsigned long long)now->found.images,
@@ -298,7 +300,7 @@ static void starts_fail_at_any_time(void **state)
 	say_harm("failing starts", times);
 }
 
-/* ---- what another coordinator wrote, and what somebody removed ---- */
+/* ---- rows that another version wrote, and files that somebody removed ---- */
 
 enum { FILE_MOST = 1 << 20 };
 
@@ -325,7 +327,7 @@ static void write_file(const char *path, const unsigned char *bytes, size_t size
 	checked_file_close(&out);
 }
 
-/* A submission as another coordinator may have written it, with so many bytes more. */
+/* Changes a submission to what another version may have written, longer by `more` bytes. */
 static void change_row(uint64_t id, const char *version, int more)
 {
 	static unsigned char submission[FILE_MOST];
@@ -344,7 +346,7 @@ static void change_row(uint64_t id, const char *version, int more)
 	ledger_close(l);
 }
 
-/* How many such files there are; the last of them in path. */
+/* Returns the number of files of that name; path becomes the last one's. */
 static size_t last_file(uint64_t job, const char *name, char path[256])
 {
 	glob_t g;
@@ -368,8 +370,8 @@ static bool is_done(uint64_t id)
 	return done;
 }
 
-/* The first job that the next start goes on with, from a checkpoint and a journal. A second journal would be that of a
- * checkpoint that did not get its name: it is removed unread. 0: none. */
+/* Returns the first job that the next start continues from a checkpoint and a journal; 0: none. A second journal would
+ * belong to a checkpoint that was not renamed: it is removed unread. */
 static uint64_t living_job(void)
 {
 	char path[256];
@@ -384,7 +386,7 @@ static uint64_t living_job(void)
 	return 0;
 }
 
-/* What a job has come to when power is lost is a matter of chance. */
+/* How far a job has come when power is lost is a matter of chance. */
 static uint64_t begin_living_restart(struct farm_run *f)
 {
 	uint64_t id = 0;
@@ -431,7 +433,7 @@ static void of_another_version(void **state)
 	assert_no_harm();
 }
 
-/* Its folder was removed: it fails, once and for all; the others go on. */
+/* The job's folder was removed: the job fails for good; the others go on. */
 static void without_its_folder(void **state)
 {
 	(void)state;
@@ -445,7 +447,7 @@ static void without_its_folder(void **state)
 	snprintf(command, sizeof command, "rm -r '%s/jobs/j%llu'", outage.root, (unsigned long long)id);
 	assert_int_equal(system(command), 0);
 	f.faulty = true;
-	assert_true(outage_start(&f) && outage_work(&f)); /* which submits another in its place */
+	assert_true(outage_start(&f) && outage_work(&f)); /* outage_work submits another job in its place */
 	assert_int_equal(f.failed, 1);
 	assert_false(f.jobs[id].submitted);
 	outage_stop(&f);

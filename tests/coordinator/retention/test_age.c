@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What finished jobs give up, by a clock of the test. */
+/* Which parts of finished jobs are deleted, and in which order, by a clock that the test sets. */
 #include "coordinator/retention/age.h"
 
 #include <stdarg.h>
@@ -10,7 +10,7 @@
 
 #define DAY 86400.0
 
-/* Films and results of 100 bytes, ended on days 5, 1, 3, 4, 2. */
+/* Films and results of 100 bytes each; the jobs ended on days 5, 1, 3, 4, 2. */
 static void fill(struct age_job jobs[5])
 {
 	static const double days[] = {5, 1, 3, 4, 2};
@@ -19,7 +19,8 @@ static void fill(struct age_job jobs[5])
 			.id = 10 + (uint64_t)i, .order = days[i], .ended = days[i] * DAY, .films = 100, .result = 100};
 }
 
-/* A letter a job, the first to end first: . nothing goes, f its films, r its result, x its record, too. */
+/* One letter per job, in the order of their ends: . nothing is deleted, f its films, r also its result, x also its
+ * record. */
 static void expect(const struct age_job jobs[5], const char *what)
 {
 	char seen[6] = "";
@@ -44,7 +45,7 @@ static void by_age(void **state)
 	expect(jobs, "rrr..");
 	age_choose(jobs, 5, &l, 33.5 * DAY);
 	expect(jobs, "xxxrr");
-	age_choose(jobs, 5, &l, -100 * DAY); /* a clock that jumps back */
+	age_choose(jobs, 5, &l, -100 * DAY); /* the clock jumps back */
 	expect(jobs, ".....");
 	l.seconds = 0;
 	age_choose(jobs, 5, &l, 1e6 * DAY);
@@ -62,7 +63,7 @@ static void by_space(void **state)
 	l.bytes = 999;
 	age_choose(jobs, 5, &l, 5 * DAY);
 	expect(jobs, "f....");
-	l.bytes = 550; /* all films before any result */
+	l.bytes = 550; /* all films go before any result */
 	age_choose(jobs, 5, &l, 5 * DAY);
 	expect(jobs, "fffff");
 	l.bytes = 300;
@@ -76,7 +77,7 @@ static void what_is_fetched_stays(void **state)
 	struct age_job jobs[5];
 	struct age_limits l = {1 * DAY, 0};
 	fill(jobs);
-	jobs[1].busy = true; /* the oldest */
+	jobs[1].busy = true; /* the oldest job */
 	age_choose(jobs, 5, &l, 100 * DAY);
 	expect(jobs, ".xxxx");
 	l = (struct age_limits){0, 300};
@@ -90,7 +91,7 @@ static void by_age_and_by_size(void **state)
 	struct age_job jobs[5];
 	struct age_limits l = {3 * DAY, 700};
 	fill(jobs);
-	age_choose(jobs, 5, &l, 5 * DAY); /* one by age, and 100 bytes more */
+	age_choose(jobs, 5, &l, 5 * DAY); /* one job by age, and another for 100 bytes */
 	expect(jobs, "rf...");
 	age_choose(jobs, 0, &l, 5 * DAY);
 }

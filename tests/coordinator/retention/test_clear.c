@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Finished jobs that are old go, with all that is in their folders and their rows, and nobody waits for it. */
+/* Old finished jobs are deleted, with everything in their folders and their rows, while nobody has to wait for it. */
 #include "common/base/disk.h"
 #include "common/base/log.h"
 #include "coordinator/retention/ages.h"
@@ -25,7 +25,7 @@ enum { JOBS = 120, LIVING = 7, YOUNG = 9, DAY = 86400 };
 
 static struct jobs jobs;
 
-/* Each look at a file takes 0.2 ms: 120 jobs are more than 20 ms. */
+/* Opening a file takes 0.2 ms, so looking at 120 jobs takes more than 20 ms. */
 static int slow_open(const char *path, int flags, mode_t mode)
 {
 	usleep(200);
@@ -77,7 +77,7 @@ static void add(uint64_t id, double ended)
 		assert_int_equal(ledger_end(jobs.ledger, &r, false, &e), 0);
 	assert_int_equal(spool_make_job(jobs.spool, id, &e), 0);
 	write_file(id, "result.exr");
-	write_file(id, "checkpoint.tmp"); /* of a run that was cut short */
+	write_file(id, "checkpoint.tmp"); /* left by an interrupted run */
 }
 
 static void open_jobs(void)
@@ -95,7 +95,7 @@ static void open_jobs(void)
 	jobs.seen = (struct age_clock){.seconds = 100.0 * DAY, .up = (double)up.tv_sec};
 }
 
-/* As a coordinator starts after a reboot that has set the wall clock ahead by so many seconds. */
+/* Starts as a coordinator does after a reboot that has set the wall clock ahead by this many seconds. */
 static void restart_after_reboot(double ahead)
 {
 	struct age_clock last = {
@@ -111,14 +111,14 @@ static void restart_after_reboot(double ahead)
 	while (jobs.clearing);
 }
 
-/* A clock that jumps by years, and back, removes nothing that is young, nor of three results for which there is too
- * little space another one than the oldest. */
+/* A clock that jumps by years, and back, removes nothing young; and of three results for which there is too little
+ * space it removes only the oldest. */
 static void jumps_of_the_wall_clock_remove_nothing(void **state)
 {
 	(void)state;
 	static const double jumps[] = {10 * 365.0 * DAY, -10 * 365.0 * DAY, 2.0 * DAY, -2.0 * DAY};
 	double now = (double)time(NULL);
-	for (int days = 0; days <= 2; days++) { /* 0: a quarter */
+	for (int days = 0; days <= 2; days++) { /* 0: a quarter of a day */
 		open_jobs();
 		jobs.config.clear_seconds = days ? days * (double)DAY : DAY / 4;
 		for (uint64_t id = 1; id <= 3; id++)
@@ -127,7 +127,7 @@ static void jumps_of_the_wall_clock_remove_nothing(void **state)
 			restart_after_reboot(jumps[k]);
 			for (uint64_t id = 1; id <= 3; id++)
 				assert_true(is_there(id, "result.exr") == (id > 1 || k == 0 || days == 0));
-			jobs.config.clear_bytes = days ? 10 : 0; /* two results */
+			jobs.config.clear_bytes = days ? 10 : 0; /* room for two results */
 		}
 		ledger_close(jobs.ledger);
 		spool_close(jobs.spool);
@@ -136,8 +136,8 @@ static void jumps_of_the_wall_clock_remove_nothing(void **state)
 	}
 }
 
-/* The last half hour of observed time was not stored when power was lost: the job that ended then is older all the same
- * than what ends now. */
+/* The last half hour of observed time was not stored when power was lost: a job that ended then is nevertheless older
+ * than one that ends now. */
 static void the_order_outlives_a_loss_of_power(void **state)
 {
 	(void)state;
@@ -147,7 +147,7 @@ static void the_order_outlives_a_loss_of_power(void **state)
 	restart_after_reboot(-(double)DAY);
 	assert_true(is_there(1, "result.exr"));
 	add(2, now);
-	jobs.config.clear_bytes = 5; /* one result */
+	jobs.config.clear_bytes = 5; /* room for one result */
 	jobs.clear_next = 0;
 	do
 		clear_tick(&jobs);
@@ -191,7 +191,7 @@ static void old_jobs_go_bit_by_bit(void **state)
 	spool_close(jobs.spool);
 }
 
-/* With rows as large as those of real jobs: nobody waits until all of them are read, nor until all are dropped. */
+/* With rows as large as those of real jobs: nobody waits until all rows are read, nor until all are deleted. */
 static void many_rows_are_read_bit_by_bit(void **state)
 {
 	(void)state;
@@ -220,13 +220,13 @@ static void many_rows_are_read_bit_by_bit(void **state)
 	} while (jobs.clearing);
 	print_message("   %d rows: %d KB, of which %d in one tick\n", ROWS, (int)((before - begin) >> 10),
 		      (int)(longest >> 10));
-	assert_true(before - begin > 12 * MB); /* all were looked at */
+	assert_true(before - begin > 12 * MB); /* all rows were looked at */
 	assert_true(longest < 8 * MB);
 	ledger_close(jobs.ledger);
 	spool_close(jobs.spool);
 }
 
-/* Records of an earlier version, and of a run whose clock was ahead: they are as young as they can be. */
+/* Records of an earlier version, and of a run whose clock was ahead, count as young as they can be. */
 static void of_unknown_age(void **state)
 {
 	(void)state;
@@ -258,7 +258,7 @@ static void of_unknown_age(void **state)
 	spool_close(jobs.spool);
 }
 
-/* What ended once more between the look and the end of it. */
+/* A job that was extended and ended again between the start and the end of the search stays. */
 static void what_has_changed_stays(void **state)
 {
 	(void)state;
@@ -287,7 +287,7 @@ static void what_has_changed_stays(void **state)
 	spool_close(jobs.spool);
 }
 
-/* Films are read while it is looked, and others while what was chosen goes. */
+/* Films that are read while the search goes on stay; so do films that are read while the chosen ones are deleted. */
 static void what_is_read_stays(void **state)
 {
 	(void)state;
@@ -300,7 +300,7 @@ static void what_is_read_stays(void **state)
 	for (uint64_t id = 1; id <= JOBS; id++)
 		add(id, (double)time(NULL) - 20 * DAY);
 	jobs.reading = &first;
-	do { /* the last job goes in a later tick than the first: 120 looks are more than one */
+	do { /* the last job goes in a later tick than the first: looking at 120 jobs takes more than one tick */
 		clear_tick(&jobs);
 		if (!is_there(1, "result.exr"))
 			jobs.reading = &second;
@@ -319,7 +319,8 @@ static bool somebody_fetches(const struct peers *user, uint64_t job)
 	return is_fetching && job == 1;
 }
 
-/* By space: a result that a client waits for stays until it was fetched, and goes soon after, not in an hour. */
+/* When space is short, a result that a client waits for stays until it was fetched, and goes soon afterwards rather
+ * than after an hour. */
 static void what_has_just_ended_is_fetched_first(void **state)
 {
 	(void)state;
@@ -346,8 +347,8 @@ static void what_has_just_ended_is_fetched_first(void **state)
 	spool_close(jobs.spool);
 }
 
-/* What is left of a folder without a row is taken for a job that was lost, and the next start would be refused: the
- * row stays until the folder is gone. */
+/* A folder without a row would be taken for a lost job, and the next start would be refused: the row stays until the
+ * folder is gone. */
 static void what_is_left_of_a_folder_has_its_row(void **state)
 {
 	(void)state;

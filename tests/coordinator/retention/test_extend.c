@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The plan of an extended job. It has the later bounds and everything else as before, so that a job extended twice has
- * the bits of one long job; bounds that are met already, or that no job could end at, are refused with a sentence.
+ * The plan of an extended job. It has the new bounds and everything else as before, so that a job extended twice gives
+ * the bits of one long job; bounds that are already met, or at which no job could end, are refused with a sentence.
  */
 #include "coordinator/jobs/extend.h"
 
@@ -55,7 +55,7 @@ static void expect_refusal(struct job *j, struct extension x, const char *text)
 		fail_msg("'%s' is not in '%s'", text, j->e.text);
 }
 
-/* In two steps or in three, the plan is that of one long job cut as the short one was. */
+/* Whether extended once or twice, the plan is that of one long job, cut where the short one ended. */
 static void as_one_long_one(void **state)
 {
 	(void)state;
@@ -76,10 +76,10 @@ static void as_one_long_one(void **state)
 			assert_int_equal(plan_make(&all, &one, &j.e), 0);
 			assert_int_equal(extend(&j, (struct extension){.spp = 100}), 0);
 			assert_true(j.plan.rounds > j.from.rounds);
-			j.from.ended = spp % 2; /* while it runs or when it is done */
+			j.from.ended = spp % 2; /* while the job runs, or when it is done */
 			j.from.rounds = spp % 2 ? j.plan.rounds : j.plan.rounds - 1;
 			int rc = extend(&j, (struct extension){.mutations = 3 * 48 * 40});
-			if (rc) /* the last round held that many more already */
+			if (rc) /* the last round was already larger by as many samples */
 				assert_true(j.from.ended && one.rounds == j.plan.rounds);
 			assert_memory_equal(&one, &j.plan, sizeof one);
 		}
@@ -93,7 +93,7 @@ static void bounds_that_are_met(void **state)
 	r.spp = 100;
 	r.seconds = 10;
 	r.target_error = 0.05;
-	/* the error was met: more samples lift it, but not the time */
+	/* the job met its error: more samples replace that bound, but not the time limit */
 	make_job(&j, &r, 3, true);
 	j.from.seconds = 5;
 	j.from.error = 0.04;
@@ -104,32 +104,32 @@ static void bounds_that_are_met(void **state)
 	j.from.error = 0.04;
 	assert_int_equal(extend(&j, (struct extension){.spp = 100}), 0);
 	assert_true(j.plan.target_error == 0 && j.plan.seconds == 10 && j.plan.rounds > rounds);
-	/* a lower one leaves the rest as it was */
+	/* a lower target leaves the other bounds as they were */
 	make_job(&j, &r, 3, true);
 	j.from.seconds = 5;
 	j.from.error = 0.04;
 	assert_int_equal(extend(&j, (struct extension){.target_error = 0.01}), 0);
 	assert_true(j.plan.target_error == 0.01 && j.plan.seconds == 10 && j.plan.rounds == rounds);
-	/* the time was up */
+	/* the time limit was met */
 	make_job(&j, &r, 3, true);
 	assert_int_equal(extend(&j, (struct extension){.spp = 1}), 0);
 	assert_true(j.plan.seconds == 0 && j.plan.target_error == 0.05);
 	make_job(&j, &r, 3, true);
 	assert_int_equal(extend(&j, (struct extension){.seconds = 3}), 0);
 	assert_true(j.plan.seconds == 13 && j.plan.rounds == rounds);
-	/* all rounds were done: an error, a time say how long it goes on */
+	/* all rounds were done: an error or a time says how long the job goes on */
 	make_job(&j, &r, 0, true);
 	j.from.seconds = 5;
 	assert_int_equal(extend(&j, (struct extension){.target_error = 0.01}), 0);
 	assert_true(j.plan.rounds == UINT64_MAX && j.plan.seconds == 10);
-	/* of one that runs nothing is lifted */
+	/* the bounds of a running job are kept */
 	make_job(&j, &r, 3, false);
 	j.from.error = 0.04;
 	assert_int_equal(extend(&j, (struct extension){.seconds = 3}), 0);
 	assert_true(j.plan.seconds == 13 && j.plan.rounds == rounds && j.plan.target_error == 0.05);
 }
 
-/* The bounds of an extension that was cancelled are nobody's any more: it goes on from what is done. */
+/* The bounds of an extension that was cancelled no longer apply: the next extension continues from what is done. */
 static void after_a_cancelled_one(void **state)
 {
 	(void)state;
@@ -150,7 +150,7 @@ static void after_a_cancelled_one(void **state)
 	assert_true(j.plan.rounds == UINT64_MAX && j.plan.seconds == 13 && j.plan.target_error == 0);
 }
 
-/* One sample per pixel is that of one group, and would go on for ever. */
+/* With one sample per pixel the job has one group, so its error is never known and it would never end. */
 static void to_an_error_that_is_never_known(void **state)
 {
 	(void)state;
@@ -174,7 +174,7 @@ static void without_a_bound(void **state)
 	r.seconds = 10;
 	make_job(&j, &r, 7, true);
 	uint64_t epoch = j.plan.epoch;
-	assert_int_equal(extend(&j, (struct extension){.mutations = 1}), 0); /* beyond what is done */
+	assert_int_equal(extend(&j, (struct extension){.mutations = 1}), 0); /* beyond the mutations that are done */
 	assert_true(j.plan.rounds == 8 && j.plan.seconds == 0 && j.plan.epoch == epoch);
 	make_job(&j, &r, 7, false);
 	expect_refusal(&j, (struct extension){.spp = 8}, "no bound on samples");

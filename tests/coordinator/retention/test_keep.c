@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Films of finished jobs: those that ended first go when there are too many, all go for a running job; results stay. */
+/* Films of finished jobs: those of the oldest jobs are deleted when there are too many, all of them when a running job
+ * needs the room; results stay. */
 #include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "coordinator/retention/keep.h"
@@ -67,7 +68,7 @@ static void add(uint64_t id)
 	assert_int_equal(ledger_end(jobs.ledger, &r, true, &e), 0);
 }
 
-/* It can be extended. */
+/* Returns whether the job can be extended. */
 static bool has_submission(uint64_t id)
 {
 	struct error e;
@@ -97,7 +98,7 @@ static void the_first_go_first(void **state)
 	assert_true(!has_submission(3) && has_submission(1));
 	assert_true(keep_drop_all(&jobs));
 	assert_false(is_there(1, "journal.2") || is_there(2, "checkpoint"));
-	assert_false(keep_drop_all(&jobs)); /* there is nothing more to be had */
+	assert_false(keep_drop_all(&jobs)); /* there is nothing more to delete */
 	for (uint64_t id = 1; id <= 3; id++)
 		assert_true(is_there(id, "result.exr"));
 	ledger_close(jobs.ledger);
@@ -120,8 +121,8 @@ static void end_at(uint64_t id, double seconds)
 	mem_free(record);
 }
 
-/* A start knows the jobs that ended last, as the run before it did: however old they are, a long one among them. The
- * films of others nobody would count. */
+/* After a start the coordinator knows the jobs that ended last, as the run before it did, however old they are; a long
+ * job is among them. Films of jobs that it did not know would not be counted. */
 static void the_last_are_known_after_a_start(void **state)
 {
 	(void)state;
@@ -141,7 +142,7 @@ static void the_last_are_known_after_a_start(void **state)
 	for (size_t i = 0; i < ENDED_MAX - 1; i++)
 		assert_int_equal(jobs.ended[i].id, i + 3);
 	mem_free(jobs.ended);
-	/* Those that ended while the clock was wrong are no later than what follows. */
+	/* Jobs that ended while the clock was wrong do not count as later than those that follow. */
 	end_at(ENDED_MAX + 4, 4e9);
 	ledger_close(jobs.ledger);
 	assert_int_equal(ledger_open(&jobs.ledger, path, &e), 0);
@@ -165,8 +166,8 @@ static int no_unlink(const char *path)
 	return -1;
 }
 
-/* Whoever needs room asks until there is none to be had: films that cannot go now, because they are being read for an
- * extension or the disk does not delete them, must not be said to have gone, or the coordinator asks for ever. */
+/* A caller that needs room asks until there is none left to free: films that cannot be deleted now, because an
+ * extension reads them or the disk fails, must not be reported as deleted, or the coordinator would ask for ever. */
 static void what_cannot_go_makes_no_room(void **state)
 {
 	(void)state;
@@ -185,7 +186,7 @@ static void what_cannot_go_makes_no_room(void **state)
 	assert_false(keep_drop_all(&jobs));
 	disk_use(NULL);
 	failing_list_begin("/jobs/j", 1, EIO);
-	keep_trim(&jobs); /* of none is it known how much it has */
+	keep_trim(&jobs); /* the size of no job's films is known */
 	assert_false(keep_drop_all(&jobs));
 	failing_list_end();
 	for (uint64_t id = 1; id <= 3; id++)

@@ -31,14 +31,15 @@ static void descriptors_bound_connections(void **state)
 	set_file_limit(64, 2048);
 	assert_int_equal(limits_connections(100, &n, &e), 0);
 	assert_int_equal(n, 100);
-	assert_true(file_limit() >= 100 + 3 * 256 && file_limit() < 2048); /* no more than it takes: a job has three */
+	assert_true(file_limit() >= 100 + 3 * 256 && file_limit() < 2048); /* no more descriptors than needed: a job has
+									    * three */
 	assert_int_equal(limits_connections(2000, &n, &e), -EINVAL);
 	assert_non_null(strstr(
 		e.text, "2000 connections, and 256 jobs, need 3024 file descriptors, and this process may have 2048"));
 	assert_int_equal(limits_connections(0, &n, &e), 0);
 	assert_int_equal(n, 2048 - 1024);
 	assert_int_equal(file_limit(), 2048);
-	set_file_limit(64, 1030); /* almost all of which the jobs and fetches could have */
+	set_file_limit(64, 1030); /* jobs and fetches could take almost all of them */
 	assert_int_equal(limits_connections(0, &n, &e), -EINVAL);
 	assert_non_null(strstr(e.text, "16 connections, and 256 jobs, need 1040 file descriptors"));
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A coordinator listens at all addresses of its name, or at none if one of them needs TLS. */
+/* A coordinator listens at all addresses that its host name has, or at none if one of them needs TLS. */
 #include "coordinator/server/server.h"
 #include "coordinator/server/server_options.h"
 #include "tests/support/folder.h"
@@ -19,7 +19,7 @@
 int __real_getaddrinfo(const char *host, const char *port, const struct addrinfo *hints, struct addrinfo **found);
 int __wrap_getaddrinfo(const char *host, const char *port, const struct addrinfo *hints, struct addrinfo **found);
 
-static const char *addresses[2]; /* of "two" */
+static const char *addresses[2]; /* addresses of the host name "two" */
 
 int __wrap_getaddrinfo(const char *host, const char *port, const struct addrinfo *hints, struct addrinfo **found)
 {
@@ -80,7 +80,7 @@ static void at_both(void **state)
 	close(second);
 }
 
-/* As ::1 is in a hosts file of a machine without IPv6. */
+/* One address belongs to no interface, like ::1 in the hosts file of a machine without IPv6. */
 static void one_is_of_no_interface(void **state)
 {
 	(void)state;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The status of a farm that keeps many jobs that have ended: snapshots stay small, what they leave out can be asked
- * for, a reader that is slow misses snapshots but is not cut off, and the loop does not wait while they are made, nor
- * do changes wait while others call again and again. One server for all tests.
+ * The status of a farm that keeps many ended jobs: snapshots stay small, and what they leave out can be asked for; a
+ * slow reader misses snapshots but is not cut off; the loop does not wait while they are made; and changes are not
+ * delayed by clients that reconnect again and again. One server serves all tests.
  */
 #include "coordinator/store/ledger.h"
 #include "tests/support/served.h"
@@ -58,10 +58,10 @@ static void make_spool(const char *path)
 	free(r);
 }
 
-/* Shared with the server: values of JSON that its loop's thread has made, and others. */
+/* Shared with the server: the JSON values made by the thread of its loop, and by other threads. */
 static struct made {
 	_Atomic unsigned on_loop, elsewhere;
-	_Atomic bool slowly; /* those of a snapshot in more than two ticks */
+	_Atomic bool slowly; /* those of one snapshot take more than two ticks */
 } * made;
 
 static void *counted_malloc(size_t size)
@@ -103,7 +103,7 @@ static void send_line(FILE *f, const char *line)
 	assert_int_equal(send(fileno(f), line, strlen(line), MSG_NOSIGNAL), strlen(line));
 }
 
-/* The next line; size may be NULL. */
+/* Returns the next line; size may be NULL. */
 static json_t *read_line(FILE *f, size_t *size)
 {
 	static char *line;
@@ -146,7 +146,7 @@ static void a_snapshot_is_small(void **state)
 	fclose(f);
 }
 
-/* What the loop reads of the jobs after its start. */
+/* Returns how many JSON values the loop makes for the jobs after its start. */
 static unsigned made_at_rest(void)
 {
 	unsigned before;
@@ -157,7 +157,7 @@ static unsigned made_at_rest(void)
 	return before;
 }
 
-/* Also for who asks before it has heard it. */
+/* The loop's thread makes no snapshot, even for a client that asks before it has received one. */
 static void the_loop_makes_no_snapshot(void **state)
 {
 	(void)state;
@@ -171,7 +171,7 @@ static void the_loop_makes_no_snapshot(void **state)
 	assert_string_equal(text_of(o, "type"), "error");
 	json_decref(o);
 	fclose(f);
-	assert_in_range(made->on_loop - on_loop, 1, 20 * LISTED); /* and the answer */
+	assert_in_range(made->on_loop - on_loop, 1, 20 * LISTED); /* and those of the answer */
 	assert_in_range(made->elsewhere - elsewhere, 40 * LISTED, UINT32_MAX);
 }
 
@@ -235,8 +235,8 @@ static void submit(struct scripted *client, uint64_t id)
 	assert_int_equal(a->job, id);
 }
 
-/* Another one that reads shows that there was a snapshot of each job. What one gets that has not read meanwhile is what
- * its socket held, what was on its way, and the newest. */
+/* A second reader shows that there was a snapshot of each job. A client that has not read meanwhile gets the snapshots
+ * that its socket held, those on their way, and the newest. */
 static void a_slow_reader_gets_the_newest(void **state)
 {
 	(void)state;
@@ -273,8 +273,8 @@ static void a_slow_reader_gets_the_newest(void **state)
 	scripted_hang_up(client);
 }
 
-/* Two that were behind get the same snapshot: it is made once for all. A tick may come between the two, so some times
- * are tried; so often the clock would never show two the same nanosecond. */
+/* Two readers that were behind get the same snapshot: it is made once for all. A tick may come between the two, so the
+ * test tries several times; if each had its own, the clock would not show both the same nanosecond so often. */
 static void what_is_sent_to_many_is_made_once(void **state)
 {
 	(void)state;
@@ -306,7 +306,7 @@ static void what_is_sent_to_many_is_made_once(void **state)
 			json_decref(o);
 			lines++;
 		}
-		assert_true(lines < EACH); /* of both: they were behind */
+		assert_true(lines < EACH); /* lines of both: they were behind */
 		same = time[0] == time[1];
 	}
 	assert_true(same);
@@ -316,7 +316,7 @@ static void what_is_sent_to_many_is_made_once(void **state)
 	scripted_hang_up(client);
 }
 
-/* How many lines there are, at most so many. */
+/* Returns the number of remaining lines, at most `most`. */
 static int lines_left(FILE *f, int most)
 {
 	static char *line;
@@ -327,8 +327,8 @@ static int lines_left(FILE *f, int most)
 	return n;
 }
 
-/* Each within what may wait for one reader, they ask and do not read: some are cut off, since no more may wait for all
- * peers and readers than 16 MB. */
+/* The readers ask and do not read, each within what may wait for one reader. Some are cut off, since at most 16 MB may
+ * wait for all peers and readers together. */
 static void what_waits_for_all_readers_is_bounded(void **state)
 {
 	(void)state;
@@ -339,7 +339,7 @@ static void what_waits_for_all_readers_is_bounded(void **state)
 	json_decref(read_line(quick, NULL));
 	for (int i = 0; i < READERS; i++) {
 		slow[i] = call_status();
-		json_decref(read_line(slow[i], NULL)); /* before that nobody listens to it */
+		json_decref(read_line(slow[i], NULL)); /* the reader does not listen before its first line */
 		for (int k = 0; k < PAGES; k++)
 			send_line(slow[i], "{\"endedBefore\":null}\n");
 		send_line(quick, "{\"endedBefore\":null}\n");
@@ -357,7 +357,7 @@ static void what_waits_for_all_readers_is_bounded(void **state)
 	fclose(quick);
 }
 
-/* Lines of that type until this job comes; ready: those that are there. */
+/* Reads lines of that type until this job comes; ready: only lines that are already there. */
 static bool hears_job(FILE *f, uint64_t id, bool ready)
 {
 	char name[32];
@@ -373,7 +373,7 @@ static bool hears_job(FILE *f, uint64_t id, bool ready)
 	return true;
 }
 
-/* Some reader always waits for a snapshot. */
+/* At any time some reader waits for a snapshot. */
 static void who_calls_again_and_again_stops_no_changes(void **state)
 {
 	(void)state;

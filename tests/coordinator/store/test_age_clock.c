@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Time that was seen to pass does not follow a wall clock that jumps. */
+/* The observed time that passed does not follow a wall clock that jumps. */
 #include "coordinator/store/age_clock.h"
 
 #include <stdarg.h>
@@ -31,14 +31,14 @@ static void wall_clock_jumps(void **state)
 	assert_true(first.seconds == 0);
 	assert_true(age_after("first", 600, 140 * DAY) == 1100); /* 40 days ahead */
 	assert_true(age_after("first", 600, 0) == 1100);
-	assert_true(age_after("first", 400, 100 * DAY) == 1000); /* no clock of a machine does that */
+	assert_true(age_after("first", 400, 100 * DAY) == 1000); /* no machine's clock behaves like that */
 	assert_true(age_after("second", 10, 100 * DAY + 300) == 1300);
 	assert_true(age_after("second", 10, 140 * DAY) == 1000 + AGE_CLOCK_CREDIT);
 	assert_true(age_after("second", 10, 0) == 1000);
-	assert_true(age_after("", 600, 100 * DAY + 60) == 1060); /* a system without such a name */
+	assert_true(age_after("", 600, 100 * DAY + 60) == 1060); /* a system without a boot id */
 }
 
-/* However short results are kept. */
+/* The credit is a part of the retention time, however short that is. */
 static void credit_is_a_part_of_what_is_kept(void **state)
 {
 	(void)state;
@@ -61,7 +61,7 @@ static void as_text(void **state)
 			text[i] = (char)(text[i] ^ 1 << bit);
 			int rc = age_clock_from_text(text, size, &back);
 			assert_true(rc == -EBADMSG ||
-				    (rc == 0 && back.seconds == s.seconds)); /* a hexadecimal digit of the other case */
+				    (rc == 0 && back.seconds == s.seconds)); /* a hexadecimal digit in the other case */
 			text[i] = (char)(text[i] ^ 1 << bit);
 		}
 	for (size_t n = 0; n + 1 < size; n++)

@@ -32,8 +32,8 @@ enum { RECORDS = 5, JOB = 12, GENERATION = 3 };
 static const size_t sizes[RECORDS] = {17, 0, 1, 64, 9};
 
 struct seen {
-	unsigned count;		 /* records, those that are missing included */
-	uint64_t missing, known; /* known: by their leases */
+	unsigned count;		 /* records, including those that are missing */
+	uint64_t missing, known; /* known: those whose leases are known */
 	double elapsed;
 	bool wrong;
 	uint64_t at[RECORDS + 2];
@@ -55,7 +55,7 @@ static int check_item(void *user, const struct journal_item *i, struct error *e)
 	struct seen *s = user;
 	struct lease_key k = lease_of(s->count);
 	(void)e;
-	if (i->kind) /* a record, or one of which the body alone is damaged */
+	if (i->kind) /* a record, or one of which only the body is damaged */
 		s->wrong |= s->count >= RECORDS || i->kind != (enum journal_kind)(1 + s->count % 3) ||
 			    i->size != sizes[s->count] || i->elapsed <= s->elapsed || !lease_key_equal(&i->lease, &k);
 	for (size_t n = 0; !i->missing && n < i->size && !s->wrong; n++)
@@ -128,8 +128,8 @@ static void all_comes_back(void **state)
 	journal_release(j);
 }
 
-/* Cut at every byte: the records before it are there, one more can be appended, and nothing of the torn one is seen
- * again. */
+/* The file is cut at every byte: the records before the cut are read, another one can be appended, and nothing of the
+ * torn record is seen again. */
 static void torn_at_every_byte(void **state)
 {
 	(void)state;
@@ -160,7 +160,7 @@ static void torn_at_every_byte(void **state)
 	}
 }
 
-/* A file that grew before its bytes were written: the kernel shows zeros. */
+/* The file grew before its bytes were written: the kernel shows zeros. */
 static void zeros_behind(void **state)
 {
 	(void)state;
@@ -189,8 +189,9 @@ static void flip(const char *path, uint64_t at, unsigned bit)
 	close(fd);
 }
 
-/* Any bit of any byte: the record that it belongs to is missing, and no other; when it is the last one, it may as well
- * have been torn. A damaged head of the file is made anew. Again, after all has been written into a new file. */
+/* One bit of any byte is flipped: the record that it belongs to is missing, and no other; if it is the last record, it
+ * may also count as torn. A damaged head of the file is made anew. All this again after everything was copied into a
+ * new file. */
 static void one_bit_wrong(void **state)
 {
 	(void)state;
@@ -211,7 +212,7 @@ static void one_bit_wrong(void **state)
 		bool head = at < ends[0], torn = damaged == RECORDS - 1;
 		for (int again = 0; again < 2; again++) {
 			int rc = open_again(&j, &s, &found);
-			if (rc == -EPROTO && at >= 5 && at < 8) /* the digits of its version */
+			if (rc == -EPROTO && at >= 5 && at < 8) /* the digits of the version */
 				break;
 			assert_int_equal(rc, 0);
 			assert_int_equal(s.count, torn ? RECORDS - 1 : RECORDS);
@@ -236,8 +237,8 @@ static void one_bit_wrong(void **state)
 	}
 }
 
-/* Bytes are wrong across the borders of records: those that they belong to are missing, all others are there, and more
- * can be appended. */
+/* Bytes are wrong across the borders of records: the records that they belong to are missing, all others are there, and
+ * more can be appended. */
 static void a_hole(void **state)
 {
 	(void)state;
@@ -272,7 +273,7 @@ static void a_hole(void **state)
 		}
 }
 
-/* Whoever makes results makes up records in them: none is believed. */
+/* The worker that makes a result puts forged records into it: none of them is believed. */
 static void a_record_in_a_record(void **state)
 {
 	(void)state;
@@ -294,7 +295,8 @@ static void a_record_in_a_record(void **state)
 		assert_int_equal(journal_sync(other, &e), 0);
 	}
 	journal_release(other);
-	flip(path, ends[0] + 3, 1); /* the first one's head: what comes next is looked for */
+	flip(path, ends[0] + 3, 1); /* damages the head of the first record, so that the reader searches for the next
+				     * one */
 	assert_int_equal(open_again(&j, &s, &found), 0);
 	assert_true(s.count == 3 && s.missing == 1 && s.known == 0 && found.lost == 1);
 	assert_int_equal(s.at[1], ends[0] + (ends[1] - ends[0] - sizes[0]) + sizeof forged);
@@ -330,7 +332,8 @@ static ssize_t failing_pread(int fd, void *bytes, size_t size, off_t at)
 	return -1;
 }
 
-/* One read after the other fails: that is an error, not the end of the journal, and the next reading finds all. */
+/* Each read fails in turn: that is reported as an error, not as the end of the journal, and the next attempt reads all
+ * records. */
 static void read_errors_cut_nothing(void **state)
 {
 	(void)state;
@@ -361,7 +364,7 @@ static void read_errors_cut_nothing(void **state)
 	}
 }
 
-/* One read after the other fails while it is copied: each time a sentence says so, and at last it is copied. */
+/* Each read fails in turn while the journal is copied: each time a sentence says so, and finally the copy succeeds. */
 static void read_errors_while_it_is_renewed(void **state)
 {
 	(void)state;
@@ -389,7 +392,7 @@ static void read_errors_while_it_is_renewed(void **state)
 	journal_release(j);
 }
 
-/* Whatever it looks like behind the name: it is left alone, and the sentence says of which version it is. */
+/* A file of another version, whatever follows its name, is left alone, and the sentence names its version. */
 static void of_another_version(void **state)
 {
 	(void)state;
@@ -431,8 +434,8 @@ static void others_are_cleared(void **state)
 	assert_int_equal(access(path, F_OK), -1);
 }
 
-/* A disk that takes no more: what was there stays, and what was appended comes when there is room, in a new file: the
- * old one is not believed again. */
+/* The disk is full: earlier records stay, and records appended meanwhile are written once there is room, into a new
+ * file, since the old one is no longer trusted. */
 static void no_room(void **state)
 {
 	(void)state;
@@ -455,9 +458,9 @@ static void no_room(void **state)
 	assert_true(journal_is_bad(j));
 	assert_int_equal(journal_renew(j, &e), -EFBIG);
 	assert_int_equal(setrlimit(RLIMIT_FSIZE, &old), 0);
-	assert_int_equal(journal_sync(j, &e), -EFBIG); /* no longer the case, but the cause */
+	assert_int_equal(journal_sync(j, &e), -EFBIG); /* no longer the state of the disk, but the original cause */
 	assert_int_equal(journal_write(j, &e), -EFBIG);
-	assert_int_equal(journal_reserve(j, 1, &e), -EIO); /* which no free space helps against */
+	assert_int_equal(journal_reserve(j, 1, &e), -EIO); /* free space does not help against this */
 	assert_non_null(strstr(e.text, "File too large"));
 	struct journal *other;
 	assert_int_equal(open_again(&other, &s, &found), 0);
@@ -478,8 +481,8 @@ static void no_room(void **state)
 }
 
 /*
- * Power lost: of what was written after the last journal_sync any sectors may be missing, in any order, and the file
- * may be as long as it was at any time since. All that was synced is there, and of the rest some records, unchanged.
+ * Power is lost: of the bytes written after the last journal_sync any sectors may be missing, in any order, and the
+ * file may have any length that it had since. All synced records are there, and some of the others, unchanged.
  */
 static void power_lost(void **state)
 {
@@ -521,7 +524,7 @@ static void power_lost(void **state)
 		assert_int_equal(open_again(&j, &s, &found), 0);
 		assert_true(s.count >= synced);
 		assert_false(s.wrong);
-		assert_int_equal(found.lost, 0); /* what is missing before others was never durable */
+		assert_int_equal(found.lost, 0); /* a missing record before others was never durable */
 		assert_int_equal(found.damaged, s.missing);
 		assert_int_equal(journal_bytes(j), ends[s.count]);
 		holes += s.missing;
@@ -530,7 +533,7 @@ static void power_lost(void **state)
 	assert_true(holes > 10);
 }
 
-/* RFC 3720, B.4 */
+/* Test vectors of RFC 3720, appendix B.4. */
 static void checksums_of_the_standard(void **state)
 {
 	(void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A journal's bytes stay what they are from build to build, whatever the machine. */
+/* A journal has the same bytes in every build and on every machine. */
 #include "coordinator/store/journal.h"
 #include "coordinator/store/journal_file.h"
 #include "common/base/bytes.h"
@@ -17,8 +17,8 @@
 
 enum { GENERATION = 3 };
 
-/* A journal as the first builds wrote it, from structs as they lay in memory of an x86-64: a batch "abcde" of a lease,
- * and counters. */
+/* A journal as the first builds wrote it, from structs as they lay in memory on x86-64: a batch "abcde" of a lease, and
+ * counters. */
 enum { OLD_FIRST = JOURNAL_HEAD, OLD_SECOND = OLD_FIRST + JOURNAL_RECORD + 5 };
 static const uint64_t old_job = 0x0102030405060708, old_salt = 0x8877665544332211;
 static const struct lease_key old_lease = {0, LEASE_RENDER, 5, 6, 0x1122334455667788};
@@ -76,7 +76,7 @@ static void earlier_journals_are_read(void **state)
 	journal_release(j);
 }
 
-/* What is written now has each number where it has always been. */
+/* A journal written now has each number where it has always been. */
 static void journals_stay_as_they_are(void **state)
 {
 	(void)state;
@@ -97,8 +97,8 @@ static void journals_stay_as_they_are(void **state)
 	buf_fini(&b);
 }
 
-/* Heads whose checksums fit, with sizes that lead out of the file: the record is none, and nothing is allocated for it.
- */
+/* Record heads whose checksums fit, with sizes beyond the end of the file: they are not taken for records, and nothing
+ * is allocated for them. */
 static void sizes_beyond_the_file(void **state)
 {
 	(void)state;

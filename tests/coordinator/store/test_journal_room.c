@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Memory and disk space of journals: what waits to be written is bounded, and room that was promised is kept. */
+/* Memory and disk space of journals: the bytes that wait to be written are bounded, and reserved room is kept. */
 #include "coordinator/store/journal.h"
 #include "coordinator/store/journal_file.h"
 #include "common/base/disk.h"
@@ -41,7 +41,8 @@ static struct buf make_piece(size_t size)
 	return b;
 }
 
-/* Appended records are written with the next flush, or earlier if those of all journals would take too much memory. */
+/* Appended records are written with the next flush, or earlier if the waiting records of all journals would take too
+ * much memory. */
 static void memory_is_bounded(void **state)
 {
 	(void)state;
@@ -53,7 +54,7 @@ static void memory_is_bounded(void **state)
 	assert_int_equal(journal_append(other, JOURNAL_BATCH, NULL, 1, "", 0, &b, &e), 0);
 	assert_int_equal(journal_create(&j, folder, JOB, GENERATION, &e), 0);
 	off_t empty = length_of_file();
-	for (unsigned n = 1; n < MOST / PIECE; n++) { /* with their heads it is a little more */
+	for (unsigned n = 1; n < MOST / PIECE; n++) { /* with the heads of records it is a little more */
 		b = make_piece(PIECE);
 		assert_int_equal(length_of_file(), empty);
 		assert_int_equal(journal_append(j, JOURNAL_BATCH, NULL, 1, "", 0, &b, &e), 0);
@@ -80,7 +81,7 @@ static ssize_t appending_pwritev(int fd, const struct iovec *parts, int count, o
 	return pwritev(fd, parts, count, at);
 }
 
-/* While it is written more and more is appended: the flush does not wait for the last of it. */
+/* While a journal is written more and more is appended: a flush does not wait for the last record. */
 static void a_flush_comes_to_an_end(void **state)
 {
 	(void)state;
@@ -117,7 +118,7 @@ static int forgetting_ftruncate(int fd, off_t size)
 	return ftruncate(fd, size);
 }
 
-/* A record for which there is no room takes nothing from those that are appended and not written yet. */
+/* A record for which there is no room takes none from records that were appended and are not written yet. */
 static void promised_room_is_kept(void **state)
 {
 	(void)state;

@@ -35,7 +35,7 @@ static struct ledger *open_ledger(void)
 	return l;
 }
 
-/* The live job after that one: 1, or 0 if there is none. */
+/* Returns 1 and the next live job after that id, or 0 if there is none. */
 static int next_live(struct ledger *l, uint64_t after, struct ledger_job *j)
 {
 	uint64_t *ids;
@@ -138,13 +138,13 @@ static void living_jobs(void **state)
 	assert_int_equal(ledger_drop(l, (uint64_t[]){2, 3}, 2, &e), 0);
 	assert_int_equal(ledger_ended_count(l), 0);
 	assert_int_equal(ledger_get(l, 2, &j, &e), 0);
-	assert_int_equal(ledger_get(l, 3, &j, &e), 1); /* it is not over */
+	assert_int_equal(ledger_get(l, 3, &j, &e), 1); /* the job is not over */
 	struct ledger_job again = {.id = 3, .owner = "", .name = "", .version = "", .record = ""};
 	assert_int_equal(ledger_add(l, &again, &e), -EEXIST); /* an id is given once */
 	ledger_close(l);
 }
 
-/* A database as the first version made it, with a job in it. */
+/* Makes a database as the first version did, with one job in it. */
 static void earlier_versions(void **state)
 {
 	(void)state;
@@ -197,8 +197,8 @@ static void hold_and_priority_are_kept(void **state)
 	ledger_close(l);
 }
 
-/* A job that ended is continued with another plan, whether the row knew of its end or not; and that end is not one of
- * the continued job. */
+/* An ended job is extended with another plan, whether or not its row recorded the end; a recorded end does not apply to
+ * the extended job. */
 static void an_ended_job_can_be_extended(void **state)
 {
 	(void)state;
@@ -212,7 +212,7 @@ static void an_ended_job_can_be_extended(void **state)
 	assert_int_equal(next_live(l, 0, &j), 1);
 	assert_true(j.extended == 0 && j.submission_size == 3 && j.plan_size == 2);
 	assert_int_equal(ledger_ended_count(l), 0);
-	more.extended = 1; /* its end could not be written */
+	more.extended = 1; /* the job's end could not be written */
 	assert_int_equal(ledger_extend(l, &more, &e), 0);
 	assert_int_equal(ledger_end(l, record_of(1, 0, "done"), false, &e), 0);
 	assert_int_equal(next_live(l, 0, &j), 1);
@@ -232,13 +232,13 @@ static void an_ended_job_can_be_extended(void **state)
 	assert_int_equal(next_live(l, 0, &j), 1);
 	assert_true(j.id == 1 && j.extended == 2 && j.submission_size == 3 && j.plan_size == 2);
 	assert_string_equal(j.owner, "7");
-	assert_string_equal(j.held, ""); /* with the end of the job that is over, too */
+	assert_string_equal(j.held, ""); /* cleared with the end of the job */
 	assert_int_equal(ledger_get(l, 2, &j, &e), 0);
 	ledger_close(l);
 }
 
-/* The checksum of a row, of numbers that are all others, is what it was in the first build: a database of any machine
- * is read on any other. */
+/* The checksum of a row whose numbers all differ is the one of the first build: a database written on one machine can
+ * be read on any other. */
 static void checksums_stay(void **state)
 {
 	(void)state;
@@ -304,7 +304,7 @@ static void ids_are_never_given_twice(void **state)
 	ledger_close(l);
 }
 
-/* Its submission stays as long as its films do, its record as long as its row. */
+/* A job's submission stays as long as its films, its record as long as its row. */
 static void what_is_kept_of_an_ended_job(void **state)
 {
 	(void)state;
@@ -313,7 +313,7 @@ static void what_is_kept_of_an_ended_job(void **state)
 	struct ledger *l = open_ledger();
 	add(l, 1);
 	assert_int_equal(ledger_read_record(l, 1, &r, &e), -ENOENT);
-	assert_int_equal(ledger_drop_submission(l, 1, &e), 0); /* it is not over */
+	assert_int_equal(ledger_drop_submission(l, 1, &e), 0); /* the job is not over */
 	assert_int_equal(ledger_end(l, record_of(1, 0, "failed"), true, &e), 0);
 	assert_int_equal(ledger_get(l, 1, &j, &e), 1);
 	assert_true(j.ended > 1e9 && j.submission_size == 4 && j.plan_size == 2);
@@ -354,7 +354,7 @@ static void notes_are_kept(void **state)
 	ledger_close(l);
 }
 
-/* Jobs come and go: of ended ones the file keeps the records, and its WAL does not grow. */
+/* Jobs come and go: of ended ones the file keeps only the records, and its WAL does not grow. */
 static void stays_small(void **state)
 {
 	(void)state;
@@ -382,11 +382,11 @@ static void stays_small(void **state)
 	ledger_close(l);
 }
 
-/* Rows as large as those of real jobs, every third of which is not over. */
+/* Adds rows as large as those of real jobs; every third job is not over. */
 static void fill(int rows)
 {
 	char sql[600];
-	struct ledger *l = open_ledger(); /* makes the tables */
+	struct ledger *l = open_ledger(); /* creates the tables */
 	ledger_close(l);
 	snprintf(
 		sql, sizeof sql,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What one of the two files of the ledger has lost is restored from the other; what both have lost is not invented. */
+/* What one of the two files of the ledger has lost is restored from the other; what both have lost is not made up. */
 #include "coordinator/store/ledger.h"
 
 #include "common/base/log.h"
@@ -56,7 +56,7 @@ static void fill(void)
 	ledger_close(l);
 }
 
-/* Twice: what was restored is there the next time, too. */
+/* Checks twice: what was restored is there the next time, too. */
 static void assert_filled(void)
 {
 	for (int again = 0; again < 2; again++) {
@@ -135,7 +135,7 @@ static void rows_are_lost_or_changed(void **state)
 		}
 }
 
-/* A backup of jobs.db from before a change is put back. */
+/* jobs.db is replaced by a backup from before a change. */
 static void a_file_is_older(void **state)
 {
 	(void)state;
@@ -197,7 +197,7 @@ static void both_are_damaged(void **state)
 	ledger_close(l);
 }
 
-/* Notes of spools from before they had checksums. The number of the next job is none: that of the jobs is. */
+/* Notes of spools from before notes had checksums. The highest job id replaces the missing number of the next job. */
 static void notes_without_checksums(void **state)
 {
 	(void)state;
@@ -218,7 +218,7 @@ static void notes_without_checksums(void **state)
 /* ---- a copy that cannot be written ---- */
 
 static _Atomic bool refuse;
-static sqlite3 *connection; /* of the ledger */
+static sqlite3 *connection; /* the ledger's own connection */
 
 static int take_connection(sqlite3 *db, const char **text, const struct sqlite3_api_routines *api)
 {
@@ -228,7 +228,7 @@ static int take_connection(sqlite3 *db, const char **text, const struct sqlite3_
 	return SQLITE_OK;
 }
 
-/* Called before each write of a table; the copy refuses. */
+/* Called before each write to a table; refuses those to the copy. */
 static int deny_writes_to_copy(void *user, int what, const char *a, const char *b, const char *file,
 			       const char *trigger)
 {
@@ -240,7 +240,7 @@ static int deny_writes_to_copy(void *user, int what, const char *a, const char *
 	return refuse && writes && file && strcmp(file, "copy") == 0 ? SQLITE_DENY : SQLITE_OK;
 }
 
-/* Rows written meanwhile are in jobs.db, and in the copy once that can be written. */
+/* Rows written meanwhile are in jobs.db, and also in the copy once that can be written. */
 static void the_copy_falls_behind(void **state)
 {
 	(void)state;
@@ -249,7 +249,7 @@ static void the_copy_falls_behind(void **state)
 	sqlite3_auto_extension((void (*)(void))take_connection);
 	struct ledger *l = open_ledger();
 	sqlite3_reset_auto_extension();
-	/* Statements are compiled again for the authorizer. */
+	/* Setting an authorizer makes SQLite compile statements again. */
 	assert_int_equal(sqlite3_set_authorizer(connection, deny_writes_to_copy, NULL), SQLITE_OK);
 	refuse = true;
 	assert_int_equal(ledger_priority(l, 3, 9, &e), 0);

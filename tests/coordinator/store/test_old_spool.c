@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A job's row comes back out of the file that held its copy, of versions 002 and 003; what is damaged or hostile does
- * not. */
+/* A job's row is restored from the file that held its copy, of versions 002 and 003; a damaged or hostile file is
+ * refused. */
 #include "coordinator/store/old_spool.h"
 
 #include "common/base/bytes.h"
@@ -26,7 +26,7 @@ static struct error e;
 enum { JOB = 1 };
 static const uint64_t revision = 0x0102030405060708;
 
-/* As version 002 wrote that row. */
+/* A row as version 002 wrote it. */
 static const unsigned char old_file[] = {
 	0x68, 0x73, 0x6c, 0x74, 0x4f, 0x30, 0x30, 0x32, 0x01, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x03, 0x00,
 	0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x08, 0x07, 0x06, 0x05, 0x04, 0x03, 0x02, 0x01, 0x00, 0x00, 0x00, 0x00,
@@ -55,7 +55,7 @@ static int tear_down(void **state)
 	return folder_tear_down(state);
 }
 
-/* With a checksum that fits. */
+/* Writes the file with a checksum that fits. */
 static void write_file(const void *bytes, size_t size)
 {
 	struct checked_file out;
@@ -66,7 +66,7 @@ static void write_file(const void *bytes, size_t size)
 	checked_file_close(&out);
 }
 
-/* As version 003 wrote that row. */
+/* Writes the row as version 003 did. */
 static size_t pack_row(unsigned char *bytes)
 {
 	Stored__Row m;
@@ -130,7 +130,7 @@ static void comes_back(void **state)
 		assert_true(rc == -ENOMEM || rc == 0);
 		old_spool_row_free(&f);
 	}
-	assert_int_equal(spool_make_job(spool, 2, &e), 0); /* another job's row is not this one's */
+	assert_int_equal(spool_make_job(spool, 2, &e), 0); /* the file of one job does not restore another job's row */
 	spool_job_path(spool, 2, "order", path);
 	write_file(bytes, size);
 	assert_int_equal(old_spool_row(spool, 2, &f, &e), -EBADMSG);
@@ -145,7 +145,7 @@ static void old_file_is_read(void **state)
 	assert_row();
 }
 
-/* Cut anywhere, whether the checksum fits or not. */
+/* The file is cut anywhere, with a checksum that fits or not. */
 static void truncated_records_are_refused(void **state)
 {
 	(void)state;
@@ -167,7 +167,7 @@ static void truncated_records_are_refused(void **state)
 	}
 }
 
-/* Sizes of version 002 that lead out of the file, or leave nothing; texts without an end. */
+/* Sizes in a file of version 002 that lead out of the file or leave nothing; texts without an end. */
 static void sizes_beyond_bounds(void **state)
 {
 	(void)state;

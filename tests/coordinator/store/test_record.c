@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A job's record comes back out of its JSON, with all that it knows. */
+/* A job's record is read back from its JSON without loss. */
 #include "coordinator/store/record.h"
 
 #include "common/base/mem.h"
@@ -81,7 +81,7 @@ static void records_come_back(void **state)
 	record_add_doubt(&back);
 	assert_non_null(strstr(back.note, "the error is about 21.8 %, its interval is not known: the chains are too"));
 	back.note[0] = 0;
-	back.rel_error_about = -1; /* an earlier version wrote it */
+	back.rel_error_about = -1; /* as written by an earlier version */
 	record_add_doubt(&back);
 	assert_string_equal(back.note, "the error's interval is not known: the chains are too short to be judged");
 	assert_true(*r.effects != 0);
@@ -99,19 +99,19 @@ static void records_come_back(void **state)
 	assert_true(back.classes[0].chains == 0.4 && isnan(back.classes[0].difference_t) &&
 		    isnan(back.classes[0].chains_error));
 	assert_true(back.classes[1].chains == 0 && isnan(back.classes[1].difference_t));
-	strcpy(r.output, "caf\xe9"); /* no memory is missing */
+	strcpy(r.output, "caf\xe9"); /* this is no lack of memory */
 	assert_int_equal(record_to_json(&r, &text, &e), -EINVAL);
 	assert_non_null(strstr(e.text, "the record of job j7 cannot be written: Invalid UTF-8"));
 }
 
-static long until_it_fails; /* allocations of the JSON library; < 0: none fails */
+static long until_it_fails; /* allocations of the JSON library before one fails; < 0: none fails */
 
 static void *alloc_until_it_fails(size_t size)
 {
 	return until_it_fails-- == 0 ? NULL : malloc(size);
 }
 
-/* One allocation after the other fails: what is written is whole, or it is not written. */
+/* Each allocation fails in turn: a record is written completely, or not at all. */
 static void whole_or_not(void **state)
 {
 	(void)state;
@@ -148,7 +148,7 @@ static int from_text(const char *text, struct job_record *r)
 	return record_from_json(text, strlen(text), r, &e);
 }
 
-/* Of an earlier version, of a hand that wrote too much, and what is none. */
+/* A record of an earlier version, one that somebody extended by hand, and texts that are no records. */
 static void other_records(void **state)
 {
 	(void)state;
@@ -167,7 +167,7 @@ static void other_records(void **state)
 	assert_true(r.id == 7 && r.rel_error == -1 && r.ended_seen == -1 && !record_is_ended(&r));
 	assert_int_equal(record_to_json(&r, &text, &e), 0);
 	*strstr(text, "box") = 'f';
-	assert_int_equal(from_text(text, &r), -EBADMSG); /* its checksum */
+	assert_int_equal(from_text(text, &r), -EBADMSG); /* the checksum is wrong */
 	mem_free(text);
 }
 

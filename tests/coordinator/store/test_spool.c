@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A spool has one master, and a folder for each job. */
+/* A spool belongs to one coordinator, and has a folder for each job. */
 #include "coordinator/store/spool.h"
 #include "common/base/disk.h"
 #include "common/base/mem.h"
@@ -41,7 +41,7 @@ static void jobs_have_folders(void **state)
 	assert_true(count == 0 && !ids);
 	for (int i = 2; i >= 0; i--)
 		assert_int_equal(spool_make_job(s, 1 + 20 * (uint64_t)i, &e), 0);
-	spool_path(s, "jobs/j07", path); /* no job's name */
+	spool_path(s, "jobs/j07", path); /* not the name of a job's folder */
 	assert_int_equal(mkdir(path, 0777), 0);
 	assert_int_equal(spool_write(s, 21, "preview.exr", "bytes", 5, &e), 0);
 	spool_job_path(s, 21, "preview.exr", path);
@@ -91,7 +91,7 @@ static uint64_t little_space(const char *path)
 	return 4 * SPOOL_RESERVE - 1;
 }
 
-/* Not where a job that waits for room needs it more. */
+/* A file is not written where a job that waits for room needs that room. */
 static void room_is_kept(void **state)
 {
 	(void)state;
@@ -119,7 +119,8 @@ static void room_is_kept(void **state)
 	spool_close(s);
 }
 
-/* Jobs that were not listed would be forgotten; a job's folder of which something is left is not gone. */
+/* Folders that cannot be listed are an error, or their jobs would be forgotten; a job's folder that still has something
+ * in it is not reported as gone. */
 static void folders_that_cannot_be_listed(void **state)
 {
 	(void)state;
@@ -147,7 +148,7 @@ static void folders_that_cannot_be_listed(void **state)
 	assert_int_equal(spool_drop_job(s, 2, &e), 0);
 	spool_job_path(s, 2, NULL, path);
 	assert_int_not_equal(access(path, F_OK), 0);
-	assert_int_equal(spool_film_bytes(s, 2, 1, &bytes, &e), 0); /* of a job that is gone: none */
+	assert_int_equal(spool_film_bytes(s, 2, 1, &bytes, &e), 0); /* the job's folder is gone: it has no films */
 	assert_int_equal(bytes, 0);
 	assert_int_equal(spool_drop_job(s, 2, &e), 0);
 	spool_close(s);
