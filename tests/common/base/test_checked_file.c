@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Numbers have the same bytes in a file on any machine; a file that is cut, or of which a bit has changed, is refused.
- */
+/* Numbers are stored as the same bytes on every machine; a truncated file, or one with a changed bit, is refused. */
 #include "common/base/checked_file.h"
 
 #include "common/base/bytes.h"
@@ -69,7 +68,7 @@ static void numbers_have_fixed_bytes(void **state)
 	assert_int_equal(checked_file_read_numbers(&f, words, sizeof *words, 2, &e), 0);
 	assert_int_equal(checked_file_read_numbers(&f, &large, sizeof large, 1, &e), 0);
 	assert_int_equal(checked_file_read_numbers(&f, &two, sizeof two, 1, &e), 0);
-	/* More than there is, and more than there can be: nothing is read. */
+	/* A read beyond the end of the file, or of more bytes than any file has, reads nothing. */
 	half = 7;
 	assert_int_equal(checked_file_read_numbers(&f, &two, sizeof two, 1, &e), -EBADMSG);
 	assert_int_equal(checked_file_read_numbers(&f, &half, sizeof half, SIZE_MAX / 4 + 2, &e), -EBADMSG);
@@ -106,7 +105,7 @@ static void other_files_are_refused(void **state)
 	assert_int_equal(checked_file_open(&f, path, &e), -EBADMSG);
 }
 
-/* Across the edges of the buffer, at each distance from it. */
+/* Arrays cross the edges of the buffer, at each distance from an edge. */
 static void large_arrays_come_back(void **state)
 {
 	(void)state;
@@ -136,7 +135,7 @@ static void large_arrays_come_back(void **state)
 	free(back);
 }
 
-/* What machines of the other byte order do. */
+/* Reads and writes as a machine of the other byte order does. */
 static void reversed_numbers(void **state)
 {
 	(void)state;
@@ -152,7 +151,7 @@ static void reversed_numbers(void **state)
 	assert_memory_equal(to, from, 8);
 }
 
-/* copy_numbers is put64, get64 and so on of each, signs of zeros and of NaN included. */
+/* copy_numbers gives the bytes of put64, get64 and so on for each number, including signs of zeros and NaNs. */
 static void copied_numbers(void **state)
 {
 	(void)state;

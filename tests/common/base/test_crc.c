@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* CRC-32C by whatever way this processor has, against one bit after the other, at every length and alignment of a word.
- */
+/* CRC-32C by the method chosen for this processor, against a bit-by-bit computation, at every length and alignment up
+ * to a word. */
 #include "common/base/crc.h"
 
 #include <setjmp.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A file that cannot be replaced stays as it was, whichever call fails, and the error is that call's. What has the name
- * of its temporary file already is neither written to nor gives it its mode. */
+/* A file that cannot be replaced stays as it was, whichever call fails, and the error is that call's. A file that
+ * already has the name of the temporary file is not written to, and its mode is not copied. */
 #include "common/base/disk.h"
 #include "tests/support/failing_list.h"
 #include "tests/support/folder.h"
@@ -29,7 +29,7 @@ static int no_open(const char *name, int flags, mode_t mode)
 static ssize_t no_room(int fd, const void *bytes, size_t size)
 {
 	(void)fd, (void)bytes, (void)size;
-	errno = 0; /* as a disk that is full answers */
+	errno = 0; /* the answer of a full disk */
 	return 0;
 }
 
@@ -106,7 +106,7 @@ static void another_file_in_its_way(void **state)
 	snprintf(temporary, sizeof temporary, "%s.tmp", path);
 	snprintf(other, sizeof other, "%s/other", folder);
 	const mode_t before = umask(077);
-	replace_with_mode(0644); /* others read it, as was asked for */
+	replace_with_mode(0644); /* others may read the file, as requested */
 	umask(before);
 	fclose(fopen(temporary, "w"));
 	assert_int_equal(chmod(temporary, 0666), 0);
@@ -117,7 +117,7 @@ static void another_file_in_its_way(void **state)
 	assert_true(stat(other, &st) == 0 && st.st_size == 0);
 }
 
-/* A list that fails after any number of names is not one that ended there; those before are seen. */
+/* A list that fails after any number of names reports the failure instead of the end; the names before it are seen. */
 static void a_list_that_fails_midway(void **state)
 {
 	(void)state;
@@ -136,7 +136,7 @@ static void a_list_that_fails_midway(void **state)
 			assert_true(name[0] >= '0' && name[0] < '0' + FILES && !name[1]);
 			seen++;
 		}
-		assert_true(most > FILES || !disk_list_next(&l)); /* and never goes on */
+		assert_true(most > FILES || !disk_list_next(&l)); /* and returns no more names */
 		assert_int_equal(disk_list_end(&l, 0, &e), most > FILES ? 0 : -ESTALE);
 		assert_int_equal(seen, most > FILES ? FILES : most);
 		assert_true(most > FILES || strstr(e.text, folder));

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Arrays grow, keep what they hold, and survive when memory is out. */
+/* Arrays grow, keep their contents, and stay valid when memory runs out. */
 #include "common/base/list.h"
 
 #include "common/base/mem.h"
@@ -20,7 +20,7 @@ static uint64_t *push(uint64_t *items, size_t *count, uint64_t value)
 	return more;
 }
 
-/* Also after items were removed, at any count: it may be below that for which memory was last allocated. */
+/* Also after items were removed: the count may be below that for which memory was last allocated. */
 static void room_follows_the_count(void **state)
 {
 	(void)state;

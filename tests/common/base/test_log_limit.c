@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A rush of lines is cut off, counted and reported; a trickle passes. */
+/* A burst of log lines is cut off, counted and reported; occasional lines pass. */
 #include "common/base/log_limit.h"
 
 #include <stdarg.h>
@@ -21,10 +21,10 @@ static void a_rush_is_cut(void **state)
 	(void)state;
 	struct log_bucket b = {0};
 	assert_int_equal(lines_logged(&b, 4000, 1000, 1000), LOG_BURST);
-	assert_int_equal(log_bucket_withheld(&b, 1000), 0); /* it may go on */
+	assert_int_equal(log_bucket_withheld(&b, 1000), 0); /* the burst may go on */
 	assert_int_equal(log_bucket_withheld(&b, 1000.5), 4000 - LOG_BURST);
 	assert_int_equal(log_bucket_withheld(&b, 1100), 0); /* reported once */
-	/* 4,000 in ten seconds, from an empty bucket: what is filled again meanwhile. */
+	/* 4,000 lines in ten seconds, from an empty bucket: those pass for which the bucket is refilled meanwhile. */
 	assert_int_equal(lines_logged(&b, LOG_BURST, 2000, 2000), LOG_BURST);
 	assert_in_range(lines_logged(&b, 4000, 2000, 2010), 10 * LOG_PER_SECOND - 1, 10 * LOG_PER_SECOND);
 }
@@ -37,7 +37,7 @@ static void a_trickle_passes(void **state)
 	assert_int_equal(log_bucket_withheld(&b, 1e6), 0);
 }
 
-/* The monotonic clock does not fall; a caller whose clock did would lose nothing but time. */
+/* The monotonic clock does not go back; if a caller's clock did, its bucket would only fill later. */
 static void time_that_stands_still(void **state)
 {
 	(void)state;

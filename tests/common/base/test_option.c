@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The reader of command lines by a table of every kind of option, and what is printed of the table. */
+/* Reads command lines by a table that has every kind of option, and checks what is printed of the table. */
 #include "common/base/option.h"
 #include "common/base/option_print.h"
 
@@ -114,7 +114,7 @@ static struct arguments a;
 static struct error e;
 static enum option_kind asked;
 
-/* The words of a command line; those that follow the program's name. */
+/* Parses the words of a command line, without the program's name. */
 static int parse(const char *line)
 {
 	static char text[512];
@@ -216,7 +216,7 @@ static void test_order_and_forms(void **state)
 		assert_string_equal(a.word[1], "j1");
 		assert_true(a.wait && a.stops == 3 && a.threads == 2);
 	}
-	expect_accepted("list -o x --wait"); /* though it begins --wait-for, too */
+	expect_accepted("list -o x --wait"); /* though --wait is also a prefix of --wait-for */
 	assert_true(a.wait && !a.quiet);
 	expect_accepted("-o x fetch -5");
 	assert_string_equal(a.word[1], "-5");
@@ -254,7 +254,7 @@ static void test_checks(void **state)
 	refused("list -o x --spp +13", "no 13");
 }
 
-/* Before whatever else is wrong. */
+/* --help and --version take precedence over all errors. */
 static void test_asked(void **state)
 {
 	(void)state;

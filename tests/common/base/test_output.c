@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A program whose stdout is a full disk does not end as if all were well. */
+/* A program whose stdout is a full disk fails instead of reporting success. */
 #include "common/base/program.h"
 
 #include <stdarg.h>
@@ -17,7 +17,7 @@
 static const struct program program = {.name = "ends", .summary = "Ends.", .exits = "0 done"};
 static char name[] = "ends", *argv[] = {name, NULL};
 
-/* Its exit code. */
+/* Returns the exit code of a process that prints so many lines to `path`. */
 static int exit_code_of(const char *path, size_t lines, bool flush, int code)
 {
 	int status = -1;
@@ -43,7 +43,7 @@ static void a_full_disk_is_noticed(void **state)
 	(void)state;
 	for (int flush = 0; flush < 2; flush++) {
 		assert_int_equal(exit_code_of("/dev/full", 1, flush, 0), 1);
-		assert_int_equal(exit_code_of("/dev/full", 100000, flush, 0), 1); /* more than waits in memory */
+		assert_int_equal(exit_code_of("/dev/full", 100000, flush, 0), 1); /* more than the buffer holds */
 		assert_int_equal(exit_code_of("/dev/full", 1, flush, 75), 75);
 		assert_int_equal(exit_code_of("/dev/full", 0, flush, 0), 0);
 		assert_int_equal(exit_code_of("/dev/null", 100000, flush, 0), 0);

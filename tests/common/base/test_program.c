@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What main may rely on once its options have been read. */
+/* What program.h promises to main once its options have been read. */
 #include "common/base/program.h"
 
 #include <errno.h>
@@ -18,7 +18,7 @@ static const struct option_row rows[] = {{0}};
 static const struct program nothing = {
 	.name = "nothing", .summary = "Does nothing.", .own = {(const struct option_group[]){{NULL, rows}, {0}}, NULL}};
 
-/* The exit code of `run` in a process of its own, or 128 and the signal that ended it. */
+/* Returns the exit code of `run` in a process of its own, or 128 plus the signal that ended it. */
 static int code_of(int (*run)(void))
 {
 	int status;

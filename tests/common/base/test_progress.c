@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Lines of progress where there is no terminal: one for each tenth, and one a minute even if nothing changes. What is
- * shown of an estimate does not fall. */
+/* Lines of progress without a terminal: one for each tenth, and one a minute even if nothing changes. A displayed
+ * estimate of progress does not fall. */
 #include "common/base/progress.h"
 
 #include <stdarg.h>
@@ -63,10 +63,10 @@ static void test_never_back(void **state)
 	struct progress p;
 	progress_start(&p);
 	assert_true(progress_kept(&p, 0.4, "bootstrap") == 0.4);
-	assert_true(progress_kept(&p, 0.1, "running") == 0.1); /* of something else */
+	assert_true(progress_kept(&p, 0.1, "running") == 0.1); /* of another state or job */
 	assert_true(progress_kept(&p, 0.6, "running") == 0.6);
-	assert_true(progress_kept(&p, 0.3, "running") == 0.6); /* it takes longer than was thought */
-	assert_true(progress_kept(&p, 0, "running") == 0.6);   /* nobody knows any more */
+	assert_true(progress_kept(&p, 0.3, "running") == 0.6); /* the job takes longer than was estimated */
+	assert_true(progress_kept(&p, 0, "running") == 0.6);   /* no estimate is known any more */
 	assert_true(progress_kept(&p, 0.7, "running") == 0.7);
 }
 
@@ -79,7 +79,7 @@ static void test_why_it_fell(void **state)
 	progress_explain_fall(&p, 0.4, "bootstrap", detail, sizeof detail);
 	progress_explain_fall(&p, 0.2, "running", detail, sizeof detail);
 	progress_explain_fall(&p, 0.8, "running", detail, sizeof detail);
-	progress_explain_fall(&p, 0.7999, "running", detail, sizeof detail); /* the same number */
+	progress_explain_fall(&p, 0.7999, "running", detail, sizeof detail); /* the displayed number is the same */
 	assert_string_equal(detail, "round 7");
 	progress_explain_fall(&p, 0.5, "running", small, sizeof small);
 	assert_string_equal(small, "round 7; it");

@@ -29,7 +29,7 @@ static void test_nearest(void **state)
 	assert_string_equal(nearest(""), "");
 }
 
-/* An offered name may be gone afterwards, as those of a folder are. */
+/* An offered name need not stay valid after the call: names in a folder listing do not. */
 static void test_copy(void **state)
 {
 	(void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Where paths lead that a program writes to, and what is there afterwards: files are replaced, links and devices stay.
- */
+/* Which file a program's output path leads to, and what is there afterwards: files are replaced, links and devices
+ * stay. */
 #include "common/base/target.h"
 #include "common/exr/image_file.h"
 
@@ -68,7 +68,7 @@ static void files_are_replaced(void **state)
 	int before = open("a/file", O_RDONLY);
 	expect_written("a/file", "two");
 	char got[8] = "";
-	assert_int_equal(read(before, got, 7), 3); /* who has it open still sees a whole one */
+	assert_int_equal(read(before, got, 7), 3); /* a process that has the file open still sees the whole old file */
 	assert_string_equal(got, "one");
 	close(before);
 	expect_content("a/file", "two");
@@ -106,10 +106,10 @@ static void pipes_and_devices_stay(void **state)
 	assert_string_equal(got, "said");
 	assert_int_equal(kind_of("a/pipe"), S_IFIFO);
 	close(reader);
-	/* A device of our own, and a link to it, as /dev/stdout is one. */
+	/* A device made by this test, and a link to it, like /dev/stdout. */
 	if (mknod("a/null", S_IFCHR | 0600, makedev(1, 3)) == 0) {
 		int fd = open("a/null", O_WRONLY);
-		if (fd >= 0) { /* not where devices do not work */
+		if (fd >= 0) { /* skipped where devices do not work */
 			expect_written("a/null", "gone");
 			assert_int_equal(symlink("null", "a/to-null"), 0);
 			expect_written("a/to-null", "gone");
@@ -118,7 +118,7 @@ static void pipes_and_devices_stay(void **state)
 		}
 		assert_int_equal(kind_of("a/null"), S_IFCHR);
 	}
-	/* A descriptor: behind what was written there before. */
+	/* A descriptor: output is appended to what was written there before. */
 	int fd = open("a/log", O_RDWR | O_CREAT, 0600);
 	assert_int_equal(write(fd, "1,", 2), 2);
 	snprintf(name, sizeof name, "/dev/fd/%d", fd);

@@ -65,7 +65,7 @@ static void texts_become_lines(void **state)
 	text_lines(out, sizeof out, cut, 3);
 	assert_string_equal(out, "one\nand 2 more");
 	text_lines(out, 8, cut + 1, 2);
-	assert_string_equal(out, "and 2 m"); /* never beyond the end */
+	assert_string_equal(out, "and 2 m"); /* never writes beyond the end of the buffer */
 }
 
 static void texts_are_cut_between_characters(void **state)
@@ -91,7 +91,7 @@ static void texts_are_cut_between_characters(void **state)
 	assert_string_equal(out, "123\xc3\xa4\xc3\xa4");
 	t = (struct text){out, sizeof out};
 	text_put(&t, "1234%s", "\xc3\xa4\xc3\xa4");
-	text_put(&t, "x"); /* nothing comes after what was cut */
+	text_put(&t, "x"); /* nothing is appended to a text that was cut */
 	assert_string_equal(out, "1234\xc3\xa4");
 }
 
@@ -109,7 +109,7 @@ static void texts_are_made_clean(void **state)
 	text_clean(command);
 	assert_string_equal(command, "  2J  \xc2\xa0  ");
 	assert_true(text_is_clean(command));
-	/* a sentence is clean whatever it quotes */
+	/* a sentence has no control characters, whatever it quotes */
 	struct error e;
 	error_set(&e, EINVAL, "<%.4s>: %s", "abc\xc3\xa4", "caf\xe9");
 	assert_string_equal(e.text, "<abc?>: caf?");

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The store of files by their hash: it keeps what it was given, refuses bytes with another hash, evicts the files that
- * were used longest ago and that nobody holds, and finds files that were damaged or removed meanwhile. What the disk
- * does to it is in test_blob_disk.c.
+ * The store of files by their hash: it keeps the files that it was given, refuses bytes with another hash, evicts the
+ * files that were used longest ago and that nobody holds, and detects files that were damaged or removed meanwhile.
+ * Errors of the disk are in test_blob_disk.c.
  */
 #include "common/base/disk.h"
 #include "common/blob/blob_batch.h"
@@ -26,7 +26,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* FIPS 180-2, appendix B.1. */
+/* Test vector of FIPS 180-2, appendix B.1. */
 static void knows_sha_256(void **state)
 {
 	(void)state;
@@ -59,7 +59,7 @@ static void keeps_and_reads_back(void **state)
 	struct blob_hash other = h;
 	other.bytes[0] ^= 1;
 	assert_int_equal(blob_open(s, &other, &size, &e), -ENOENT);
-	blob_text_store(s, "hello, farm"); /* twice is as once */
+	blob_text_store(s, "hello, farm"); /* storing a file twice has the effect of storing it once */
 	assert_int_equal(blob_text_bytes(folder), 11);
 	blob_store_close(s);
 }
@@ -79,12 +79,12 @@ static void refuses_false_bytes(void **state)
 	assert_int_equal(blob_write_commit(w, &e), -EBADMSG);
 	assert_int_equal(blob_write_begin(&w, s, &h, 4, &e), 0);
 	assert_int_equal(blob_write_add(w, "tru", 3, &e), 0);
-	assert_int_equal(blob_write_commit(w, &e), -EBADMSG); /* short */
+	assert_int_equal(blob_write_commit(w, &e), -EBADMSG); /* too short */
 	assert_false(blob_has(s, &h, NULL));
 	blob_store_close(s);
 	char command[128];
 	snprintf(command, sizeof command, "test -z \"$(ls -A '%s')\"", folder);
-	assert_int_equal(system(command), 0); /* no temporary file stays */
+	assert_int_equal(system(command), 0); /* no temporary file is left */
 }
 
 static void forgets_the_oldest_that_nobody_holds(void **state)
@@ -105,12 +105,12 @@ static void forgets_the_oldest_that_nobody_holds(void **state)
 	assert_true(blob_has(s, &a, NULL) && blob_has(s, &c, NULL) && blob_has(s, &d, NULL));
 	assert_int_equal(blob_text_bytes(folder), 30);
 	assert_true(blob_hold(s, &a));
-	assert_int_equal(blob_write_begin(&w, s, &b, 10, &e), -EFBIG); /* all in use */
+	assert_int_equal(blob_write_begin(&w, s, &b, 10, &e), -EFBIG); /* all bytes are in use */
 	assert_int_equal(blob_write_begin(&w, s, &b, 31, &e), -EMSGSIZE);
 	blob_store_close(s);
 }
 
-/* The last twenty of a hundred fit; whenever the store is opened, they are there and no others. */
+/* The last twenty of a hundred files fit; whenever the store is opened, these are there and no others. */
 static void knows_many(void **state)
 {
 	(void)state;
@@ -135,7 +135,8 @@ static void knows_many(void **state)
 	blob_store_close(s);
 }
 
-/* What two writers have brought has room below the limit together; what they only announced takes none. */
+/* The bytes that two writers have sent must fit below the limit together; bytes that were only announced take no room.
+ */
 static void room_is_taken_by_what_arrives(void **state)
 {
 	(void)state;
@@ -151,12 +152,12 @@ static void room_is_taken_by_what_arrives(void **state)
 	assert_int_equal(blob_write_add(w[1], "0123456789abcdef", 16, &e), 0);
 	assert_int_equal(blob_write_add(w[0], "0123456789", 10, &e), -EFBIG);
 	blob_write_abort(w[1]);
-	for (int i = 0; i < 3; i += 2) { /* the second finds it there */
+	for (int i = 0; i < 3; i += 2) { /* the second writer finds the file stored */
 		assert_int_equal(blob_write_add(w[i], "0123456789", 10, &e), 0);
 		assert_int_equal(blob_write_commit(w[i], &e), 0);
 	}
 	assert_int_equal(blob_text_bytes(folder), 10);
-	assert_int_equal(blob_write_begin(&w[1], s, &b, 15, &e), 0); /* all that arrived is given back */
+	assert_int_equal(blob_write_begin(&w[1], s, &b, 15, &e), 0); /* all that had arrived was given back */
 	blob_write_abort(w[1]);
 	blob_store_close(s);
 }
@@ -182,7 +183,7 @@ static void evicts_as_bytes_arrive(void **state)
 	assert_int_equal(blob_write_add(w, "0", 1, &e), 0);
 	assert_false(blob_has(s, &a, NULL));
 	assert_true(blob_has(s, &b, NULL));
-	assert_true(blob_hold(s, &b)); /* which is what is left to evict */
+	assert_true(blob_hold(s, &b)); /* b is the only file left to evict */
 	assert_int_equal(blob_write_add(w, "123456789", 9, &e), 0);
 	assert_int_equal(blob_write_add(w, "0", 1, &e), -EFBIG);
 	assert_int_equal(blob_text_bytes(folder), 30);
@@ -193,7 +194,7 @@ static void evicts_as_bytes_arrive(void **state)
 	blob_store_close(s);
 }
 
-/* A smaller limit after a restart: what is held by then stays, though it is the oldest. */
+/* After a restart with a smaller limit, files that are held before the store is trimmed stay, even the oldest. */
 static void held_before_it_is_trimmed(void **state)
 {
 	(void)state;
@@ -213,8 +214,8 @@ static void held_before_it_is_trimmed(void **state)
 	blob_store_close(s);
 }
 
-/* Any byte of it: it is noticed, kept beside, no more given out; writing it again mends it, and who held it holds it
- * still. */
+/* Any byte is damaged: a check detects it, the file is moved aside and no longer given out; writing the file again
+ * restores it, and its holders still hold it. */
 static void damaged_at_rest(void **state)
 {
 	(void)state;
@@ -234,9 +235,9 @@ static void damaged_at_rest(void **state)
 		char wrong = (char)(text[at] ^ 1);
 		assert_int_equal(pwrite(fd, &wrong, 1, (off_t)at), 1);
 		close(fd);
-		assert_int_equal(blob_check(s, &h, 1000, &e), 0); /* it was just written, and is not read again */
+		assert_int_equal(blob_check(s, &h, 1000, &e), 0); /* the file was just written, and is not read again */
 		assert_int_equal(blob_check(s, &h, BLOB_SINCE_GIVEN, &e), 0);
-		if (at % 2) { /* whoever got it may have wrong bytes */
+		if (at % 2) { /* whoever was given the file may have wrong bytes */
 			close(blob_open(s, &h, &size, &e));
 			assert_int_equal(blob_check(s, &h, 1000, &e), 0);
 		}
@@ -249,7 +250,7 @@ static void damaged_at_rest(void **state)
 		assert_int_equal(blob_check(s, &h, 0, &e), 0);
 		assert_true(blob_has(s, &h, &size) && size == strlen(text));
 	}
-	for (int seconds = 0; seconds <= 1000; seconds += 1000) { /* however recently it was read */
+	for (int seconds = 0; seconds <= 1000; seconds += 1000) { /* however recently the file was read */
 		unlink(path);
 		assert_int_equal(blob_check(s, &h, seconds, &e), -EBADMSG);
 		assert_non_null(strstr(e.text, "gone"));
@@ -259,12 +260,12 @@ static void damaged_at_rest(void **state)
 	unlink(path);
 	assert_int_equal(blob_check(s, &h, BLOB_SINCE_GIVEN, &e), -EBADMSG);
 	assert_int_equal(blob_expect(s, &h, &e), 0);
-	assert_int_equal(blob_expect(s, &other, &e), 0); /* never there */
+	assert_int_equal(blob_expect(s, &other, &e), 0); /* a file that was never there */
 	assert_false(blob_has(s, &other, NULL));
 	blob_text_store(s, "x");
 	blob_release(s, &other);
 	blob_text_store(s, text);
-	for (int i = 0; i < 40; i++) { /* more than there is room for: what is held stays */
+	for (int i = 0; i < 40; i++) { /* more files than there is room for: held ones stay */
 		char more[64];
 		snprintf(more, sizeof more, "something else of fifty bytes or so, number %d", i);
 		struct blob_hash m = blob_text_store(s, more);
@@ -274,7 +275,7 @@ static void damaged_at_rest(void **state)
 	blob_store_close(s);
 }
 
-/* It is made again; what was in it is missed when it is looked for. */
+/* The removed folder is made again; the files that were in it are found missing when they are used. */
 static void a_folder_that_is_removed(void **state)
 {
 	(void)state;
@@ -296,7 +297,7 @@ static void a_folder_that_is_removed(void **state)
 	blob_store_close(s);
 }
 
-/* A check in parts: what happens to the blob in between. */
+/* A check in parts, and what happens to the file between these parts. */
 static void checked_in_parts(void **state)
 {
 	(void)state;
@@ -309,13 +310,13 @@ static void checked_in_parts(void **state)
 	struct blob_hash h = blob_text_store(s, "bytes that are checked");
 	blob_release(s, &h);
 	blob_path(s, &h, path, sizeof path);
-	/* ended early: nothing is known, and nothing is lost */
+	/* the check ends early: nothing is known, and nothing is lost */
 	assert_int_equal(blob_check_begin(&c, s, &h, 0, &e), 1);
 	assert_int_equal(blob_check_end(c, &e), -ECANCELED);
 	close(blob_open(s, &h, &size, &e));
 	assert_int_equal(blob_check_begin(&c, s, &h, BLOB_SINCE_GIVEN, &e), 1);
 	assert_int_equal(blob_check_end(c, &e), -ECANCELED);
-	/* it is held, and given again before its check has ended */
+	/* the file is held, and given out again before its check has ended */
 	assert_int_equal(blob_check_begin(&c, s, &h, BLOB_SINCE_GIVEN, &e), 1);
 	assert_true(blob_is_being_checked(s, &h));
 	struct blob_hash more = blob_text_hash("other bytes, too many of them");
@@ -327,7 +328,7 @@ static void checked_in_parts(void **state)
 	assert_int_equal(blob_check_end(c, &e), 0);
 	assert_false(blob_is_being_checked(s, &h));
 	assert_int_equal(blob_check_begin(&c, s, &h, BLOB_SINCE_GIVEN, &e), 1);
-	/* two at once find the damage, and it is written again before the second says so */
+	/* two checks find the damage at once, and the file is written again before the second one reports it */
 	assert_int_equal(truncate(path, 3), 0);
 	assert_int_equal(blob_check_begin(&other, s, &h, 0, &e), 1);
 	while (blob_check_read(c) || blob_check_read(other))

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The store of files on a disk that fails: errors are reported and cost no file, a store that must survive flushes
- * before it says that a file is there, alone or with others, a cache never does and reads its files again after a loss
- * of power, and what cannot be written because the disk is full goes away.
+ * The store of files on a disk that fails: errors are reported and cost no file. A store that must survive a loss of
+ * power flushes files, alone or in batches, before it reports them as stored; a cache never flushes, and reads its
+ * files again after a restart. When the disk is full, the file that could not be written is removed.
  */
 #include "common/base/disk.h"
 #include "common/blob/blob_batch.h"
@@ -63,8 +63,8 @@ static int failing_close(int fd)
 	return -1;
 }
 
-/* A cache flushes nothing: after a loss of power a name may be there without its bytes, and is read before it is used.
- */
+/* A cache flushes nothing: after a loss of power a name may be there without its bytes, so the file is read before it
+ * is used. */
 static void flushed_as_needed(void **state)
 {
 	(void)state;
@@ -91,7 +91,7 @@ static void flushed_as_needed(void **state)
 	blob_store_close(s);
 }
 
-/* As on a network file system that writes when the file is closed. */
+/* A network file system that writes when the file is closed may fail there. */
 static void a_cached_file_that_cannot_be_closed(void **state)
 {
 	(void)state;
@@ -124,7 +124,8 @@ static struct blob_writer *write_text(struct blob_store *s, const char *text, st
 	return w;
 }
 
-/* What a batch has is there once it was entered, and not before; what was not is gone, and so is the room for it. */
+/* The files of a batch are in the store once the batch was entered, and not before; files that were not entered are
+ * gone, and their room is free. */
 static void flushed_together(void **state)
 {
 	(void)state;
@@ -143,7 +144,7 @@ static void flushed_together(void **state)
 	assert_true(blob_has(s, &h[0], NULL) && blob_has(s, &h[1], NULL));
 	assert_true(blob_hold(s, blob_batch_hash(b, 0)));
 	blob_batch_free(b);
-	b = blob_batch_new(s); /* its ten bytes fit, and h[1] need not go for them */
+	b = blob_batch_new(s); /* its ten bytes fit without evicting h[1] */
 	assert_int_equal(blob_batch_add(b, write_text(s, "ABCDEFGHIJ", &h[2]), &e), 0);
 	blob_batch_free(b);
 	assert_true(blob_has(s, &h[1], NULL) && !blob_has(s, &h[2], NULL));
@@ -153,7 +154,7 @@ static void flushed_together(void **state)
 	blob_store_close(s);
 }
 
-/* Two send the same: one of them stores it first, and neither loses it. */
+/* Two clients send the same file: one of them stores it first, and neither loses it. */
 static void stored_meanwhile(void **state)
 {
 	(void)state;
@@ -170,12 +171,12 @@ static void stored_meanwhile(void **state)
 	blob_batch_enter(b);
 	blob_batch_free(b);
 	assert_true(blob_has(s, &h, &size) && size == 10);
-	struct blob_hash more = blob_text_store(s, "twenty bytes of text"); /* which fit beside it */
+	struct blob_hash more = blob_text_store(s, "twenty bytes of text"); /* fits beside it */
 	assert_true(blob_has(s, &h, NULL) && blob_has(s, &more, NULL));
 	blob_store_close(s);
 }
 
-/* Power is lost before the flush: the next start finds nothing of it. */
+/* Power is lost before the flush: the next start finds nothing of the file. */
 static void not_flushed(void **state)
 {
 	(void)state;
@@ -198,7 +199,7 @@ static void not_flushed(void **state)
 	blob_store_close(s);
 }
 
-static int full_with; /* errno of writes, as long as some file is there */
+static int full_with; /* errno of writes as long as there are files */
 static char full_while[256];
 
 static ssize_t write_where_room_is(int fd, const struct iovec *parts, int count, off_t at)
@@ -217,7 +218,8 @@ static bool remove_that_file(void *user)
 	return unlink(full_while) == 0;
 }
 
-/* A full disk, or a quota that is used up: what nobody holds goes first, then whoever has more is asked. */
+/* On a full disk, or when a quota is used up, files that nobody holds are evicted first; then whoever holds more is
+ * asked to free some. */
 static void a_disk_that_is_full(void **state)
 {
 	(void)state;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A store of many small files makes room in steps whose time does not grow with the number of its files: as many files
- * go for some bytes as those bytes have blocks on the disk, each without a look at the others. What was used or
- * released last goes last.
+ * A store of many small files makes room in steps whose time does not grow with the number of its files: a write evicts
+ * as many files as its bytes have blocks on the disk, without looking at the others. The file that was used or released
+ * last is evicted last.
  */
 #include "common/base/disk.h"
 #include "common/blob/blob.h"
@@ -34,12 +34,12 @@ static double user_seconds(void)
 static struct blob_hash hash_of_number(unsigned i)
 {
 	struct blob_hash h = {{0}};
-	uint32_t mixed = i * UINT32_C(2654435761); /* so that they do not lie in order */
+	uint32_t mixed = i * UINT32_C(2654435761); /* so that they are not in order */
 	memcpy(h.bytes, &mixed, sizeof mixed);
 	return h;
 }
 
-/* Files whose names nobody compares with their contents. */
+/* A store whose files' contents do not match their names; nobody compares these. */
 static struct blob_store *store_of(unsigned count, uint64_t limit)
 {
 	struct blob_store *s;
@@ -58,14 +58,14 @@ static struct blob_store *store_of(unsigned count, uint64_t limit)
 	return s;
 }
 
-/* For what is no file here nothing is to be removed. */
+/* The files exist only in the store's table: there is nothing to remove. */
 static int no_unlink(const char *path)
 {
 	(void)path;
 	return 0;
 }
 
-/* User time of so many evictions of a store of `count` files. */
+/* User time of FEW evictions from a store of `count` files. */
 static double time_of_evictions(unsigned count)
 {
 	struct disk none = disk_system;
@@ -90,7 +90,7 @@ static void each_without_a_look_at_others(void **state)
 		fail_msg("%d evictions of %d files took %g s, of %d files %g s", FEW, FEW, few, MANY, many);
 }
 
-/* A megabyte is 256 blocks. */
+/* A megabyte has 256 blocks. */
 static void as_many_as_blocks(void **state)
 {
 	(void)state;
@@ -116,7 +116,7 @@ static void as_many_as_blocks(void **state)
 	blob_store_close(s);
 }
 
-/* All go in the end, and none that is held: counted in bytes and in entries. */
+/* All files are evicted in the end, except held ones; the store's bytes and entries agree. */
 static void all_but_those_that_are_held(void **state)
 {
 	(void)state;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The error that a canvas estimates: its interval covers the truth, and the distances of groups are what it says. */
+/* The error that a canvas estimates: its interval covers the true error, and the distances between groups are correct.
+ */
 #include "common/estimate/canvas_image.h"
 
 #include "common/base/mem.h"
@@ -14,7 +15,7 @@
 #include <string.h>
 #include <cmocka.h>
 
-static double group_offset; /* shared by all pixels of a group: an error of b looks so */
+static double group_offset; /* offset shared by all pixels of a group: the effect of an error of b */
 static double pixel_noise;
 
 static float noisy(void)
@@ -22,11 +23,11 @@ static float noisy(void)
 	return (float)(4 * (1 + group_offset + pixel_noise * canvas_normal()));
 }
 
-/* 400 images with known true relMSE, 16 groups: the upper end is to lie above the truth in 95 % of the runs, the
- * estimate's mean is to be the truth. Level: an interval that covers 92 % or more (the Satterthwaite approximation is
- * allowed as much) fails the limit of 85 % with a probability below 1e-6; the mean of 400 estimates has a standard
- * error of at most 1.8 %, so 10 % off has a probability below 1e-7. Power: a coverage of 78 % (an interval forgotten
- * gives about 50 %) is found with more than 99.9 %. Errors common to all pixels are the hard case. */
+/* 400 images with known true relMSE, 16 groups: the upper end must be above the truth in 95 % of the runs, and the
+ * estimate's mean must equal the truth. Level: an interval that covers 92 % or more (the Satterthwaite approximation
+ * may cost that much) fails the limit of 85 % with a probability below 1e-6; the mean of 400 estimates has a standard
+ * error of at most 1.8 %, so a deviation of 10 % has a probability below 1e-7. Power: a coverage of 78 % (without an
+ * interval it is about 50 %) is found with more than 99.9 %. Errors common to all pixels are the hard case. */
 static void estimated_error_covers_the_truth(void **unused)
 {
 	(void)unused;
@@ -35,7 +36,7 @@ static void estimated_error_covers_the_truth(void **unused)
 		double each = 0.08, truth = 0, mean_estimate = 0;
 		int covered = 0;
 		enum { RUNS = 400 };
-		/* The mean of 16 groups has a variance of each^2/16 per pixel, relative to B = 1, in X, Y and Z alike
+		/* The mean of 16 groups has a variance of each^2/16 per pixel, relative to B = 1, equal in X, Y and Z
 		 * when correlated; the expected relMSE is compared with (rgb - truth)^2 realised over the runs. */
 		for (int run = 0; run < RUNS; run++) {
 			struct canvas *c;
@@ -103,8 +104,8 @@ static float nearly_one(void)
 	return (float)(1 + 0.02 * canvas_uniform());
 }
 
-/* A group's distance over any weights, from nothing but what was put into its film; their sum is that of the squared
- * errors. */
+/* A group's distance under any weights, computed here from the values that were put into its film only; the sum over
+ * groups is that of the squared errors. */
 static void distances_of_groups_are_the_errors(void **unused)
 {
 	(void)unused;

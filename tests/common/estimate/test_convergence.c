@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * When chains are said to disagree (common/estimate/convergence.h), from synthetic images. Each criterion alone, just
- * below and just above its limit: tiles that have not mixed, classes that differ from the bootstrap, groups that are
- * apart, chains that stand still. Then the sentences, which must fit however many criteria fail, and what the image
- * file says.
+ * below and just above its limit: tiles that have not mixed, classes that differ from the bootstrap, groups that differ
+ * from each other, chains that stand still. Then the sentences, which must fit however many criteria fail, and the
+ * header of the image file.
  */
 #include "common/estimate/convergence.h"
 
@@ -28,7 +28,7 @@ struct fixture {
 	float r_hat[TILES], tile_error[TILES], tile_share[TILES];
 };
 
-/* 64 chains in 16 groups, 20 rounds of 1,000 mutations, and nothing wrong with them. */
+/* 64 chains in 16 groups, 20 rounds of 1,000 mutations, without any disagreement. */
 static void make_fixture(struct fixture *f)
 {
 	memset(f, 0, sizeof *f);
@@ -87,7 +87,8 @@ static void expect_words(const struct convergence *a, const char *words)
 static void tails_of_student(void **state)
 {
 	(void)state;
-	/* Cauchy has a closed form; so do 2 degrees: 1 - t / sqrt(t^2 + 2). Quantiles of 15 degrees from tables. */
+	/* Student's t with 1 degree of freedom (Cauchy) has a closed form; so has 2: 1 - t / sqrt(t^2 + 2). Quantiles
+	 * of 15 degrees are from tables. */
 	for (double t = 0; t < 30; t += 0.7) {
 		close_to(convergence_student_tail(t, 1), 1 - 2 / M_PI * atan(t), 1e-14);
 		close_to(convergence_student_tail(-t, 2), 1 - t / sqrt(t * t + 2), 1e-14);
@@ -112,7 +113,7 @@ static void all_is_well(void **state)
 	close_to(a.r_hat_worst, 1.038, 1e-6);
 	assert_int_equal(a.worst_x, 7 + 3 * TILE_SIZE);
 	assert_int_equal(a.worst_y, 11 + 4 * TILE_SIZE);
-	/* Nothing known of tiles, or no light in them. */
+	/* Nothing is known of tiles, or there is no light in them. */
 	f.img.r_hat = f.img.tile_error = f.img.tile_share = NULL;
 	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 	assert_true(isnan(a.r_hat_median) && isnan(a.r_hat_worst));
@@ -176,23 +177,23 @@ static void classes_that_differ(void **state)
 	make_fixture(&f);
 	struct path_class_energy *rough = &f.img.classes[path_class(4, PATH_ROUGH)],
 				 *both = &f.img.classes[path_class(4, PATH_BOTH)];
-	/* 5 % of b too little; t of 15 degrees at 5e-6, two-sided, is 6.91. */
+	/* b is too small by 5 %; the two-sided quantile of t with 15 degrees at 5e-6 is 6.91. */
 	*rough = (struct path_class_energy){1.5, 0.01, 1.4, 0.01, -6.8};
 	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 	rough->difference_t = -7;
 	assert_int_equal(verdict_of(&f, &a), CHAINS_DISAGREE);
 	assert_int_equal(a.classes_flagged, 1U << path_class(4, PATH_ROUGH));
 	expect_words(&a, "to paths (rough, 3-4 edges) they give 70 % of the light, the bootstrap 75 %");
-	/* As significant, but small. */
+	/* As significant, but a small part of the light. */
 	*rough = (struct path_class_energy){1.5, 0.001, 1.47, 0.001, -20};
 	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
-	/* Large for a small class. */
+	/* A large difference for a small class. */
 	make_fixture(&f);
 	*both = (struct path_class_energy){0.02, 0.001, 0.015, 0.001, -7};
 	assert_int_equal(verdict_of(&f, &a), CHAINS_DISAGREE);
 	*both = (struct path_class_energy){0.009, 0.0001, 0.006, 0.0001, -7};
 	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
-	/* More than the bootstrap: only where the bootstrap knows the class. */
+	/* A class has more energy than in the bootstrap: this counts only if the bootstrap found the class. */
 	*both = (struct path_class_energy){0.5, 0.01, 0.6, 0.01, 7};
 	assert_int_equal(verdict_of(&f, &a), CHAINS_DISAGREE);
 	*both = (struct path_class_energy){0.1, 0.02, 0.6, 0.01, 30};
@@ -223,7 +224,7 @@ static void groups_that_are_apart(void **state)
 	f.plan.groups = 7;
 	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 	f.plan.groups = 16;
-	*both = (struct path_class_energy){0.1, 0.1, 0.059, 0.059, 1}; /* too little to see */
+	*both = (struct path_class_energy){0.1, 0.1, 0.059, 0.059, 1}; /* too little energy to matter */
 	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 }
 
@@ -238,7 +239,7 @@ static void chains_that_stand_still(void **state)
 	f.img.counts.counters[COUNT_STUCK] = 14;
 	assert_int_equal(verdict_of(&f, &a), CHAINS_DISAGREE);
 	expect_words(&a, "in 1.09 % of their epochs of 1000 mutations they accepted nothing");
-	f.plan.epoch = 999; /* too short an epoch to mean much */
+	f.plan.epoch = 999; /* the epoch is too short to tell much */
 	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 }
 
@@ -255,7 +256,7 @@ static void samples_agree(void **state)
 	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 }
 
-/* All at once must fit; the table has a row for each class with energy. */
+/* The sentences of all criteria together must fit; the table has a row for each class with energy. */
 static void words_fit(void **state)
 {
 	(void)state;

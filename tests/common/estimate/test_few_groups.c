@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What an image says of its own error where it has few groups.
+ * What an image states about its own error when it has few groups.
  *
- * - A pixel in which one group outweighs the others is doubtful with any number of groups from five on. The pixel was
- *   chosen so that a limit on the kurtosis of 0.6 times the number of groups, which is that of 16, finds it with 16
- *   groups only.
- * - Two hits of a firefly make no highlight, three do, with any number of groups that could tell: with eight, two hits
- *   are 1.53 standard errors high, which with 16 only three are.
- * - Four groups of few pixels state no interval, and with many they do, if their errors have a variance: of 50 pictures
- *   whose errors have none at most 10 state one. If a fifth did by chance, that would be 10 in the mean; the seeds are
- *   fixed, 5 do, and 49 without the doubt about tails.
+ * - A pixel in which one group outweighs the others is doubtful with any number of groups from five on. The pixel is
+ *   chosen so that a limit of 0.6 times the number of groups on the kurtosis, which is the limit for 16, would find it
+ *   with 16 groups only.
+ * - Two hits of a firefly do not make a highlight, three do, with any number of groups that could tell: with eight, two
+ *   hits are 1.53 standard errors high, a height that takes three hits with 16 groups.
+ * - With four groups, pictures of few pixels state no interval, and those of many do if their errors have a variance:
+ *   of 50 pictures whose errors have none at most 10 state one. If a fifth did by chance, 10 would be the mean; the
+ *   seeds are fixed: 5 do, and 49 without the doubt about tails.
  */
 #include "common/estimate/canvas_image.h"
 #include "common/estimate/stated_error.h"
@@ -34,7 +34,7 @@ static struct plan plan_of(uint32_t groups, uint32_t width, uint32_t height)
 	return p;
 }
 
-/* Groups agree to 10 % but for the first few of them, which find light in one pixel. */
+/* Groups agree to 10 %, except that the first few of them find extra light in one pixel. */
 struct found {
 	double light[3];
 };
@@ -89,7 +89,7 @@ static double grain(void *user, uint32_t group, uint32_t pixel)
 	return 1 + 0.3 * dice_normal(user);
 }
 
-/* Grain and a little light of a Pareto law of index 1.5, which has no variance. */
+/* Grain, and a little light that follows a Pareto law of index 1.5, which has no variance. */
 static double unequal_light(void *user, uint32_t group, uint32_t pixel)
 {
 	(void)group;
@@ -97,7 +97,7 @@ static double unequal_light(void *user, uint32_t group, uint32_t pixel)
 	return 0.9 + 0.3 * dice_normal(user) + 0.1 / 3 * pow(1 - dice_throw(user), -1 / 1.5);
 }
 
-/* How many of 50 pictures state an interval. */
+/* Returns how many of 50 pictures state an interval. */
 static int stated_of(const char *name, group_image_value *of, struct plan p, enum error_doubt *doubt)
 {
 	struct dice d = dice_of(name);

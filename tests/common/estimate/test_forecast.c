@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Forecasts against renders played with exact chi-square statistics: groups whose pixels' deviations are Brownian in
+ * Forecasts against renders simulated with exact chi-square statistics: groups whose pixels' deviations are Brownian in
  * work. Level: each share of intervals that hold is a binomial of 300 renders whose expectation is 0.93 or more (the
- * prior of the trend makes intervals wider than the noise alone); below 0.86 with less than 1e-6. Power: intervals of
- * half the width hold in 0.67 or less of the renders, a wrong law of work in none.
+ * prior of the trend makes intervals wider than the noise alone); it is below 0.86 with a probability of less than
+ * 1e-6. Power: intervals of half the width hold in 0.67 or less of the renders, those of a wrong law of work in none.
  */
 #include "common/json/estimate_json.h"
 #include "common/estimate/merge.h"
@@ -18,7 +18,7 @@
 #include <stdio.h>
 #include <cmocka.h>
 
-/* Wilson and Hilferty 1931; 14 degrees and more. */
+/* Chi-square deviate for 14 degrees of freedom and more (Wilson and Hilferty 1931). */
 static double chi_square(struct dice *d, double degrees)
 {
 	double s = 2 / (9 * degrees), root = 1 - s + sqrt(s) * dice_normal(d);
@@ -32,7 +32,8 @@ static double chi_square_5(double degrees)
 	return root > 0 ? degrees * root * root * root : 0;
 }
 
-/* A render: sum of squares over `degrees` dimensions of a Brownian motion whose variance grows by 1 a unit of work. */
+/* A simulated render: sum of squares over `degrees` dimensions of a Brownian motion whose variance grows by 1 per unit
+ * of work. */
 struct walk {
 	double degrees, square, work, scale; /* relMSE = scale / work */
 };
@@ -100,7 +101,7 @@ static void intervals_hold(void **state)
 		}
 		printf("%4.0f degrees: %.3f of the intervals hold, high over low %.2f, predicted over real %.3f\n",
 		       degrees[k], (double)held / (double)runs, exp(wide), exp(off));
-		if (runs >= 300) /* fewer show that nothing breaks */
+		if (runs >= 300) /* with fewer runs this only shows that nothing breaks */
 			assert_true((double)held >= 0.86 * (double)runs);
 		assert_true(exp(wide) < (degrees[k] < 100 ? 16 : 4));
 		if (runs >= 300)
@@ -108,7 +109,7 @@ static void intervals_hold(void **state)
 	}
 }
 
-/* The forecast of a render by its own looks knows what has come already. */
+/* A render's forecast from its own estimates takes into account what has been rendered already. */
 static void own_looks_tell_more(void **state)
 {
 	(void)state;
@@ -175,7 +176,7 @@ static void halving_costs_three_times_what_was_paid(void **state)
 	assert_true(fabs(error.middle / (0.5 * sqrt(end->rel_mse)) - 1) < 0.05);
 }
 
-/* Light that comes in bursts: the error falls more slowly than the rule says, and the forecast sees it coming. */
+/* Light that comes in bursts: the error falls more slowly than by the rule, and the forecast follows that trend. */
 static void a_trend_is_seen(void **state)
 {
 	(void)state;
@@ -197,7 +198,7 @@ static void a_trend_is_seen(void **state)
 	assert_true(middle[1] > 1.2 * middle[0] && middle[1] < 2.5);
 }
 
-/* Looks in doubt: their interval is not known, or a multiple of the estimate counts. */
+/* Makes estimates in doubt: their interval is unknown, and a multiple of the estimate counts where there is one. */
 static struct forecast_history doubtful_looks(double factor, unsigned known)
 {
 	struct forecast_history h = {0};
@@ -212,7 +213,8 @@ static struct forecast_history doubtful_looks(double factor, unsigned known)
 	return h;
 }
 
-/* Whoever waits for an error in doubt waits for a share of the target, and for a small error at most. */
+/* A user who waits for an error in doubt waits until the estimate is a fraction of the target, and below a small error.
+ */
 static void doubt_is_waited_for(void **state)
 {
 	(void)state;
@@ -229,11 +231,11 @@ static void doubt_is_waited_for(void **state)
 			assert_true(fabs(stop / stops[rule][i] - 1) < 1e-9);
 			assert_true(forecast_target(&h, &p, targets[i], FORECAST_SAME, &c));
 			assert_true(c.work.middle > 0.8 * want && c.work.middle < 1.2 * want);
-			/* Another render may be luckier than its pilot. */
+			/* A new render may have less error than its pilot had. */
 			assert_true(forecast_target(&h, &p, targets[i], FORECAST_NEW, &fresh));
 			assert_true(fresh.work.middle > 0.8 * alone && fresh.work.middle < 1.2 * alone);
 			assert_true(fresh.work.low <= c.work.low);
-			p.kind = PLAN_CHAINS; /* whose doubt ends */
+			p.kind = PLAN_CHAINS; /* the doubt of such a render ends */
 			assert_true(forecast_stop_in_doubt(&h, &p, targets[i]) == 0);
 			p.kind = PLAN_SAMPLES;
 			h.looks[h.count - 1].doubtful = 0;
@@ -242,8 +244,8 @@ static void doubt_is_waited_for(void **state)
 		}
 }
 
-/* The more of a pilot's looks are in doubt, the longer a render is expected to take; without any, as if there were no
- * such thing. */
+/* The more of a pilot's estimates are in doubt, the longer a render is expected to take; without doubtful ones the
+ * forecast is the ordinary one. */
 static void doubt_is_counted(void **state)
 {
 	(void)state;
@@ -260,7 +262,7 @@ static void doubt_is_counted(void **state)
 		       c.work.low, c.work.high, sure.work.middle);
 		assert_true(c.work.middle <= before && c.work.high >= sure.work.high);
 		assert_true(known < 9 || c.work.middle < 1.3 * sure.work.middle);
-		/* What a multiple of the estimate says is no margin of those that are known. */
+		/* A multiple of the estimate adds no margin to estimates whose interval is known. */
 		assert_true(known < 6 || c.work.low < 1.2 * sure.work.low);
 		assert_true(known > 0 || c.work.middle > 15 * sure.work.middle);
 		before = c.work.middle;
@@ -290,9 +292,9 @@ static void what_is_no_look_is_passed_over(void **state)
 	assert_true(h.looks[FORECAST_LOOKS - 1].work == 3 * FORECAST_LOOKS);
 	assert_null(forecast_reached(&h, 1e-9));
 	assert_ptr_equal(forecast_reached(&h, 10), &h.looks[0]);
-	h.looks[0].doubtful = 1; /* no render would have ended by it */
+	h.looks[0].doubtful = 1; /* no render would have ended at it */
 	assert_ptr_equal(forecast_reached(&h, 10), &h.looks[1]);
-	/* Out of reach is said, not computed with. */
+	/* A target out of reach is reported as such, without computing. */
 	assert_true(forecast_target(&h, &p, 1e-200, FORECAST_SAME, &c) && isinf(c.work.low));
 }
 

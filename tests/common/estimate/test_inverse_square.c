@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Moments of the weight of a brightness that is known with an error, against the midpoint rule in the brightness
- * itself; no statistics. The floor is from a thousandth of the error to a hundred errors.
+ * Moments of the weight of a brightness that is known with an error, against the midpoint rule over the brightness
+ * itself, without statistics. The floor ranges from a thousandth of the error to a hundred errors.
  */
 #include "common/estimate/inverse_square.h"
 

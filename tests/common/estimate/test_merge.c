@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* When the error is looked at, and what stopping by it does: the ladder, and renders that are stopped by their targets.
- */
+/* When the error is estimated, and what stopping by it does: the ladder of rounds, and renders that stop at their
+ * targets. */
 #include "common/base/mem.h"
 #include "common/estimate/merge.h"
 #include "tests/support/dice.h"
@@ -28,7 +28,7 @@ static void looks_are_geometric(void **state)
 {
 	(void)state;
 	static const uint64_t ladder[] = {1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 15, 18, 22, 27, 33, 41};
-	struct plan p = plan_of(30, 20, 4); /* 64 samples a pixel and round */
+	struct plan p = plan_of(30, 20, 4); /* 64 samples per pixel and round */
 	uint64_t r = 0;
 	for (size_t i = 0; i < sizeof ladder / sizeof *ladder; i++) {
 		r = merge_error_next(&p, r);
@@ -45,7 +45,7 @@ static void looks_are_geometric(void **state)
 	assert_false(merge_error_due(&p, 1));
 }
 
-/* A black image, of at least a million samples, where nothing but an error bounds them. */
+/* A black image ends, after a million samples at least, if only an error bounds it. */
 static void black_ends(void **state)
 {
 	(void)state;
@@ -71,8 +71,8 @@ static void black_ends(void **state)
 	assert_int_equal(merge_end_of(&p, 27, 0, &img), MERGE_GOES_ON);
 }
 
-/* At least 0.9 mutations a pixel and group between looks, whatever the plan's rounds are; and steps of a quarter or
- * less, once there are four. */
+/* At least 0.9 mutations per pixel and group between two estimates, however long the plan's rounds are; and, from four
+ * rounds on, steps of a quarter or less. */
 static void looks_are_worth_their_cost(void **state)
 {
 	(void)state;
@@ -98,7 +98,7 @@ static void looks_are_worth_their_cost(void **state)
 		    merge_error_next(&p, UINT64_MAX / 4) > UINT64_MAX / 4);
 }
 
-/* A render whose pixels err by themselves and all together: sums of a group and round of `epoch` samples. */
+/* A render whose pixels have errors of their own and one in common: sums of a group and round of `epoch` samples. */
 struct render {
 	double each, common;
 	struct dice dice;
@@ -167,13 +167,13 @@ static int by_size(const void *a, const void *b)
 }
 
 /*
- * 300 renders each, stopped at a target that needs 7 rounds and more. Published: the share whose error is above the
- * target at the stop, its median over the target, and the rounds. It is 15 to 20 % in all cases, near what a single
- * look has when one error is common to all pixels (the error at hand is a normal's magnitude, and no rule can know it);
- * with errors of many pixels the 15 % are above by 2 % or so, because the upper end is at the estimate then. So a
- * second look that confirms would buy nothing. Level: binomial; a share of 20 % fails the limit of 33 % of 300 with
- * 1e-7. Power: without the interval (the estimate against the target) it is above 40 % in all cases, found with more
- * than 99 %.
+ * 300 renders each, stopped at a target that needs 7 rounds or more. Printed: the share whose error is above the target
+ * at the stop, its median over the target, and the rounds. The share is 15 to 20 % in all cases, near that of a single
+ * estimate when one error is common to all pixels (the error of one render is then the magnitude of one normal deviate,
+ * which no rule can know); where many pixels have errors of their own the 15 % are above the target by about 2 %,
+ * because there the upper end is close to the estimate. So a second estimate that confirms the first would gain
+ * nothing. Level: binomial; a share of 20 % exceeds the limit of 33 % of 300 with a probability of 1e-7. Power: without
+ * the interval (the estimate against the target) the share is above 40 % in all cases, found with more than 99 %.
  */
 static void stops_are_not_lucky_dips(void **state)
 {
@@ -210,7 +210,8 @@ static void stops_are_not_lucky_dips(void **state)
 	}
 }
 
-/* Against a clock that completes rounds one by one: the render ends at the first of them after its time. */
+/* Against a clock that completes rounds one by one: the render ends at the first round that completes after its time
+ * limit. */
 static void time_ends_with_a_round(void **state)
 {
 	(void)state;
@@ -222,7 +223,7 @@ static void time_ends_with_a_round(void **state)
 		while (end < p.seconds || end < now)
 			end += round;
 		double left = merge_seconds_left(&p, now, (now - bootstrap) / round, 1 / round);
-		/* the clock adds up rounding errors, and at its beats one round more or less is as true */
+		/* the clock adds up rounding errors: at its beats, one round more or less is equally correct */
 		double wrong = fabs(left - (end - now)) / round;
 		assert_true(wrong < 1e-6 || fabs(wrong - 1) < 1e-6);
 		if (wrong > 0.5)

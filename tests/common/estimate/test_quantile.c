@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Against tables of the F and chi-square distributions, and against closed forms. */
+/* Quantiles against tables of the F and chi-square distributions, and against closed forms. */
 #include "common/estimate/quantile.h"
 
 #include <math.h>
@@ -36,15 +36,15 @@ static void quantiles_are_those_of_the_tables(void **state)
 static void closed_forms_hold(void **state)
 {
 	(void)state;
-	/* Two degrees above: P(F < x) = 1 - (1 + 2 x / b)^(-b / 2). */
+	/* Two degrees in the numerator: P(F < x) = 1 - (1 + 2 x / b)^(-b / 2). */
 	for (double b = 1; b < 1e5; b *= 3.7)
 		for (double p = 0.025; p < 1; p += 0.095)
 			assert_near(f_quantile(p, 2, b), b / 2 * expm1(-2 / b * log1p(-p)), 1e-7);
-	/* One and one: (2 / pi) atan(sqrt(x)). */
+	/* One degree each: (2 / pi) atan(sqrt(x)). */
 	for (double x = 1e-6; x < 1e6; x *= 7)
 		assert_near(f_below(x, 1, 1), 2 / 3.14159265358979323846 * atan(sqrt(x)), 1e-12);
 	assert_true(f_below(0, 3, 4) == 0);
-	/* Many degrees: near 1 by normal quantiles. */
+	/* Many degrees: F is near 1, with quantiles of a normal distribution. */
 	double narrow = sqrt(2 / 1e6 * (1 + 1.0 / 15));
 	assert_near((f_quantile(0.975, 1e6, 15e6) - 1) / narrow, 1.96, 3e-3);
 	assert_near((1 - f_quantile(0.025, 1e6, 15e6)) / narrow, 1.96, 3e-3);

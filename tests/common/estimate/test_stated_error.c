@@ -1,21 +1,23 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What an image says of its own error, on groups whose truth is known: 300 pictures each of grain, of hits that come by
- * the clump, and of light that seldom comes, in bright and dark surroundings, and of checks between which the dark ones
- * do not know how dark they are: there the estimate is too small by a third, and the interval holds because it says so.
+ * What an image states about its own error, on groups whose truth is known: 300 pictures each of grain, of hits that
+ * come in clumps, and of rare light, in bright and dark surroundings; and of a checkered strip whose dark fields do not
+ * know how dark they are: there the estimate is too small by a third, and the interval holds because it allows for
+ * that.
  *
- * - Intervals hold the realised relMSE of at least 90 % of the pictures for which they are known. Level: at a true
- *   coverage of 95 % fewer than 90 % of 300 have a probability of 3e-4, at 97 % of 5e-8. Power: a coverage of 85 % is
- *   found with 99 %, of 80 % with more than 99.99 %. Seeds are fixed: a run that passes passes always.
+ * - Intervals contain the realised relMSE of at least 90 % of the pictures for which they are known. Level: at a true
+ *   coverage of 95 % less than 90 % of 300 has a probability of 3e-4, at 97 % of 5e-8. Power: a coverage of 85 % is
+ *   found with 99 %, one of 80 % with more than 99.99 %. Seeds are fixed, so the result is always the same.
  * - At the edges of something bright before a black background, where few pixels are much darker than the others of
- *   their block, 80 % have to: 57 of 67 do, and 45 if no pixel may be darker than its block.
- * - Planted: the same interval with estimates that are too small by 2 (errors of pixels by 1.4) holds less; by 8 or 4
- * where pixels may be darker than their block, since the interval allows for that.
- * - Where one group in one pixel decides, no interval is stated, and no target is met; neither where no pixel's
- *   brightness is known, nor, in 48 of 50 pictures or more, where errors follow a law without a variance; always where
- *   it has one.
- * - The estimate of a picture that is black but for one part is what the formula says, to 15 %; without the floor, or
- *   with one of 0.02 or 0.005 m, it is off by factors. 2048 pixels: its standard error is below 1 %.
+ *   their block, at least 80 % must hold: 57 of 67 do, and 45 if no pixel were allowed to be darker than its block.
+ * - Planted faults: the same interval around estimates that are too small by 2 (errors of pixels by 1.4) holds less
+ *   often; around those too small by 8 or 4 where pixels may be darker than their block, since the interval allows for
+ *   that.
+ * - Where one group in one pixel decides, no interval is stated and no target is met. The same holds where no pixel's
+ *   brightness is known and, in 48 of 50 pictures or more, where errors follow a law without a variance; where the law
+ *   has a variance an interval is always stated.
+ * - The estimate for a picture that is black except for one part equals the formula to 15 %; without the floor, or with
+ *   a floor of 0.02 or 0.005 m, it is off by factors. With 2048 pixels its standard error is below 1 %.
  */
 #include "common/base/mem.h"
 #include "common/exr/header.h"
@@ -35,7 +37,7 @@
 
 enum { WIDTH = 16, HEIGHT = 8, PIXELS = WIDTH * HEIGHT, GROUPS = GROUP_IMAGE_GROUPS };
 
-/* As many pictures, and a sixth of them when sanitized. */
+/* Returns the number of pictures, or a sixth of it when sanitized. */
 static int of_length(int pictures)
 {
 	return test_scaled() ? pictures / 6 : pictures;
@@ -46,7 +48,7 @@ static int of_length(int pictures)
 static double brightness(uint32_t pixel)
 {
 	uint32_t x = pixel % WIDTH;
-	return x < 6 ? 1 : x < 12 ? 0.2 + 0.02 * (pixel / WIDTH) : 0.05; /* a lit wall, a shade, the dark */
+	return x < 6 ? 1 : x < 12 ? 0.2 + 0.02 * (pixel / WIDTH) : 0.05; /* a lit wall, the shade, the dark */
 }
 
 static double grain(void *user, uint32_t group, uint32_t pixel)
@@ -55,7 +57,7 @@ static double grain(void *user, uint32_t group, uint32_t pixel)
 	return brightness(pixel) * (1 + 0.4 * dice_normal(user));
 }
 
-/* Hits of equal energy: 256 clumps of them in the brightest pixels, 13 in the darkest, of all groups. */
+/* Hits of equal energy over all groups: 256 clumps of them in the brightest pixels, 13 in the darkest. */
 static double hits(void *user, uint32_t group, uint32_t pixel)
 {
 	(void)group;
@@ -65,7 +67,7 @@ static double hits(void *user, uint32_t group, uint32_t pixel)
 	return n / 16;
 }
 
-/* A quarter of the light comes with one in ten groups of a pixel. */
+/* A quarter of a pixel's light comes in one of ten groups. */
 static double rare_light(void *user, uint32_t group, uint32_t pixel)
 {
 	(void)group;
@@ -75,15 +77,15 @@ static double rare_light(void *user, uint32_t group, uint32_t pixel)
 
 enum { CHECKED = 3 };
 
-/* A wall, and at its side a strip of checks. */
+/* A wall, with a checkered strip at its side. */
 static double strip(uint32_t pixel)
 {
 	uint32_t x = pixel % WIDTH, y = pixel / WIDTH;
 	return x >= CHECKED || (x + y) % 2 ? 1 : 0.3;
 }
 
-/* Grain on the wall. Of the checks ten hits of equal energy in the lit ones, of all groups, and three in the dark ones,
- * whose errors are divided by a brightness between the two. */
+/* Grain on the wall. Hits of equal energy on the checks, over all groups: ten in the lit ones, and three in the dark
+ * ones, whose errors are divided by a brightness between the two. */
 static double checked_light(void *user, uint32_t group, uint32_t pixel)
 {
 	(void)group;
@@ -100,7 +102,7 @@ static double edges(uint32_t pixel)
 	return x > 4 && x < 11 ? 1 : 0;
 }
 
-/* Each of a group's samples meets it or does not. */
+/* Each sample of a group hits the bright thing or misses it. */
 static double edge_light(void *user, uint32_t group, uint32_t pixel)
 {
 	(void)group;
@@ -128,10 +130,11 @@ static double realised_error(const struct canvas_image *img, truth_of *truth)
 }
 
 struct least {
-	double known, held; /* shares: of the pictures, and of the intervals that are known */
+	double known, held; /* known: share of the pictures with a known interval; held: share of these intervals that
+			     * hold */
 };
 
-/* fault: by which planted estimates are too small. */
+/* fault: factor by which planted estimates are too small. */
 static void check_interval(const char *name, group_image_value *of, truth_of *truth, struct least least, double bias,
 			   double fault)
 {
@@ -173,14 +176,14 @@ static void intervals_hold(void **state)
 	check_interval("edges", edge_light, edges, (struct least){0.15, 0.8}, 0.45, 4);
 }
 
-/* ---- colours that cancel */
+/* ---- colours whose channels cancel ---- */
 
 struct gold {
 	struct dice dice;
-	double most, noise; /* blue is from -most to most, its noise that of a group; the floor is 1 / 150 */
+	double most, noise; /* blue ranges from -most to most, with this noise in a group; the floor is 1 / 150 */
 };
 
-/* In another order than the pixels'. */
+/* Blue values in another order than the pixels'. */
 static double true_blue(const struct gold *g, uint32_t pixel)
 {
 	return 2 * g->most * ((pixel * 53 % PIXELS + 0.5) / PIXELS - 0.5);
@@ -193,7 +196,7 @@ static double bright(void *user, uint32_t group, uint32_t pixel)
 	return 1 + 0.04 * dice_normal(&g->dice);
 }
 
-/* What takes the white's blue away is no wall's colour but one of gold: its noise is the sum's. */
+/* The blue of white is cancelled by that of a golden colour, not of a darker wall: its noise is that of the sum. */
 static double no_blue(void *user, uint32_t group, uint32_t pixel)
 {
 	(void)group;
@@ -201,7 +204,7 @@ static double no_blue(void *user, uint32_t group, uint32_t pixel)
 	return true_blue(g, pixel) + g->noise * dice_normal(&g->dice) - 1;
 }
 
-/* The mean stated relMSE of a hundred pictures over the one that follows from the true blue. */
+/* Returns the mean stated relMSE of a hundred pictures over the relMSE that follows from the true blue. */
 static double gold_stated_over_true(double most, double noise)
 {
 	const int times = of_length(100);
@@ -223,9 +226,9 @@ static double gold_stated_over_true(double most, double noise)
 	return stated / expected;
 }
 
-/* The blue of gold is next to nothing, and comes out negative in half of the groups. A divisor to which the noise is
- * added would make it 0.3 of the true one in the first case; all brightnesses equally probable 0.5 in the second. Blue
- * is spread evenly here and not normally, so that less of it is near zero: hence the 1.3. */
+/* The blue of a golden colour is nearly 0, and comes out negative in half of the groups. In the first case a divisor to
+ * which the noise is added would give 0.3 of the true error; in the second, a prior of equally probable brightnesses
+ * would give 0.5. Blue is uniform here and not normal, so that less of it is near zero: hence the 1.3. */
 static void colours_that_cancel(void **state)
 {
 	(void)state;
@@ -260,25 +263,25 @@ static void one_sample_decides_nothing(void **state)
 	assert_int_equal(merge_end_of(&p, 1, 0, &img), MERGE_GOES_ON);
 	stated_error(&img, text, sizeof text);
 	assert_non_null(strstr(text, "its interval is not known: 1"));
-	/* If pixel 45 is a highlight: 6.25 is its brightness and its standard error, those of the others are 0.1 /
-	 * sqrt(15) of theirs. */
+	/* If pixel 45 is a highlight: 6.25 is its brightness and its standard error; the standard errors of the other
+	 * pixels are 0.1 / sqrt(15) of their brightness. */
 	double own = (6.25 * 6.25 / (6.3 * 6.3 + 6.25 * 6.25) + (PIXELS - 1) * 0.01 / 15) / PIXELS;
 	print_message("with its own brightness %.5f, by hand %.5f\n", img.rel_mse_own, own);
 	assert_true(fabs(img.rel_mse_own / own - 1) < 0.05);
 	assert_non_null(strstr(text, "; if the bright ones are highlights and not fireflies, the error is about 6."));
-	img.rel_mse_unseen = 3 * img.rel_mse_own; /* is missing also if they are */
+	img.rel_mse_unseen = 3 * img.rel_mse_own; /* in this case the unseen light is missing, too */
 	stated_error(&img, text, sizeof text);
 	assert_non_null(strstr(text, "; if the bright ones are highlights and not fireflies, the error is about 1"));
 	img.rel_mse_unseen = img.rel_mse;
 	stated_error(&img, text, sizeof text);
 	assert_null(strstr(text, "highlights"));
-	/* The same picture without it is known, and meets a target. */
+	/* The same picture without the doubt has a known error, and meets a target. */
 	img.rel_mse_doubt = ERROR_KNOWN;
 	assert_int_equal(merge_end_of(&p, 1, 0, &img), MERGE_ERROR);
 	canvas_image_fini(&img);
 }
 
-/* 6 hits of equal energy a pixel, of all groups: none knows its brightness to better than 40 %. */
+/* 6 hits of equal energy per pixel, over all groups: no pixel knows its brightness to better than 40 %. */
 static double few_hits(void *user, uint32_t group, uint32_t pixel)
 {
 	(void)group;
@@ -300,8 +303,8 @@ static void unknown_brightness_is_doubtful(void **state)
 	}
 }
 
-/* Grain, and a little light of a Pareto law: of index 1.5 it has no variance, however little it adds to this picture's;
- * of 4 it has one. */
+/* Grain, and a little light that follows a Pareto law: of index 1.5 it has no variance, however little it adds to this
+ * picture's; of index 4 it has one. */
 static double pareto_deviate(struct dice *d, double index)
 {
 	double rare = pow(1 - dice_throw(d), -1 / index) * (index - 1) / index;
@@ -353,12 +356,13 @@ static void infinite_variance_is_doubtful(void **state)
 	(void)state;
 	int stated;
 	int a = doubtful_of("index 1.5", very_unequal, ERROR_TAIL, 1.5, &stated);
-	assert_true(stated <= 2 && a >= 8); /* without this doubt: 19 and 0; the others are doubtful by one group */
+	assert_true(stated <= 2 && a >= 8); /* without this doubt: 19 and 0; the other pictures are doubtful because of
+					     * one group */
 	doubtful_of("index 4", less_unequal, ERROR_TAIL, 4, &stated);
 	assert_true(stated == 50);
 }
 
-/* What a pilot says is missing makes the error doubtful where it may leave the interval. */
+/* Light that a pilot reports as missing makes the error doubtful where it may exceed the interval. */
 static void unseen_light_is_doubtful(void **state)
 {
 	(void)state;
@@ -381,7 +385,7 @@ static void unseen_light_is_doubtful(void **state)
 	}
 }
 
-/* Chains find light by their 16 independent samples, not by their mutations: by four a pixel, one, or fewer. */
+/* Chains find light by their 16 independent samples, not by their mutations: by four per pixel, one, or fewer. */
 static void chains_find_by_independent_samples(void **state)
 {
 	(void)state;
@@ -398,8 +402,9 @@ static void chains_find_by_independent_samples(void **state)
 	}
 }
 
-/* One group in sixteen is five times as bright, another one in each pixel: a firefly that is small enough for the pixel
- * to be believed. The upper bound divides it by 1, what the others found, not by the 1.25 that it makes of it. */
+/* One group in sixteen is five times as bright, a different one in each pixel: a firefly small enough for the pixel to
+ * be believed. The upper bound divides it by 1, the brightness in the other groups, and not by the mean of 1.25, which
+ * includes the firefly. */
 static double small_fireflies(void *user, uint32_t group, uint32_t pixel)
 {
 	(void)user;
@@ -414,7 +419,7 @@ static void fireflies_are_divided_by_what_others_found(void **state)
 	group_image(&p, small_fireflies, NULL, &img);
 	double ratio = img.rel_mse_upper / img.rel_mse;
 	print_message("upper bound over estimate %.3f\n", ratio);
-	assert_true(ratio > 1.45); /* 1.17 where a firefly counts in what divides it */
+	assert_true(ratio > 1.45); /* 1.17 if the divisor included the firefly */
 	canvas_image_fini(&img);
 }
 
@@ -441,7 +446,8 @@ static void what_is_said_about_the_error(void **state)
 		"brightness is not known well enough; no chain reached 7 of 100 pixels");
 	assert_false(stated_error_meets(&img, 0.5));
 	img.unvisited = 0;
-	/* Rare light may leave the interval unknown for ever: a multiple of the estimate counts, once that is small. */
+	/* Rare light may leave the interval unknown for ever: once the estimate is small, a multiple of it is compared
+	 * with the target. */
 	static const struct {
 		enum error_doubt doubt;
 		double small, factor;
@@ -463,10 +469,10 @@ static void what_is_said_about_the_error(void **state)
 		img.rel_mse = 1.01 * small * small;
 		assert_false(stated_error_meets(&img, 10));
 		img.rel_mse = small * small;
-		img.rel_mse_upper = 0.49; /* more than that */
+		img.rel_mse_upper = 0.49; /* larger than that multiple */
 		assert_true(stated_error_meets(&img, 0.701) && !stated_error_meets(&img, 0.699));
 		img.rel_mse_upper = 0.0121;
-		/* Unseen light counts beside it, once it may leave that. */
+		/* Unseen light is added once it may exceed that multiple. */
 		double room = (least * least - small * small) / 2;
 		img.rel_mse_unseen = 0.99 * room;
 		assert_true(stated_error_meets(&img, 1.001 * least));
@@ -507,7 +513,7 @@ static void what_is_said_about_the_error(void **state)
 
 enum { WIDE = 64, TALL = 32 };
 
-/* One lit column; elsewhere noise around 0, as of colours out of gamut. */
+/* One lit column; elsewhere noise around 0, as colours out of gamut have. */
 static double mostly_black(void *user, uint32_t group, uint32_t pixel)
 {
 	(void)group;

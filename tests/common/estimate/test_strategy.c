@@ -38,7 +38,7 @@ static struct plan make_plan(void)
 	return p;
 }
 
-/* A lease of one chain without tiles; nothing of it lands in the crop. */
+/* The result of a lease of one chain without tiles: nothing lands in the crop. */
 static struct batch make_batch(uint64_t epoch, uint32_t group, uint32_t part)
 {
 	const struct plan p = make_plan();
@@ -135,7 +135,8 @@ static void a_batch_counts_within_bounds(void **state)
 	b.strategy[1][STRATEGY_RAYS] = UINT64_C(1) << 56;
 	expect(&p, &b, -EBADMSG);
 	b = make_batch(0, 0, 0);
-	b.strategy[0][STRATEGY_FAIL_OUTSIDE] = 3; /* with those that were accepted or failed otherwise one too many */
+	b.strategy[0][STRATEGY_FAIL_OUTSIDE] = 3; /* one too many, together with the proposals that were accepted or
+						   * failed otherwise */
 	expect(&p, &b, -EBADMSG);
 	b = make_batch(0, 0, 0);
 	b.counters[COUNT_ACCEPTED] = 456;
@@ -154,7 +155,7 @@ static void a_batch_counts_within_bounds(void **state)
 	expect(&p, &b, -EBADMSG);
 }
 
-/* n samples with this sum and this sum of squares. */
+/* Checks n samples with this sum and this sum of squares. */
 static void expect_sums(uint64_t n, double sum, double square, int rc)
 {
 	struct plan p = make_plan();
@@ -170,14 +171,14 @@ static void sums_are_of_samples_that_can_be(void **state)
 	(void)state;
 	expect_sums(0, 0, 0, 0);
 	expect_sums(0, 1, 1, -EBADMSG);
-	expect_sums(4, 8, 16, 0);	   /* all alike */
-	expect_sums(4, 8, 64, 0);	   /* one has it all */
-	expect_sums(4, 8, 15.9, -EBADMSG); /* Cauchy and Schwarz */
+	expect_sums(4, 8, 16, 0);	   /* all samples are equal */
+	expect_sums(4, 8, 64, 0);	   /* one sample has all of it */
+	expect_sums(4, 8, 15.9, -EBADMSG); /* violates the Cauchy-Schwarz inequality */
 	expect_sums(4, 8, 64.1, -EBADMSG);
 	expect_sums(4, 8, 0, -EBADMSG);
-	expect_sums(4, 1e-200, 0, 0); /* the squares are below what there is */
+	expect_sums(4, 1e-200, 0, 0); /* the squares underflow */
 	expect_sums(1, 1.7e308, 1.7e308, -EBADMSG);
-	expect_sums(1, 1e100, 1e200, -EBADMSG); /* no float is as large */
+	expect_sums(1, 1e100, 1e200, -EBADMSG); /* no float is that large */
 	expect_sums(4, -8, 64, -EBADMSG);
 	expect_sums(4, (double)INFINITY, (double)INFINITY, -EBADMSG);
 	expect_sums(4, (double)NAN, 1, -EBADMSG);
@@ -217,21 +218,21 @@ static void tables_are_readable(void **state)
 		"the image is black: no sample found light; 2,000 contributions were NaN, infinite or negative, and "
 		"were left out; 1 of 8 chain epochs accepted nothing (4 chains); longest run: "
 		"911 rejections");
-	strategy_add_beyond(0.0009, text, sizeof text); /* not worth a word */
+	strategy_add_beyond(0.0009, text, sizeof text); /* too little to mention */
 	assert_null(strstr(text, "missing"));
 	strategy_add_beyond(0.25, text, sizeof text);
 	assert_non_null(strstr(
 		text,
 		"911 rejections; 25 % of the light is missing: it comes by paths of more edges than are simulated "
 		"(128; pssmlt: 32)"));
-	strategy_table(p.mutations, &n, small, sizeof small); /* cut, and ended */
+	strategy_table(p.mutations, &n, small, sizeof small); /* cut, and terminated */
 	assert_int_equal(strlen(small), sizeof small - 1);
 	strategy_lines(p.mutations, &n, text, sizeof text);
 	assert_non_null(strstr(text, "independent: proposed 1234567 accepted 7 "));
 	assert_non_null(strstr(
 		text,
 		"\nhslt: proposed 900 accepted 460 rays 1800 walks 800 iterations 2400 reverseWalks 500 outside 90 "));
-	/* The widest that there can be. */
+	/* The widest possible numbers. */
 	memset(n.strategy, 0xff, sizeof n.strategy);
 	memset(n.counters, 0xff, sizeof n.counters);
 	p.chains = UINT32_MAX;
@@ -239,7 +240,7 @@ static void tables_are_readable(void **state)
 	strategy_note(&p, &n, true, text, sizeof text);
 	strategy_add_beyond(0.00123456, text, sizeof text);
 	assert_true(strlen(text) < STRATEGY_NOTE);
-	char lines[5120]; /* what the header keeps for them */
+	char lines[5120]; /* the size of the header's buffer for them */
 	strategy_lines("aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa,b,c,d,e,f,g,h", &n, lines, sizeof lines);
 	assert_true(strlen(lines) < sizeof lines - 1);
 	strategy_table("aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa,b,c,d,e,f,g,h", &n, text, sizeof text);

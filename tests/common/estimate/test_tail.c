@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The tail index: of Pareto samples, whose index is known, and of the numbers that are kept.
- * Level and power: for each index the mean of 64 independent estimates of k = 128 has a relative standard error of 1.1
- * % (the law of Hill's estimate there is k a / Gamma(k): mean k / (k - 1), coefficient of variation 1 / sqrt(k - 2)).
- * The bound is 4.5 standard errors, two-sided level 7e-6 each; a bias of 7 % is found with more than 95 %.
- * What rules out an index: how many of 4,000 estimates from samples of a Pareto law of index 2 exceed it, against the
- * law of the estimate, Gamma(k), integrated by Simpson's rule: within 4.5 standard errors, and near 5 % where k is
- * large.
+ * The tail index, of Pareto samples, whose index is known, and of the largest values that are kept. Level and power:
+ * for each index the mean of 64 independent estimates with k = 128 has a relative standard error of 1.1 % (Hill's
+ * estimate follows k a / Gamma(k): mean a k / (k - 1), coefficient of variation 1 / sqrt(k - 2)). The bound is 4.5
+ * standard errors, two-sided level 7e-6 each; a bias of 7 % is found with more than 95 %. The limit that rules out an
+ * index: the number of 4,000 estimates from samples of a Pareto law of index 2 that exceed it, against the law of the
+ * estimate, Gamma(k), integrated by Simpson's rule: within 4.5 standard errors, and near 5 % where k is large.
  */
 #include "common/estimate/tail.h"
 #include "worker/render/math/rng.h"
@@ -48,7 +47,7 @@ static void the_index_of_a_pareto_law_is_found(void **state)
 	}
 }
 
-/* Of an estimate by k = 1, asymptotically (Dekkers et al. 1989, corollary 3.2). */
+/* Asymptotic variance of an estimate with k = 1 (Dekkers et al. 1989, corollary 3.2). */
 static double evi_variance(double g)
 {
 	if (g >= 0)
@@ -57,9 +56,9 @@ static double evi_variance(double g)
 	return (1 - g) * (1 - g) * a * (4 - 8 * a / b + (5 - 11 * g) * a / (b * c));
 }
 
-/* Of Pareto laws, whose index is that of their power, of the exponential law, 0, and of the uniform one, -1. The bound
- * is 4.5 standard errors and 0.02 for bias, of the order of 1 / k and k / n, 0.008 each: level 7e-6 or less each. 0.5
- * is told from 0.4 with a power of more than 95 %. */
+/* The extreme value index of Pareto laws is the inverse of their power, of the exponential law 0, and of the uniform
+ * law -1. The bound is 4.5 standard errors plus 0.02 for bias, which is of the order of 1 / k and k / n, 0.008 each:
+ * level 7e-6 or less each. 0.5 is told from 0.4 with a power of more than 95 %. */
 static void the_extreme_value_index_is_found(void **state)
 {
 	(void)state;
@@ -71,7 +70,7 @@ static void the_extreme_value_index_is_found(void **state)
 			struct tail t;
 			assert_int_equal(tail_init(&t, K + 1), 0);
 			for (uint64_t i = 0; i < SAMPLES; i++) {
-				double x = pareto(9000 + k, i, 1); /* 1 / x is uniform */
+				double x = pareto(9000 + k, i, 1); /* 1 / x is uniformly distributed */
 				tail_add(&t, g > 0 ? pow(x, g) : g < 0 ? 1 - 1 / x : log(x));
 			}
 			tail_settle(&t);
@@ -121,7 +120,7 @@ static void too_few_or_equal_numbers_have_a_defined_index(void **state)
 	tail_fini(&t);
 }
 
-/* P(X < x) for X of Gamma(k): Simpson's rule over the density. */
+/* P(X < x) for X ~ Gamma(k), by Simpson's rule over the density. */
 static double gamma_below(double k, double x)
 {
 	enum { STEPS = 20000 };
@@ -144,7 +143,8 @@ static void an_index_is_ruled_out_by_one_in_twenty(void **state)
 		for (uint64_t time = 0; time < TIMES; time++) {
 			struct tail t;
 			assert_int_equal(tail_init(&t, k + 1), 0);
-			for (uint64_t i = 0; i <= k; i++) /* of k + 1 samples the law is that of more */
+			for (uint64_t i = 0; i <= k; i++) /* the estimate of k + 1 samples has the law of a larger
+							   * sample */
 				tail_add(&t, pareto(9000 + time, i, 2));
 			tail_settle(&t);
 			above += tail_index(&t, k) > least;

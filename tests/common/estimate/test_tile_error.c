@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Errors of single pixels, on groups whose truth is known. Pixels that rare light did not reach have an error as large
- * as what they miss, and only where such light may come; pixels to which no chain came are counted and have an error.
+ * Errors of single pixels, on groups whose truth is known. The error of a pixel that rare light did not reach is as
+ * large as the light that it misses, but only where such light may come; pixels that no chain visited are counted and
+ * have an error.
  */
 #include "common/estimate/merge.h"
 #include "common/estimate/stated_error.h"
@@ -19,7 +20,7 @@
 
 enum { WIDTH = 16, HEIGHT = 8, PIXELS = WIDTH * HEIGHT };
 
-/* A wall known to 2 %, and as much light again that comes with one sample of a group in `hits_per_group`. */
+/* A wall known to 2 %, plus as much light again that comes with one sample of a group in `hits_per_group`. */
 struct rare {
 	struct dice d;
 	double hits_per_group;
@@ -33,8 +34,8 @@ static double rare_light(void *user, uint32_t group, uint32_t pixel)
 	return 1 + 0.02 * dice_normal(&r->d) + dice_poisson(&r->d, r->hits_per_group) / r->hits_per_group;
 }
 
-/* Of 50 pictures, from column `first` on: the share of values more than three errors from the truth, and the mean
- * squared error over the mean squared deviation. */
+/* Over 50 pictures, from column `first` on: *beyond is the share of values more than three errors from the truth,
+ * *ratio the mean squared error over the mean squared deviation. */
 static void compare_with_truth(group_image_value *of, struct rare *r, double truth, uint32_t first, double *beyond,
 			       double *ratio)
 {
@@ -64,10 +65,11 @@ static void rare_light_of(double hits_per_group, double *beyond, double *ratio)
 }
 
 /*
- * A quarter of a hit per pixel: three of four pixels look certain, and miss half of their light. Without their
- * neighbours' errors 70 % of the values are more than three errors from the truth; Student's t with 15 degrees of
- * freedom would have 0.9 %. Where every group had 40 hits, the errors are those of the groups alone: 19,200 values know
- * the ratio of the squares to 1.8 % (their colours go together: 6,400 count), so 6 % is three standard errors.
+ * With a quarter of a hit per pixel, three of four pixels look certain and miss half of their light. Without their
+ * neighbours' errors 70 % of the values would be more than three errors from the truth; Student's t with 15 degrees of
+ * freedom has 0.9 %. With 40 hits in every group the errors are those of the groups alone: 19,200 values (6,400
+ * independent ones, because colours are correlated) determine the ratio of the squares to 1.8 %, so 6 % is three
+ * standard errors.
  */
 static void rare_light_is_in_the_errors_of_pixels(void **state)
 {
@@ -82,10 +84,10 @@ static void rare_light_is_in_the_errors_of_pixels(void **state)
 }
 
 /*
- * Two columns of a highlight, which has a firefly in a quarter of its pixels, beside a wall a hundred times darker and
- * known to 2 %: the wall's errors are its own. 14,336 values of 4,779 independent pixels know the ratio of the squares
- * to 3 %, with the errors' own spread (15 degrees of freedom); if the highlight's rare light counted for the wall, it
- * would be above 100.
+ * Two columns of a highlight, with a firefly in a quarter of its pixels, beside a wall a hundred times darker and known
+ * to 2 %: the wall's errors must be its own. 14,336 values of 4,779 independent pixels determine the ratio of the
+ * squares to 3 %, including the spread of the errors (15 degrees of freedom); if the highlight's rare light counted for
+ * the wall, the ratio would be above 100.
  */
 static double beside_a_highlight(void *user, uint32_t group, uint32_t pixel)
 {
@@ -104,7 +106,7 @@ static void a_highlight_says_nothing_about_the_wall(void **state)
 	assert_true(fabs(ratio - 1) < 0.15);
 }
 
-/* ---- chains that did not come */
+/* ---- tiles that no chain visited ---- */
 
 static double half_visited(void *user, uint32_t group, uint32_t pixel)
 {

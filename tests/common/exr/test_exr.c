@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Tiles and images as EXR: what is written comes back bit by bit, through our reader and through OpenEXR's; tiles of
- * another film, truncated and damaged ones are refused and never crash; images of others with half floats, lines in
- * reverse order or strange channels are read; each failing allocation is an error that leaks nothing.
+ * Tiles and images as EXR: they are read back bit by bit, through our reader and through OpenEXR's; tiles of another
+ * film and truncated or damaged ones are refused and never cause a crash; images of other programs with half floats,
+ * lines in reverse order or unusual channels are read; each failing allocation is an error that leaks nothing.
  */
 #include "common/exr/exr_read.h"
 #include "common/exr/exr_tile.h"
@@ -93,7 +93,8 @@ static void tiles_of_another_film_are_refused(void **unused)
 	mem_free(bytes);
 }
 
-/* Cut short at every length, and with bytes changed: an error or a tile, never a crash (run under sanitizers too). */
+/* Files cut at every length, and with changed bytes, give an error or a tile, and never a crash (also run under
+ * sanitizers). */
 static void broken_tiles_never_crash(void **unused)
 {
 	(void)unused;
@@ -198,7 +199,8 @@ static bool comes_back(const struct exr_image *img)
 	return same;
 }
 
-/* The library marks a chunk as stored by its size: deflate that saves nothing and loses nothing must not be written. */
+/* Readers recognise an uncompressed chunk by its size: so a chunk that deflate leaves at the same size must be written
+ * uncompressed. */
 static void chunks_that_deflate_to_their_own_size_come_back(void **unused)
 {
 	(void)unused;
@@ -209,7 +211,7 @@ static void chunks_that_deflate_to_their_own_size_come_back(void **unused)
 	for (size_t i = 0; i < 8; i++)
 		plane[i] = (float)(i + 1);
 	assert_true(comes_back(&img));
-	/* Of these sizes and contents two dozen hit the size exactly. */
+	/* Two dozen of these sizes and contents deflate to exactly their own size. */
 	for (uint32_t w = 1; w <= 64; w++)
 		for (size_t k = 1; k < 40; k++) {
 			img.width = img.full_width = w;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Images compressed by DWA, as OpenEXR itself writes them: the pixels come back but for what DWA loses; damaged files
- * are refused, or read as something.
+ * Images compressed by DWA, as OpenEXR writes them: the pixels are read back except for DWA's losses; damaged files are
+ * refused, or read as some image.
  */
 #include "common/exr/exr_dwa.h"
 
@@ -30,7 +30,7 @@ static double value_at(int channel, int x, int y)
 	return 1.6 + (channel == 1 ? -1 : 1) * 1.4 * sin(0.05 * x + 0.02 * y + channel);
 }
 
-/* A file of W x H pixels; tiled: in tiles of 32 x 16. */
+/* Makes a file of W x H pixels, in tiles of 32 x 16 if `tiled`. */
 static unsigned char *dwa_file(int compression, int channels, bool tiled, size_t *size)
 {
 	static ImfRgba pixels[W * H];
@@ -107,7 +107,7 @@ static void test_pixels(void **state)
 	}
 }
 
-/* More than is allowed; not DWA; cut short; bits changed. */
+/* Larger than allowed; not DWA; truncated; with changed bits. */
 static void test_damage(void **state)
 {
 	(void)state;
@@ -131,7 +131,7 @@ static void test_damage(void **state)
 		if (exr_read_dwa(copy, size, INT64_MAX, &img, &e) == 0)
 			exr_image_fini(&img);
 	}
-	/* So wide that the library's room for 256 rows would be 300 MB. */
+	/* The image is so wide that the library's buffer for 256 rows would take 300 MB. */
 	static const char window[] = "dataWindow\0box2i\0\x10\0\0";
 	const int32_t right = LEFT + 140000 - 1;
 	size_t at = 0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Outputs that would destroy an input, each other or a file of another format are refused; all else is not. */
+/* Outputs that would destroy an input, each other or a file of another format are refused; all others are accepted. */
 #include "common/exr/output_files.h"
 
 #include <stdarg.h>
@@ -114,7 +114,7 @@ static void test_two_outputs(void **state)
 		close(others[i]);
 	}
 	close(copy);
-	assert_int_equal(access("new.exr", F_OK), -1); /* nothing is left behind */
+	assert_int_equal(access("new.exr", F_OK), -1); /* no file is left behind */
 }
 
 static void test_formats(void **state)
@@ -170,7 +170,7 @@ static void test_formats(void **state)
 		NULL, "are the same file, stdout");
 }
 
-/* A name is not to say another format than the file has; one that says none, or in capitals, is taken. */
+/* A name must not suggest another format than the file has; a name without a format, or in capitals, is accepted. */
 static void test_names(void **state)
 {
 	(void)state;

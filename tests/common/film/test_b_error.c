@@ -2,13 +2,14 @@
 /*
  * b's standard error, on independent samples whose law is known: 100 bootstraps each of 16 groups of 4,096 samples.
  *
- *   finite    of a Pareto law of index 3 and an exponential one the error is stated in at least 95 of 100, and b
- * +- 2.131 errors (Student's t, 15 degrees) holds the mean in at least 85 of 100. Level: a true coverage of 94 % gives
- * less with a probability of 6e-4. Power: of errors that are too small by 2 (coverage 68 %) more than 99.9 % are found.
- *   infinite  of indices 1.5 and 1.1 it is not stated, with the reason, in at least 95 of 100: the index by 128 samples
- * has an error of 9 %, so that one of 1.5 is taken for 2 or more once in 400. What it would have stated is printed: it
- * holds the mean in 82 and 36 of 100. words     header and reason; where few samples carry light; after the films were
- * saved and read again.
+ * - Finite variance (a Pareto law of index 3, and an exponential law): the error is stated in at least 95 of 100
+ *   bootstraps, and b plus or minus 2.131 errors (Student's t, 15 degrees) contains the mean in at least 85 of 100.
+ *   Level: a true coverage of 94 % gives less with a probability of 6e-4. Power: errors that are too small by 2
+ *   (coverage 68 %) are found with more than 99.9 %.
+ * - Infinite variance (indices 1.5 and 1.1): the error is not stated, with the reason, in at least 95 of 100: the index
+ *   from 128 samples has an error of 9 %, so that one of 1.5 is taken for 2 or more once in 400. The interval that
+ *   would have been stated is printed: it contains the mean in 82 and 36 of 100.
+ * - Words: header and reason; where few samples carry light; after the films were saved and read again.
  */
 #include "common/base/mem.h"
 #include "common/film/canvas_save.h"
@@ -95,7 +96,7 @@ static void take_image(const struct canvas *c, struct canvas_image *img)
 }
 
 struct found {
-	int stated, held; /* held: of all */
+	int stated, held; /* held: of all bootstraps, whether stated or not */
 };
 
 static struct found try_law(const char *name, law *of, double index, double mean)

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A job's film: the same bits in whatever order batches arrive, complete rounds alone in the image, chains scaled by
- * b, blocks of groups that add up to it, values beyond the grid counted instead of added, one lease's share of a pixel
- * bounded, and each failing allocation an error that leaks nothing.
+ * A job's film: the same bits in whatever order batches arrive, only complete rounds in the image, chains scaled by b,
+ * blocks of groups that add up to the image, values beyond the grid counted instead of added, a bound on one lease's
+ * share of a pixel, and an error without leaks for each failing allocation.
  */
 #include "common/estimate/canvas_image.h"
 
@@ -119,8 +119,8 @@ static void a_sum_beyond_the_grid_adds_nothing(void **unused)
 	assert_int_equal(canvas_rounds(c), rounds);
 	assert_int_equal(canvas_image(c, false, &after, NULL), 0);
 	assert_memory_equal(before.rgb, after.rgb, 100 * 70 * 3 * sizeof(float));
-	/* The same lease with values that fit is still welcome, and so the bits are those of a run without the bad one.
-	 */
+	/* The same lease with values that fit is still accepted, and then the bits are those of a run without the bad
+	 * batch. */
 	b = canvas_batch(&p, rounds, 0, 0, 4, canvas_one);
 	assert_int_equal(canvas_add(c, &b, NULL), 0);
 	batch_fini(&b);
@@ -177,7 +177,7 @@ static void only_complete_rounds_are_published(void **unused)
 	struct batch b = canvas_batch(&p, 2, 0, 0, 1, canvas_one);
 	assert_int_equal(canvas_add(c, &b, NULL), -EAGAIN);
 	batch_fini(&b);
-	b = canvas_batch(&p, 0, 1, 1, 1, canvas_one); /* the last one closes both */
+	b = canvas_batch(&p, 0, 1, 1, 1, canvas_one); /* the last batch closes both rounds */
 	assert_int_equal(canvas_add(c, &b, NULL), 0);
 	assert_true(canvas_has(c, &b.key));
 	b.key.epoch = 2;
@@ -193,8 +193,8 @@ static void only_complete_rounds_are_published(void **unused)
 	canvas_free(c);
 }
 
-/* Chains: the group's image by the group's b, the published one by the pooled b, independent samples of the bootstrap
- * and of complete rounds only. */
+/* Chains: a group's image is scaled by the group's b and the published image by the pooled b; independent samples count
+ * from the bootstrap and from complete rounds only. */
 static void chains_are_scaled_by_b(void **unused)
 {
 	(void)unused;
@@ -216,7 +216,7 @@ static void chains_are_scaled_by_b(void **unused)
 		assert_int_equal(canvas_add(c, &b, NULL), 0);
 		batch_fini(&b);
 	}
-	/* Of an open round: counts nothing. */
+	/* A batch of an open round, which must not count. */
 	struct batch early = canvas_batch(&p, 1, 0, 0, 1, canvas_one);
 	early.independent_sum = 1e9;
 	assert_int_equal(canvas_add(c, &early, NULL), 0);
@@ -255,7 +255,7 @@ static float random_float(void)
 	return (float)canvas_uniform();
 }
 
-/* Beside a value that fills a double's mantissa, too: to the nearest, not towards zero. */
+/* Values are rounded to the nearest, not towards zero, also beside a value that fills a double's mantissa. */
 static void values_are_rounded_to_the_grid(void **unused)
 {
 	(void)unused;
@@ -277,8 +277,8 @@ static void values_are_rounded_to_the_grid(void **unused)
 	}
 }
 
-/* The mean over groups of the blocks is the image's, where the groups have as many samples; each group's b stands for
- * its share. */
+/* The mean over groups of the blocks is the image's if the groups have equally many samples; each group is scaled by
+ * its own b. */
 static void blocks_of_groups_make_the_image(void **unused)
 {
 	(void)unused;
@@ -301,7 +301,7 @@ static void blocks_of_groups_make_the_image(void **unused)
 		assert_int_equal(canvas_image(c, false, &img, NULL), 0);
 		canvas_group_blocks(c, 3, 2, block[0]);
 		for (uint32_t g = 0; g < 4; g++) {
-			/* Undo the group's own b, so that the pooled one remains. */
+			/* Replaces the group's own b by the pooled one. */
 			double own = kind == PLAN_CHAINS ? (g + 1) / img.b : 1;
 			b_sum += own / 4;
 			for (int k = 0; k < 7; k++)
@@ -325,7 +325,7 @@ static void blocks_of_groups_make_the_image(void **unused)
 	}
 }
 
-/* Between groups that differ by a few percent: errors of pixels are not averaged with their neighbours' then. */
+/* The groups differ by a few percent, so that errors of pixels are not averaged with those of their neighbours. */
 static void failing_allocations_leak_nothing(void **unused)
 {
 	(void)unused;
@@ -357,8 +357,8 @@ static void a_folder_that_is_not_there_is_an_error(void **unused)
 	assert_non_null(strstr(e.text, "/nonexistent/folder"));
 }
 
-/* A pixel never holds more than the mutations of a lease of chains, and a lease of samples never fills an eighth of the
- * range. */
+/* A pixel never holds more than the mutations of a lease of chains, and a lease of samples never fills more than an
+ * eighth of the range. */
 static void a_pixel_of_one_lease_is_bounded(void **unused)
 {
 	(void)unused;
@@ -387,7 +387,8 @@ static void a_pixel_of_one_lease_is_bounded(void **unused)
 				  .tiles = &tile,
 				  .counters = {[COUNT_SAMPLES] = 10}};
 		assert_int_equal(canvas_new(&c, &p, -30, NULL, NULL), 0);
-		float most = chains ? 0x1p14f * 10 : 0x1p29f; /* quantum 2^-30, sums below 2^62 of them */
+		float most =
+			chains ? 0x1p14f * 10 : 0x1p29f; /* the quantum is 2^-30, and sums stay below 2^62 quanta */
 		xyz[77] = most;
 		assert_int_equal(canvas_admits(c, &b, &e), 0);
 		xyz[77] = -most;

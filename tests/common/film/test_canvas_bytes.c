@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The bytes of a saved canvas stay what they are from build to build, whatever the machine; bytes that are none are
- * refused, though their checksum fits. */
+/* A saved canvas has the same bytes in every build and on every machine; other bytes are refused even if their checksum
+ * fits. */
 #include "common/film/canvas_save.h"
 
 #include "common/base/bytes.h"
@@ -17,7 +17,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* As a build of x86-64 wrote it from memory: head, lists, tallies, moments, two tiles of three sums, the end. */
+/* A file as an x86-64 build wrote it from memory: head, lists, tallies, moments, two tiles of three sums, the end. */
 enum { SIZE = 355312, MOMENTS = 156766, FIRST_TILE = 158680 };
 static const struct golden old_runs[] = {
 	{0, "020000000099000001000000020000000100000001000000010000000030"},
@@ -105,7 +105,7 @@ static struct canvas *make_canvas(const struct plan *p)
 	return c;
 }
 
-/* A part of the bootstrap, a complete round, a part of the next one. */
+/* Makes a canvas with part of the bootstrap, a complete round, and part of the next one. */
 static struct canvas *small_canvas(const struct plan *p)
 {
 	struct canvas *c = make_canvas(p);
@@ -155,7 +155,7 @@ static int load(struct canvas **c, const struct plan *p, size_t size)
 	return rc;
 }
 
-/* And it goes on: the last part of the second round completes it. */
+/* The loaded canvas can be continued: the last part of the second round completes the round. */
 static void earlier_ones_are_loaded(void **state)
 {
 	(void)state;
@@ -192,15 +192,15 @@ static void cut_ones_are_refused(void **state)
 	assert_refused(&p, SIZE - 1, -EBADMSG);
 }
 
-/* Any bit of the head and of the shape of the moments, counts that contradict each other, and places of tiles that the
- * films do not have. */
+/* Refused: any flipped bit of the head and of the shape of the moments, counts that contradict each other, and
+ * positions of tiles outside the films. */
 static void others_are_refused(void **state)
 {
 	(void)state;
 	struct plan p = small_plan();
 	for (int bit = 0; bit < 8 * 40; bit++) {
 		int at = bit / 8;
-		bool build = at < 8 || (at >= 28 && at < 32); /* version, tally, tile: of another build */
+		bool build = at < 8 || (at >= 28 && at < 32); /* fields for version, tally and tile: another build */
 		old[at] ^= (unsigned char)(1 << bit % 8);
 		assert_refused(&p, SIZE, build ? -EPROTO : -EBADMSG);
 		old[at] ^= (unsigned char)(1 << bit % 8);
@@ -210,7 +210,7 @@ static void others_are_refused(void **state)
 		assert_refused(&p, SIZE, -EBADMSG);
 		old[MOMENTS + bit / 8] ^= (unsigned char)(1 << bit % 8);
 	}
-	/* More and fewer leases than are marked, a mark that is none, a round that is complete and open. */
+	/* More or fewer leases than are marked, an invalid mark, a round that is both complete and open. */
 	static const struct golden counts[] = {{48, "01000000"},   {52, "00000000"}, {52, "02000000"},
 					       {52, "0200000001"}, {56, "02"},	     {58, "01"},
 					       {61, "01"},	   {60, "ff"},	     {52, "02000000000100000101"}};

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A canvas that was saved and loaded goes on with the same bits, wherever between two batches it was saved; so does one
- * of which batches are taken back and replaced. */
+/* A canvas that was saved and loaded continues with the same bits, between whichever batches it was saved; so does one
+ * whose batches were taken back and replaced. */
 #include "common/film/canvas_save.h"
 
 #include "common/estimate/canvas_image.h"
@@ -34,7 +34,7 @@ static float random_float(void)
 	return (float)(canvas_uniform() * pow(10, -6 * canvas_uniform()));
 }
 
-/* Every field that a canvas looks at; some tiles, and no more than the film has. */
+/* Every field that a canvas reads, with some of the tiles of the film. */
 static struct batch make_batch(const struct plan *p, enum lease_kind kind, uint64_t epoch, uint32_t group,
 			       uint32_t part)
 {
@@ -71,7 +71,7 @@ static void add(struct canvas *c, const struct plan *p, enum lease_kind kind, ui
 	batch_fini(&b);
 }
 
-/* The n-th batch of a run in which the next round begins before the last one is complete. */
+/* Adds the n-th batch of a run in which the next round begins before the previous one is complete. */
 static void add_nth(struct canvas *c, const struct plan *p, unsigned n)
 {
 	enum { LEASES = GROUPS * PARTS };
@@ -96,7 +96,7 @@ static void path_of(char path[128])
 	snprintf(path, 128, "%s/canvas", folder);
 }
 
-/* Saves, forgets, loads. */
+/* Saves the canvas, frees it, and returns the loaded one. */
 static struct canvas *through_file(struct canvas *c, const struct plan *p, const char *films)
 {
 	char path[128];
@@ -190,12 +190,12 @@ static void what_is_loaded_is_what_was_saved(void **unused)
 	canvas_free(again);
 }
 
-/* What somebody made up instead: another batch's content, under this key. */
+/* A fabricated result: another batch's content under this key. */
 static struct batch make_wrong(const struct plan *p, const struct lease_key *k, uint64_t salt)
 {
 	struct batch b = make_batch(p, LEASE_RENDER, 1000 + salt, k->group, k->part);
 	b.key.epoch = k->epoch;
-	b.counters[COUNT_LONGEST_STUCK] = 0; /* a maximum is not taken back */
+	b.counters[COUNT_LONGEST_STUCK] = 0; /* a maximum cannot be taken back */
 	return b;
 }
 
@@ -216,8 +216,8 @@ static bool all_right(const struct canvas *c, const uint64_t *done, const uint64
 	return canvas_rounds(c) == ROUNDS && canvas_missing(c) == 0;
 }
 
-/* A batch is wrong in two of three cases at first; up to two of a lease are, one after the other, and noticed later,
- * when their rounds may be complete. */
+/* Two of three batches are wrong at first; up to two wrong ones arrive for a lease, one after the other, and are
+ * detected later, when their rounds may be complete. */
 static void what_is_taken_back_leaves_nothing(void **unused)
 {
 	(void)unused;
@@ -269,7 +269,7 @@ static void what_is_taken_back_leaves_nothing(void **unused)
 	}
 }
 
-/* Films of another plan or grid, truncated ones and ones with a wrong bit are refused, and nothing of them is used. */
+/* Films of another plan or grid, truncated ones and ones with a wrong bit are refused, and no part of them is used. */
 static void others_are_refused(void **unused)
 {
 	(void)unused;

@@ -58,7 +58,8 @@ static void large_values_cancel(void **unused)
 static void rounds_once_to_nearest_even(void **unused)
 {
 	(void)unused;
-	/* 1 + 2^-53 is a tie: to even, down; 2^-1074 more and it is above. 1 + 3 x 2^-53 is a tie: to even, up. */
+	/* 1 + 2^-53 is a tie, rounded down to even; adding 2^-1074 puts it above the tie. 1 + 3 x 2^-53 is a tie,
+	 * rounded up to even. */
 	struct exact_sum s = {0};
 	exact_sum_add(&s, 1);
 	exact_sum_add(&s, 0x1p-53);
@@ -111,7 +112,7 @@ static void refuses_what_is_not_finite(void **unused)
 	assert_memory_equal(&s, &empty, sizeof s);
 }
 
-/* A carry goes on through words that are full. */
+/* A carry propagates through words with all bits set. */
 static void carries_go_all_the_way(void **unused)
 {
 	(void)unused;

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What canvas_image says of chains: potential scale reduction of sequences whose answer is known, the error of a tile,
- * energies of path classes; and that the order of batches changes no bit.
+ * What canvas_image computes for chains: the potential scale reduction of sequences whose answer is known, the error of
+ * a tile, energies of path classes; and that the order of batches changes no bit.
  *
- * Level of the statistical test: 1e-6 a tile. Power: V follows chi-square with 1023 degrees, so that a scale reduction
- * whose V / W is off by 30 % is found with 95 % probability.
+ * Level of the statistical test: 1e-6 per tile. Power: V follows chi-square with 1023 degrees of freedom, so that a
+ * scale reduction whose V / W is off by 30 % is found with 95 % probability.
  */
 #include "common/estimate/canvas_image.h"
 
@@ -24,7 +24,7 @@
 #define LEVEL 1e-6
 enum { TILES = 6 };
 
-/* Six tiles. */
+/* The film has six tiles. */
 static struct plan make_plan(uint32_t chains, uint32_t groups, uint32_t parts, uint64_t epoch)
 {
 	struct plan p = {.integrator = "hslt",
@@ -72,7 +72,7 @@ static void add_batch(struct canvas *c, struct batch *b)
 	batch_fini(b);
 }
 
-/* Where a chain is: it draws a tile, or none, and stays for `stay` mutations. */
+/* Simulates where a chain is: it draws a tile, or none, and stays there for `stay` mutations. */
 static const double chance[TILES] = {0.3, 0.05, 0.1, 0, 0.25, 0.2};
 
 static uint32_t draw_tile(struct dice *d)
@@ -140,7 +140,7 @@ static void known_sequences(void **state)
 	}
 }
 
-/* Four chains of four mutations, 1, 2, 2 and 3 of them in the tile: V = 1/24, W = 7/24. */
+/* Four chains of four mutations each, 1, 2, 2 and 3 of which are in the tile: V = 1/24, W = 7/24. */
 static void four_by_hand(void **state)
 {
 	(void)state;
@@ -161,7 +161,7 @@ static void four_by_hand(void **state)
 	canvas_free(c);
 }
 
-/* Every chain sits in a tile of its own, or half of its time there. */
+/* Each chain stays in a tile of its own, or spends half of its time there. */
 static void chains_that_stand_still(void **state)
 {
 	(void)state;
@@ -187,7 +187,7 @@ static void chains_that_stand_still(void **state)
 	}
 }
 
-/* Rounding is no disagreement: all chains are in one tile all the time, or share their states' light alike. */
+/* Rounding must not look like disagreement: all chains are in one tile all the time, or share their light alike. */
 static void nothing_varies(void **state)
 {
 	(void)state;
@@ -239,7 +239,7 @@ static void order_changes_no_bit(void **state)
 		}
 		for (int skip = 0; skip < order * 1000; skip++)
 			dice_throw(&places);
-		/* Within two rounds that are open at the same time. */
+		/* In random order within two rounds that are open at the same time. */
 		for (uint32_t i = 0; i < ALL; i++) {
 			uint32_t from = i / (2 * LEASES) * 2 * LEASES,
 				 j = order ? from + dice_below(&places, 2 * LEASES) : i;
@@ -288,7 +288,7 @@ static void classes_by_hand(void **state)
 		add_batch(c, &b);
 	}
 	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
-	/* b of each group is 82 / 9: its bootstrap's 80 of 8 and one independent proposal of 2. */
+	/* b of each group is 82 / 9: 80 from the 8 samples of the bootstrap, and 2 from one independent proposal. */
 	const double of_group = 82.0 / 9;
 	double d[4], b[4], h[4];
 	for (int g = 0; g < 4; g++) {
@@ -343,12 +343,12 @@ static void only_complete_rounds_of_chains(void **state)
 	add_batch(c, &boot);
 	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
 	assert_null(img.r_hat);
-	assert_true(img.classes[0].bootstrap == 1 && isnan(img.classes[0].difference_t)); /* one group of two */
+	assert_true(img.classes[0].bootstrap == 1 && isnan(img.classes[0].difference_t)); /* one of two groups */
 	canvas_image_fini(&img);
 	canvas_free(c);
 }
 
-/* More chains than sequences: one a lease. And sums that would leave the grid. */
+/* More chains than sequences, one in each lease; and sums beyond the grid. */
 static void more_chains_than_sequences_and_sums_beyond_the_grid(void **state)
 {
 	(void)state;

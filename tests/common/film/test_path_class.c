@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Classes of paths against their definition, said in another way: over all words of smooth and rough vertices. */
+/* Classes of paths against an independent form of their definition, over all words of smooth and rough vertices. */
 #include "common/film/path_class.h"
 
 #include <setjmp.h>
@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-/* From the word itself, camera first, 's' or 'r' a vertex. */
+/* The class from the word itself: camera first, one letter per vertex, 's' smooth or 'r' rough. */
 static enum path_class_kind defined_kind(const char *word)
 {
 	size_t n = strlen(word), first_rough = strcspn(word, "r"), smooth = 0;
@@ -53,7 +53,7 @@ static enum path_class_kind kind_of(unsigned bits, unsigned n)
 	return kind;
 }
 
-/* A word in two parts, each of any length. */
+/* A word joined from two parts, each of any length. */
 static void test_joins(void **state)
 {
 	(void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Addresses are read strictly, and those beyond this machine need TLS or --insecure. */
+/* Addresses are parsed strictly, and those beyond this machine need TLS or --insecure. */
 #include "common/net/addr.h"
 #include "tests/support/first_address.h"
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Power is lost before each call of hslt-ca that changes the disk, and another part of what was not flushed is lost:
- * what a command reported as done is there afterwards (a certificate with its key and its record, a revocation in every
- * list), and a command that was interrupted can be repeated.
+ * Power is lost before each call of hslt-ca that changes the disk, and a different part of what was not flushed is lost
+ * each time: what a command reported as done is there afterwards (a certificate with its key and its record, a
+ * revocation in every list), and an interrupted command can be repeated.
  */
 #include "common/base/mem.h"
 #include "common/net/authority.h"
@@ -51,7 +51,7 @@ static int run_step(const char *ca, enum step s, struct error *e)
 	}
 }
 
-/* The exit code of a process whose disk loses power at that call. */
+/* Returns the exit code of a process whose disk loses power at that call. */
 static int run_until(const char *ca, const char *root, const char *after, uint64_t lose_at, uint64_t seed)
 {
 	int status;
@@ -89,7 +89,7 @@ static void same_file(const char *ca, const char *one, const char *other)
 	assert_int_equal(system(command), 0);
 }
 
-/* Certificates of that name, and how many of them are revoked. */
+/* Returns the number of certificates of that name; *revoked: how many of them are revoked. */
 static size_t count_certificates(const char *ca, const char *name, size_t *revoked)
 {
 	struct authority_entry *list;
@@ -114,7 +114,7 @@ static void what_was_reported_is_there(const char *ca, int done)
 		count_certificates(ca, "nobody", &revoked);
 	if (done > FARM)
 		expect_opens(ca, "farm");
-	if (done > NODE) { /* also while it is renewed */
+	if (done > NODE) { /* also during a renewal */
 		assert_true(count_certificates(ca, "node", &revoked) >= 1);
 		expect_opens(ca, "node");
 	}
@@ -132,7 +132,7 @@ static void the_rest_can_be_done(const char *ca, int done)
 	size_t revoked;
 	for (int s = done; s < STEPS; s++) {
 		int rc = run_step(ca, (enum step)s, &e);
-		/* It was interrupted when all of it was on the disk. */
+		/* The command was interrupted when all of its changes were on the disk. */
 		if (rc && !(s == done && rc == -EEXIST && s < RENEWED))
 			fail_msg("command %d: %s", s, e.text);
 	}
@@ -157,7 +157,7 @@ static void a_loss_of_power_undoes_nothing_that_was_reported(void **state)
 	for (uint64_t at = 1;; at++) {
 		assert_int_equal(system(command), 0);
 		code = run_until(ca, root, after, at, at);
-		if (code == 0) /* power is not lost before the end */
+		if (code == 0) /* the commands ended before power was lost */
 			break;
 		assert_int_equal(code, FAULTY_DISK_EXIT);
 		assert_true(at < CALLS_MOST);
@@ -167,21 +167,21 @@ static void a_loss_of_power_undoes_nothing_that_was_reported(void **state)
 		the_rest_can_be_done(ca_after, shared->done);
 	}
 	assert_true(lost > 0);
-	for (uint64_t seed = 0; seed < SEEDS; seed++) { /* of the names that were changed last, either may be lost */
+	for (uint64_t seed = 0; seed < SEEDS; seed++) { /* either of the last two renames may be lost */
 		assert_int_equal(system(command), 0);
 		assert_int_equal(run_until(ca, root, after, renewed, CALLS_MOST + seed), FAULTY_DISK_EXIT);
 		expect_opens(ca_after, "node");
 	}
 }
 
-static bool fails; /* whatever gives a certificate its name */
+static bool fails; /* renames that put a certificate in place fail */
 static int failing_rename(const char *from, const char *to)
 {
 	const char *end = strstr(to, "/cert.pem");
 	return fails && end && !end[9] ? (errno = EIO, -1) : disk_system.rename(from, to);
 }
 
-/* The key has been replaced, and the certificate could not be: it is used, listed, and revoked all the same. */
+/* The key was replaced and the certificate could not be: the old certificate is still used, listed and revoked. */
 static void a_failure_between_key_and_certificate(void **state)
 {
 	(void)state;
@@ -202,7 +202,7 @@ static void a_failure_between_key_and_certificate(void **state)
 	the_rest_can_be_done(ca, RENEWED);
 }
 
-/* A record that is empty keeps nobody from the others: they are listed and revoked, and it is named. */
+/* An empty record does not hide the others: they are listed and revoked, and the damaged one is named. */
 static void a_damaged_record(void **state)
 {
 	(void)state;
@@ -237,7 +237,7 @@ static void a_damaged_record(void **state)
 	same_file(ca, "crl.pem", "farm/crl.pem");
 }
 
-/* Certificates that were not listed are neither revoked nor shown, and that is said. */
+/* Certificates that could not be listed are neither revoked nor shown, and that is reported. */
 static void a_record_that_cannot_be_listed(void **state)
 {
 	(void)state;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The client against a coordinator of a few lines that means it no good: names of files that lead elsewhere, and more
- * than was asked for.
+ * The client against a small malicious coordinator: names of files that lead elsewhere, and more data than was asked
+ * for.
  */
 #include "common/base/mem.h"
 #include "common/net/client.h"
@@ -39,20 +39,20 @@ struct coordinator {
 	pthread_t thread;
 	int listener;
 	char address[32];
-	const char *host;      /* by which the client calls it; NULL: 127.0.0.1 */
-	const char *name;      /* answers one Fetch, and calls the result so */
-	uint64_t sizes[2];     /* or two, and says that the file is so long */
-	bool once;	       /* and then answers no more */
-	int drops;	       /* or drops the fetch so often */
-	size_t flood, payload; /* or says so many unasked things of so many bytes before it reads on */
-	atomic_bool hold;      /* but not yet */
-	atomic_bool deaf;      /* and does not read on while this is so */
+	const char *host;      /* the client connects to this name; NULL: 127.0.0.1 */
+	const char *name;      /* the name of the result in the answer to Fetch */
+	uint64_t sizes[2];     /* size of the file in the first and second answer */
+	bool once;	       /* stops answering after the first answer */
+	int drops;	       /* number of fetches that are dropped */
+	size_t flood, payload; /* so many unrequested messages of this payload before the coordinator reads on */
+	atomic_bool hold;      /* delays the flood */
+	atomic_bool deaf;      /* the coordinator does not read while this is set */
 	atomic_bool said;
 };
 
 /* ---- a file system ---- */
 
-static bool is_plain; /* neither hard links nor renames that replace nothing */
+static bool is_plain; /* a file system without hard links and without renames that refuse to replace */
 
 int __real_link(const char *from, const char *to);
 int __wrap_link(const char *from, const char *to);
@@ -76,7 +76,7 @@ int __wrap_renameat2(int from_folder, const char *from, int to_folder, const cha
 int __real_getaddrinfo(const char *host, const char *port, const struct addrinfo *hints, struct addrinfo **found);
 int __wrap_getaddrinfo(const char *host, const char *port, const struct addrinfo *hints, struct addrinfo **found);
 
-/* Nobody listens at the first address of "two". */
+/* No server listens at the first address of "two". */
 int __wrap_getaddrinfo(const char *host, const char *port, const struct addrinfo *hints, struct addrinfo **found)
 {
 	if (strcmp(host, "two") != 0)
@@ -171,7 +171,7 @@ static void *coordinate(void *user)
 		if (i % 2)
 			say_dropped(fd);
 		else
-			say_chunk(fd, "", 0, 3 * sizeof image); /* of another image than at last */
+			say_chunk(fd, "", 0, 3 * sizeof image); /* of another image than before */
 	for (int i = 0; i < (c->once ? 1 : 2) && c->sizes[0] && recv(fd, bytes, sizeof bytes, 0) > 0; i++)
 		say_chunk(fd, "", (uint64_t)i * sizeof image, c->sizes[i]);
 	while (recv(fd, bytes, sizeof bytes, 0) > 0)
@@ -256,7 +256,7 @@ static void lead_nowhere(const char *here)
 	write_text("above.exr");
 	assert_int_equal(mkdir(here, 0700), 0);
 	assert_int_equal(chdir(here), 0);
-	/* folders are not looked at */
+	/* folders in the name are ignored */
 	snprintf(path, sizeof path, "%s/above.exr", folder);
 	assert_int_equal(fetch_as(path, taken), 0);
 	assert_string_equal(taken, "above.exr");
@@ -265,14 +265,14 @@ static void lead_nowhere(const char *here)
 	assert_true(file_holds("room.exr", image, sizeof image));
 	assert_int_not_equal(stat("../room.exr", &st), 0);
 	assert_int_equal(fetch_as("\xc3\xa4 b.exr", taken), 0);
-	/* what would be no file's name, or a file that others look for */
+	/* names that no file can have, or that other programs look for */
 	memset(longest, 'x', sizeof longest - 1);
 	longest[sizeof longest - 1] = 0;
 	const char *const bad[] = {"",	      ".",   "..",   "/",    "a/",	  "../..",    "/home/.profile",
 				   ".bashrc", "-rf", "a/-o", "a\nb", "a\x1b[2Jb", "\xff\xfe", longest};
 	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
 		assert_int_equal(fetch_as(bad[i], taken), -EEXIST);
-	/* what is there stays: files, links that lead nowhere, links that lead to files */
+	/* existing entries stay: files, links that lead nowhere, links that lead to files */
 	write_text("mine.exr");
 	assert_int_equal(symlink("../nobody.exr", "link.exr"), 0);
 	assert_int_equal(symlink("../above.exr", "other.exr"), 0);
@@ -281,7 +281,7 @@ static void lead_nowhere(const char *here)
 	assert_int_equal(fetch_as("other.exr", taken), -EEXIST);
 	assert_true(file_holds("mine.exr", "precious", 8) && file_holds("../above.exr", "precious", 8));
 	assert_int_not_equal(stat("../nobody.exr", &st), 0);
-	assert_int_equal(files_here(), 6); /* and nothing half done */
+	assert_int_equal(files_here(), 6); /* and no temporary file */
 	assert_int_equal(chdir(".."), 0);
 }
 
@@ -294,7 +294,7 @@ static void names_lead_nowhere(void **state)
 	is_plain = false;
 }
 
-/* The image's name is free when it is done, and a preview replaces nothing either. */
+/* The image's name stays free until the image is done, and a preview replaces no existing file either. */
 static void previews_leave_the_name(void **state)
 {
 	(void)state;
@@ -313,7 +313,7 @@ static void previews_leave_the_name(void **state)
 			assert_true(file_holds(taken, image, sizeof image));
 		}
 	assert_int_not_equal(access("soon.exr", F_OK), 0);
-	/* no room for the addition */
+	/* the longest name leaves no room for the addition */
 	memset(longest, 'x', sizeof longest - 1);
 	longest[sizeof longest - 1] = 0;
 	struct coordinator c = {.name = longest};
@@ -334,7 +334,7 @@ static void who_names_a_file_gets_it(void **state)
 	assert_true(file_holds("old.exr", image, sizeof image));
 }
 
-/* Also where the name is given, or leads there by a link: the final name is for the image. */
+/* Also if the preview's name is given, or leads to the final name by a link: the final name is for the image. */
 static void a_preview_never_takes_the_final_name(void **state)
 {
 	(void)state;
@@ -364,7 +364,7 @@ static void a_preview_never_takes_the_final_name(void **state)
 	}
 }
 
-/* The preview's own name may lead there, too. */
+/* The preview's own name may also be a link to the final name. */
 static void a_preview_does_not_follow_a_link_to_the_final_name(void **state)
 {
 	(void)state;
@@ -396,7 +396,7 @@ static void a_file_of_another_size_is_another_file(void **state)
 	}
 }
 
-/* The signal that ends a process in the midst of a fetch. */
+/* Returns the signal that ends a process in the middle of a fetch. */
 static int ended_by(int number, void (*handling)(int))
 {
 	struct coordinator c = {.sizes = {2 * sizeof image}, .once = true};
@@ -433,7 +433,7 @@ static void a_signal_leaves_nothing_half_done(void **state)
 		assert_int_equal(ended_by(numbers[i], SIG_DFL), numbers[i]);
 		assert_int_equal(files_here(), before);
 	}
-	assert_int_equal(ended_by(SIGHUP, SIG_IGN), SIGTERM); /* nohup */
+	assert_int_equal(ended_by(SIGHUP, SIG_IGN), SIGTERM); /* as under nohup */
 	assert_int_equal(files_here(), before);
 }
 
@@ -457,7 +457,7 @@ static void a_dropped_fetch_begins_again(void **state)
 	assert_int_equal(client_exit_code(-EAGAIN), 1);
 }
 
-/* So does a log, of which nothing is printed twice, or in part. */
+/* A dropped log stream begins again, too, and no line is printed twice or in part. */
 static void a_dropped_stream_begins_again(void **state)
 {
 	(void)state;
@@ -476,7 +476,7 @@ static void a_dropped_stream_begins_again(void **state)
 	assert_int_equal(unlink("stream"), 0);
 }
 
-/* Neither the coordinator's refusal nor its absence, whatever the system calls it. */
+/* An error of the client's own files is not reported as the coordinator's refusal or absence, whatever errno is. */
 static void own_files_are_own_faults(void **state)
 {
 	(void)state;
@@ -497,9 +497,9 @@ static void own_files_are_own_faults(void **state)
 	assert_int_equal(client_exit_code(rc), 1);
 }
 
-/* ---- more than was asked for ---- */
+/* ---- more data than was asked for ---- */
 
-/* Takes what has come in until there is no more: how much that was. */
+/* Takes all messages that have arrived, and returns their total size. */
 static size_t take_all(struct client *cl)
 {
 	struct client_message m;
@@ -528,8 +528,8 @@ static void floods_are_dammed(void **state)
 		struct client *cl = connect_client(&c);
 		struct error e;
 		unsigned char *question = calloc(1, 1 << 22);
-		/* Nobody reads them, and they are more than the system holds between the two: the client stays in one
-		 * of them, and takes in the flood, until the flood is too much for it. The others return at once. */
+		/* Nobody takes the messages, and they exceed the buffers of the system: one of these calls blocks and
+		 * receives the flood until it exceeds the limit. The other calls return at once. */
 		for (int k = 0; k < 32; k++)
 			assert_int_equal(client_send(cl, ENVELOPE(BYE, bye), question, 1 << 22, &e), 0);
 		free(question);
@@ -547,7 +547,7 @@ static void the_second_address_answers(void **state)
 	disconnect_client(&c, connect_client(&c));
 }
 
-/* One allocation after the other fails: nobody waits for a message that was lost. */
+/* Each allocation fails in turn: the client never waits for a message that was lost. */
 static void no_memory_for_a_message(void **state)
 {
 	(void)state;

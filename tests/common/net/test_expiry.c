@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Certificates that end soon are spoken of in time, again every day, and not when there is no need; clocks are
- * arguments here. Those that are new are taken up, if not at once, then later, and are for whom the old ones were.
+ * Warnings about certificates that expire soon: they come in time, repeat every day, and do not come without need; the
+ * clock is an argument here. New certificates are loaded, if not at once, then later, and must be for the same party as
+ * the old ones.
  */
 #include "common/net/authority.h"
 
@@ -35,7 +36,7 @@ static int remove_folder(void **state)
 	return system(command);
 }
 
-/* An authority of `whole` days, and a worker's certificate of `own` days by it. */
+/* Makes an authority that is valid for `whole` days and a worker's certificate by it that is valid for `own` days. */
 static struct tls *open_party(const char *name, double whole, double own)
 {
 	char ca[128], folder[160];
@@ -91,7 +92,7 @@ static void it_is_said_once_a_day_and_after_files_were_read(void **state)
 	tls_close(t);
 }
 
-/* A certificate does not outlive its authority: both are named. Another authority in ca.pem does not matter. */
+/* A certificate is not valid longer than its authority: both are named. Another authority in ca.pem does not matter. */
 static void the_authoritys_end_is_named(void **state)
 {
 	(void)state;
@@ -127,7 +128,7 @@ static void what_could_not_be_read_is_read_later(void **state)
 	assert_int_equal(setrlimit(RLIMIT_NOFILE, &none), 0);
 	int first = tls_refresh(t, &e), second = tls_refresh(t, &e);
 	assert_int_equal(setrlimit(RLIMIT_NOFILE, &limit), 0);
-	assert_true(first < 0 && second == 0); /* it is said once */
+	assert_true(first < 0 && second == 0); /* the failure is reported once */
 	assert_true(tls_self(t)->until == before);
 	assert_int_equal(tls_refresh(t, &e), 1);
 	assert_true(tls_self(t)->until > before);
@@ -135,7 +136,7 @@ static void what_could_not_be_read_is_read_later(void **state)
 	tls_close(t);
 }
 
-/* A folder stays the same party's. */
+/* A folder must stay that of the same party. */
 static void renewed_is_what_it_was(void **state)
 {
 	(void)state;
@@ -151,7 +152,7 @@ static void renewed_is_what_it_was(void **state)
 	snprintf(to, sizeof to, "%s/moved", ca);
 	assert_int_equal(rename(from, to), 0);
 	assert_int_equal(authority_issue(ca, "moved", TLS_WORKER, 5, true, &e), -EEXIST);
-	assert_int_equal(authority_issue(ca, "node", TLS_CLIENT, 5, true, &e), 0); /* nothing is there any more */
+	assert_int_equal(authority_issue(ca, "node", TLS_CLIENT, 5, true, &e), 0); /* the folder is gone */
 }
 
 int main(void)

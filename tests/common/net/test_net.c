@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Connections carry frames both ways, report their end once, and never grow without bound: in plaintext and through
- * TLS. Where only one end speaks TLS, both find out at once.
+ * Connections carry frames both ways, report their end once, and never grow without bound, in plaintext and through
+ * TLS. If only one end speaks TLS, both ends report it at once.
  */
 #include "common/base/mem.h"
 #include "common/net/authority.h"
@@ -28,7 +28,7 @@ struct end {
 	size_t payload;
 	bool garbled, gave_way;
 	int distrust;
-	struct tls_peer peer; /* who the other one was when a message came */
+	struct tls_peer peer; /* the peer, as it was when a message arrived */
 	char why[128];
 };
 
@@ -36,7 +36,7 @@ static uv_loop_t loop;
 static uv_tcp_t listener;
 static struct end here, there;
 static struct conn_config config;
-static struct send_pool *sending; /* NULL: no limit of all connections */
+static struct send_pool *sending; /* NULL: no limit on all connections together */
 static char folder[64];
 static struct tls *calling, *listening; /* NULL: plaintext */
 
@@ -131,7 +131,7 @@ static void close_ends(void)
 		conn_close(there.conn, "test over");
 	uv_close((uv_handle_t *)&listener, NULL);
 	uv_run(&loop, UV_RUN_DEFAULT);
-	assert_int_equal(uv_loop_close(&loop), 0); /* nothing is left open */
+	assert_int_equal(uv_loop_close(&loop), 0); /* no handle is left open */
 	assert_true(here.closed == 1 && there.closed == 1);
 }
 
@@ -184,7 +184,8 @@ static void who_does_not_read_is_cut_off(void **state)
 {
 	(void)state;
 	connect_ends();
-	/* The loop does not run in between, so nothing is taken: the kernel's buffers fill, then ours. */
+	/* The loop does not run in between, so nothing is sent: first the kernel's buffers fill, then the connection's
+	 * queue. */
 	for (int i = 0; i < 1000 && !here.closed; i++)
 		send_bye(&here, 1 << 20);
 	while (!here.closed)
@@ -193,7 +194,8 @@ static void who_does_not_read_is_cut_off(void **state)
 	close_ends();
 }
 
-/* Among all connections, too: what one that reads has taken counts no more, and one that does not read is cut off. */
+/* The limit over all connections: bytes that a reading peer has taken no longer count, and a peer that does not read is
+ * cut off. */
 static void all_are_cut_off_together(void **state)
 {
 	(void)state;
@@ -213,7 +215,7 @@ static void all_are_cut_off_together(void **state)
 	}
 	for (; !pool.leaving && unread < 32; unread++)
 		send_bye(&there, 1 << 20);
-	const uint64_t copied = calling ? 1 << 20 : 0; /* of a frame that had room, once TLS encrypts it */
+	const uint64_t copied = calling ? 1 << 20 : 0; /* of a frame whose room was reserved before TLS encrypts it */
 	assert_true(unread > 1 && unread < 32 && pool.used == 0 && pool.leaving > 1 << 20 &&
 		    pool.leaving <= pool.limit + copied);
 	while (!there.closed || !here.closed)
@@ -239,7 +241,8 @@ static void half_a_frame_is_not_waited_for(void **state)
 	close_ends();
 }
 
-/* Of the second message one bit is another one than was sent, of the first (a hello in practice) none. */
+/* A bit of the second message changes in transit: the connection closes. The first message (in practice a hello) is not
+ * protected. */
 static void changed_bytes_close(void **state)
 {
 	(void)state;
@@ -252,7 +255,7 @@ static void changed_bytes_close(void **state)
 	for (int where = 0; where < 4; where++) {
 		size_t size;
 		unsigned char payload[1000] = {0}, *bytes = checksummed_message(&m, payload, sizeof payload, &size);
-		static const size_t places[] = {1, 9, 17, 700}; /* a length, a checksum, the header, the payload */
+		static const size_t places[] = {1, 9, 17, 700}; /* in a length, a checksum, the header, the payload */
 		bytes[places[where]] ^= 4;
 		connect_ends();
 		send_bye(&here, 10);
@@ -280,7 +283,7 @@ static void silence_is_not_waited_for(void **state)
 	close_ends();
 }
 
-/* A frame of a payload, piece by piece. */
+/* One frame with a payload, sent piece by piece. */
 enum { PAYLOAD = 1 << 20, PIECE = PAYLOAD / 16 };
 
 struct drip {
@@ -301,8 +304,8 @@ static void on_drip(uv_timer_t *t)
 		uv_timer_stop(t);
 }
 
-/* Between two looks at the other sockets a few frames of one are taken, however much it has sent; it may send it all
- * and hang up. */
+/* However many frames a peer has sent, only a few are handled before other sockets are looked at; the peer may send
+ * them all and hang up. */
 static void many_frames_keep_nobody_waiting(void **state)
 {
 	(void)state;
@@ -325,7 +328,8 @@ static void many_frames_keep_nobody_waiting(void **state)
 	close_ends();
 }
 
-/* While connections that gave way still hold memory, nothing is taken that may need more, read already or not. */
+/* While connections that gave way still hold memory, nothing is read that may need more, and frames that were already
+ * read wait. */
 static void frames_wait_for_memory(void **state)
 {
 	(void)state;
@@ -350,8 +354,8 @@ static void frames_wait_for_memory(void **state)
 	close_ends();
 }
 
-/* Its bytes are words, and after 0.8 s it is whole; its time is over after 16.5 s: half a second and one for each 64
- * KB. */
+/* The bytes of a slow frame count as signs of life. It is complete after 0.8 s; it may take 16.5 s: half a second plus
+ * one for each 64 KB. */
 static void a_slow_frame_is_heard(void **state)
 {
 	(void)state;
@@ -370,7 +374,7 @@ static void a_slow_frame_is_heard(void **state)
 	send_bye(&here, 0);
 	while (!there.messages)
 		uv_run(&loop, UV_RUN_ONCE);
-	assert_int_equal(there.partial, 0); /* none was under way */
+	assert_int_equal(there.partial, 0); /* no frame was under way */
 	conn_set_quiet(there.conn, 0.3);
 	d.timer.data = &d;
 	uv_timer_init(&loop, &d.timer);
@@ -385,7 +389,8 @@ static void a_slow_frame_is_heard(void **state)
 	mem_free(payload);
 }
 
-/* Nobody is to blame for what was not read: the clocks of silence and of half a frame stand still with the loop. */
+/* A peer is not blamed for what was not read: the timeouts for silence and for incomplete frames stand still with the
+ * loop. */
 static void a_late_reader_waits(void **state)
 {
 	(void)state;
@@ -438,7 +443,8 @@ static int end_tls(void **state)
 	return system(command);
 }
 
-/* The last one alone speaks, or not, as told: both hear what is wrong before the time of a handshake is over. */
+/* Only the last end to connect speaks, or stays silent, as told: both ends hear what is wrong before the handshake
+ * times out. */
 static void one_sided(bool caller_speaks)
 {
 	struct tls *t = caller_speaks ? listening : calling;
@@ -462,8 +468,8 @@ static void only_one_speaks_it(void **state)
 	one_sided(false);
 }
 
-/* Whoever connects and says nothing, or a word now and then, has as long as the handshake may take; here the clock is
- * the peer's silence. */
+/* A peer that connects and says nothing, or a byte now and then, has as long as a handshake may take; in this test the
+ * clock is the timeout for silence. */
 static void silence_is_no_handshake(void **state)
 {
 	(void)state;
@@ -478,7 +484,7 @@ static void silence_is_no_handshake(void **state)
 	calling = t;
 }
 
-/* What is not valid any more is cut off while it lives. */
+/* A connection whose certificate is no longer valid is cut off while it is open. */
 static void a_live_connection_is_checked_again(void **state)
 {
 	(void)state;
@@ -501,7 +507,8 @@ static void a_live_connection_is_checked_again(void **state)
 	assert_int_equal(remove(list), 0);
 }
 
-/* Who is refused because of a date is told apart from who is refused for good: at the handshake, and later. */
+/* A peer that is refused because of a date is told apart from one that is refused for good, at the handshake and later.
+ */
 static void a_date_is_told_apart(void **state)
 {
 	(void)state;
@@ -512,7 +519,8 @@ static void a_date_is_told_apart(void **state)
 	assert_int_equal(authority_issue(folder, "brief", TLS_WORKER, 2.0 / 86400, false, &e), 0);
 	assert_int_equal(tls_open(&calling, path, &e), 0);
 	tls_set_recheck(listening, 0.3);
-	for (int i = 0; i < 2; i++) { /* connected while it expires, unless the machine stands still; then too late */
+	for (int i = 0; i < 2; i++) { /* connected while the certificate expires, unless the machine stands still; then
+				       * connected too late */
 		connect_ends();
 		send_bye(&here, 1);
 		while (!there.closed)

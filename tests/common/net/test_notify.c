@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Service managers are told what they asked for, by path and by abstract name; their sockets are taken, others' are
- * not. */
+/* Service managers are notified at the socket that they name, by path or by abstract name; the sockets that they pass
+ * are used, and those passed to other processes are not. */
 #include "common/net/notify.h"
 
 #include <stdarg.h>
@@ -18,7 +18,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-/* A bound socket of the type at an abstract name of this process; "@..." in name. */
+/* Returns a bound socket of the type at an abstract name of this process; name becomes "@...". */
 static int bind_abstract(int type, char name[64], const char *what)
 {
 	struct sockaddr_un a = {.sun_family = AF_UNIX};
@@ -52,7 +52,7 @@ static void notices_reach_the_service_manager(void **state)
 	assert_true(notify_send("WATCHDOG=1"));
 	expect_datagram(manager, "READY=1");
 	expect_datagram(manager, "WATCHDOG=1");
-	/* One that does not listen, or listens no more, holds nobody up. */
+	/* A manager that does not listen, or no longer listens, does not delay the program. */
 	int sent = 0;
 	while (sent < 100000 && notify_send("WATCHDOG=1"))
 		sent++;
@@ -117,8 +117,8 @@ static int code_of(pid_t child)
 	return WEXITSTATUS(status);
 }
 
-/* In a child whose descriptors from 3 on are these: which one it takes (3...), 0 for none; 99: it leaks into programs.
- */
+/* Runs a child whose descriptors from 3 on are these; returns the one that the child takes (3...), 0 for none, or 99 if
+ * it would be inherited by programs that the child starts. */
 static int socket_taken(const int *fds, int count, const char *announced, bool other_pid)
 {
 	pid_t child = fork();
@@ -150,7 +150,7 @@ static void the_right_socket_is_taken_over(void **state)
 	int listening = bind_abstract(SOCK_STREAM, name, "listening");
 	int tcp = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
 	assert_int_equal(listen(listening, 1), 0);
-	assert_int_equal(listen(tcp, 1), 0); /* an unbound one gets a free port */
+	assert_int_equal(listen(tcp, 1), 0); /* an unbound socket gets a free port */
 	const int all[] = {null, datagrams, idle, tcp, listening};
 	assert_int_equal(socket_taken(all, 5, "5", false), 7);
 	assert_int_equal(socket_taken(all + 4, 1, "1", false), 3);

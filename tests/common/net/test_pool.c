@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* libuv's pool starts, or nothing is left of the attempt; uv_thread_create is wrapped (Makefile), and refuses here. */
+/* Either libuv's thread pool starts, or the attempt leaves nothing behind. uv_thread_create is wrapped (Makefile) so
+ * that it can fail here. */
 #include "common/net/pool.h"
 
 #include <errno.h>
@@ -13,7 +14,7 @@
 
 #include <cmocka.h>
 
-static int created, refused_from; /* the threads of a test, and how many of them there may be */
+static int created, refused_from; /* threads created in a test, and the first that is refused */
 
 int __real_uv_thread_create(uv_thread_t *thread, uv_thread_cb run, void *arg);
 int __wrap_uv_thread_create(uv_thread_t *thread, uv_thread_cb run, void *arg);
@@ -48,7 +49,7 @@ static int start(int most, struct error *e)
 	return rc;
 }
 
-/* Where the system refuses one of the threads, libuv would abort: its pool is not asked for any. */
+/* libuv would abort if the system refused one of its threads: so its pool is not started at all. */
 static void a_refused_thread_fails_the_start(void **state)
 {
 	struct error e;
@@ -69,7 +70,7 @@ static void all_threads_start(void **state)
 	int before = threads_of_process();
 	assert_int_equal(start(4, &e), 0);
 	assert_int_equal(created, 4);
-	assert_int_equal(threads_of_process(), before + 4); /* the pool's, before its first use */
+	assert_int_equal(threads_of_process(), before + 4); /* the threads of the pool, before its first use */
 	assert_int_equal(start(4, &e), 0);
 	assert_int_equal(threads_of_process(), before + 4);
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What arrives on many connections at once never needs more memory than the pool has: long frames wait in turn, one of
- * each owner, nobody who waits is taken for dead or slow, and whoever keeps others waiting must go on sending. Short
- * ones pass.
+ * Frames that arrive on many connections at once never need more memory than the pool has: long frames wait for their
+ * turn, one per owner; a peer that waits is not taken for dead or slow, and one that keeps others waiting must go on
+ * sending. Short frames pass.
  */
 #include "common/base/mem.h"
 #include "common/net/conn.h"
@@ -50,7 +50,7 @@ static void in_turn(void **state)
 	assert_true(take_bytes(&p, 1, 40));
 	assert_false(take_bytes(&p, 2, 70));
 	assert_false(take_bytes(&p, 3, 1000)); /* alone, later */
-	assert_false(take_bytes(&p, 4, 1));    /* there is room for it once one has gone, but others were first */
+	assert_false(take_bytes(&p, 4, 1));    /* there is room for it once one has gone, but others came first */
 	receive_pool_give(&p, &turns[1]);
 	assert_string_equal(went, "");
 	receive_pool_give(&p, &turns[0]);
@@ -161,7 +161,7 @@ static void run_loop_once(void)
 	uv_run(&loop, UV_RUN_ONCE);
 }
 
-/* As a caller would send it after its hello, or part of it. */
+/* Sends the bytes of a frame, or part of it, as a caller would after its hello. */
 static void send_bytes(int i, const unsigned char *bytes, size_t size)
 {
 	unsigned char *copy = mem_alloc(size, 1);
@@ -183,7 +183,7 @@ static void send_short(int i)
 	conn_send(callers[i].conn, ENVELOPE(BYE, bye), NULL, 0);
 }
 
-/* Another machine's: a plain socket at an address of its own. */
+/* Opens a connection from another machine: a plain socket at an address of its own. */
 static int open_foreign(void)
 {
 	struct sockaddr_in from = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK + 1)};
@@ -224,7 +224,7 @@ static void open_all(double stall_seconds)
 		assert_int_equal(conn_connect(&callers[i].conn, &loop, &bound, &caller, &events, &callers[i], &e), 0);
 		while (accepted <= i)
 			run_loop_once();
-		send_short(i); /* the first frame, which has no checksum */
+		send_short(i); /* the first frame of a connection, which has no checksum */
 		while (!ends[i].messages)
 			run_loop_once();
 	}
@@ -258,7 +258,8 @@ static unsigned count_waiting(void)
 	return n;
 }
 
-/* The first has sent half of its frame. Others send all of theirs, and wait; short messages of somebody else pass. */
+/* The first peer has sent half of its frame. Others send all of theirs, and wait; short messages of another peer pass.
+ */
 static void one_after_the_other(void **state)
 {
 	(void)state;
@@ -281,7 +282,7 @@ static void one_after_the_other(void **state)
 	while (arrived < 3)
 		run_loop_once();
 	assert_true(order[0] == 0 && order[1] == 1 && order[2] == 2);
-	/* whoever hangs up lets others go on */
+	/* a peer that hangs up lets the next one go on */
 	send_bytes(0, frame, HALF);
 	while (!pool.used)
 		run_loop_once();
@@ -302,7 +303,7 @@ static size_t send_some(int fd, const unsigned char *bytes, size_t size)
 	return n > 0 ? (size_t)n : 0;
 }
 
-/* Four of one machine are first; whoever calls from another one waits for one of those that wait, not for all. */
+/* Four connections of one machine come first; a caller from another machine waits for one of them, not for all. */
 static void machines_take_turns(void **state)
 {
 	(void)state;
@@ -331,7 +332,7 @@ static void machines_take_turns(void **state)
 	free(frame);
 }
 
-/* A frame that is promised to be so long that minutes are allowed for it, and of which nothing more comes. */
+/* Sends the head of a frame so long that it may take minutes, and nothing more. */
 static void send_promise(int i)
 {
 	static unsigned char frame[FRAME_CHECKED_PREFIX + PROMISED_PART];
@@ -355,7 +356,7 @@ static void whoever_keeps_others_waiting(void **state)
 	send_bytes(1, frame, size);
 	wait_for_turn();
 	int heard = ends[1].partial;
-	while (!arrived) /* for longer than it may be silent, and than a frame of its length may take to go on */
+	while (!arrived) /* longer than a peer may be silent, and longer than a frame of this length may pause */
 		run_loop_once();
 	assert_true(ends[0].closed && strstr(ends[0].why, "not completed in time"));
 	assert_true(ends[1].partial > heard && !ends[1].closed);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What waits to be sent to many peers is bounded: those give way that hold much and have read nothing for longest.
+ * The bytes that wait to be sent to many peers are bounded: peers that hold much and have read nothing for longest give
+ * way.
  */
 #include "common/net/send_pool.h"
 
@@ -42,7 +43,7 @@ static int begin(void **state)
 	return 0;
 }
 
-/* Whatever gave way meanwhile, all is given back in the end. */
+/* All memory is given back in the end, whichever peers gave way. */
 static int end(void **state)
 {
 	(void)state;
@@ -61,7 +62,7 @@ static bool send(int i, uint64_t bytes, uint64_t now)
 	return ok;
 }
 
-/* The kernel takes a part of what waits; nobody is told. */
+/* The kernel takes a part of what waits, without reporting it. */
 static void reads_some(int i)
 {
 	peers[i].left--;
@@ -75,12 +76,12 @@ static void whoever_has_read_nothing_for_longest(void **state)
 	assert_string_equal(gave_way, "a");
 	assert_true(pool.used == 90 && pool.leaving == 30);
 	reads_some(1);
-	assert_true(send(3, 20, 5)); /* the second has just read */
+	assert_true(send(3, 20, 5)); /* the second peer has just read */
 	assert_string_equal(gave_way, "ac");
 	send_pool_sub(&peers[0].share, 30, 6);
 	assert_int_equal(pool.leaving, 30);
 	assert_int_equal(pool.used, 80);
-	/* the last one holds most, and has read nothing since it was sent something first */
+	/* the last peer holds most, and has read nothing since it was first sent something */
 	assert_false(send(3, 40, 6));
 	assert_string_equal(gave_way, "acd");
 	assert_int_equal(pool.used, 30);
@@ -92,7 +93,7 @@ static void little_is_left_alone(void **state)
 	assert_true(send(0, 5, 1) && send(1, 60, 2) && send(2, 5, 3) && send(3, 25, 4));
 	assert_true(send(4, 10, 5));
 	assert_string_equal(gave_way, "b");
-	assert_true(send(4, 70, 6)); /* on average they hold 11: it has less, and the fourth more */
+	assert_true(send(4, 70, 6)); /* on average the peers hold 11: this one holds less, and the fourth more */
 	assert_string_equal(gave_way, "bd");
 }
 
@@ -103,7 +104,7 @@ static void of_the_same_moment_the_most(void **state)
 	assert_string_equal(gave_way, "b");
 }
 
-/* Each has read a part of it all, and asked for more: the time counts since it did. */
+/* Each peer has read a part of its bytes and asked for more: the time counts from when it last read. */
 static void what_is_taken_counts(void **state)
 {
 	(void)state;
@@ -121,7 +122,7 @@ static void alone_it_may_be_of_any_size(void **state)
 	(void)state;
 	assert_true(send(0, 1000, 1));
 	assert_string_equal(gave_way, "");
-	assert_true(send(1, 1, 2)); /* the first has too much for others to be sent anything */
+	assert_true(send(1, 1, 2)); /* the first peer holds so much that nothing can be sent to others */
 	assert_string_equal(gave_way, "a");
 	assert_true(pool.used == 1 && pool.leaving == 1000);
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Frames leave in their order, the first as it is and each further one checked; what waits is bounded, in one queue and
- * in all; each state sends what it says. Over a pair of sockets whose far end is read by hand, so that a peer that does
- * not read is one. Of TLS only what it holds in memory is looked at; the rest is test_net's.
+ * Frames are sent in order, the first one as it is and each further one with a checksum; the waiting bytes are bounded,
+ * in one queue and in all queues; errors end the queue. Runs over a pair of sockets whose far end is read by hand, so
+ * that a peer can refuse to read. Of TLS only the memory that it takes is checked here; the rest is in test_net.
  */
 #include "common/base/mem.h"
 #include "common/net/send_queue.h"
@@ -93,7 +93,7 @@ static int end(void **state)
 	return uv_loop_close(&loop);
 }
 
-/* A frame of so many bytes of content, each `fill`. */
+/* Returns a frame with `content` bytes of content, each of them `fill`. */
 static unsigned char *frame_of(size_t content, unsigned char fill)
 {
 	unsigned char *frame = mem_alloc(FRAME_PREFIX + content, 1);
@@ -114,7 +114,7 @@ static void time_passes(void)
 		uv_update_time(&loop);
 }
 
-/* Two hold too much together: the one gives way whose far end reads nothing, though the other one has waited longer. */
+/* Two queues hold too much together: the one whose peer reads nothing gives way, though the other has waited longer. */
 static void who_reads_stays(void **state)
 {
 	static char bytes[LIMIT];
@@ -125,7 +125,7 @@ static void who_reads_stays(void **state)
 	send_frame(LARGE, 'b');
 	time_passes();
 	assert_true(recv(other.far, bytes, sizeof bytes, MSG_DONTWAIT) > 0);
-	uv_run(&loop, UV_RUN_NOWAIT); /* a part of a frame: only the kernel knows */
+	uv_run(&loop, UV_RUN_NOWAIT); /* the kernel took a part of a frame, without a report to the queue */
 	assert_true(f.failed == 0 && pool.used > 2 * LARGE);
 	send_queue_frame(&other.queue, frame_of(LIMIT, 'c'), FRAME_PREFIX + LIMIT);
 	assert_true(f.failed == 1 && f.queue.gave_way && other.failed == 0);
@@ -134,7 +134,7 @@ static void who_reads_stays(void **state)
 	end_one(&other);
 }
 
-/* Reads at the other end until there are so many bytes. */
+/* Reads at the far end until `size` bytes have arrived. */
 static unsigned char *receive(size_t size)
 {
 	unsigned char *bytes = malloc(size + 1);
@@ -172,7 +172,7 @@ static void first_plain_then_checked(void **state)
 	assert_memory_equal(got + plain, head, sizeof head);
 	assert_memory_equal(got + plain + sizeof head, expected[1] + FRAME_PREFIX, 7);
 	assert_true(nothing_comes());
-	assert_int_equal(f.drained, 1); /* both were written in one turn of the loop */
+	assert_int_equal(f.drained, 1); /* both frames were written in one turn of the loop */
 	assert_true(send_queue_is_empty(&f.queue));
 	free(got);
 	mem_free(expected[0]);
@@ -190,7 +190,7 @@ static void what_waits_is_bounded(void **state)
 	assert_int_equal(f.failed, 1);
 	assert_string_equal(f.why, "the peer does not read what is sent to it");
 	assert_int_equal(f.drained, 0);
-	send_frame(1, 'c'); /* freed, and no second failure */
+	send_frame(1, 'c'); /* freed, and no second failure is reported */
 	assert_int_equal(f.failed, 1);
 }
 
@@ -202,12 +202,13 @@ static void many_small_frames_reach_the_limit(void **state)
 		send_frame(1000, 'x');
 		taken++;
 	}
-	/* With their overhead; those that the kernel took at once count until the loop says so. */
+	/* Frames count with their overhead; bytes that the kernel took at once count until the loop reports them. */
 	assert_in_range(taken, LIMIT / 1300, LIMIT / 1000);
 }
 
-/* A peer takes a long frame slowly through TLS. Until its last piece is encrypted the whole frame is in memory, and so
- * are the pieces that the kernel has not taken; the pool knows of both. What TLS adds is less than a hundredth. */
+/* A peer reads a long frame slowly through TLS. The whole frame stays in memory until its last piece is encrypted, and
+ * so do the encrypted pieces that the kernel has not taken; the pool counts both. TLS itself adds less than a
+ * hundredth. */
 static void what_tls_copies_counts(void **state)
 {
 	(void)state;
@@ -217,13 +218,13 @@ static void what_tls_copies_counts(void **state)
 	f.queue.link = pair_listener.link;
 	f.queue.limit = 2 * LARGE;
 	send_frame(LARGE, 'a');
-	send_frame(LIMIT / 2, 'b'); /* waits behind it */
+	send_frame(LIMIT / 2, 'b'); /* waits behind the long frame */
 	while (!send_queue_is_empty(&f.queue)) {
 		size_t frames = 0;
 		if (!STAILQ_EMPTY(&f.queue.frames))
 			frames += LIMIT / 2;
 		if (f.queue.unsent >
-		    LIMIT + LIMIT) /* the first one has not been dropped: all that libuv has is of it */
+		    LIMIT + LIMIT) /* the long frame is still in memory: all that libuv holds is part of it */
 			frames += LARGE;
 		looks += frames > LARGE && sent > LARGE / 2;
 		assert_true(pool.used + LARGE / 100 >= frames + f.queue.in_flight);
@@ -265,7 +266,7 @@ static void states_only_advance(void **state)
 	free(got);
 }
 
-/* A far end that is gone is an error of the stream, told once. */
+/* A far end that is gone is an error of the stream, reported once. */
 static void error_of_the_stream(void **state)
 {
 	(void)state;

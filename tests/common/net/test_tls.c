@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Handshakes in memory, between folders that an authority of the test has made: who is let in, and who is not and why.
+ * TLS handshakes in memory, with certificates of an authority that the test makes: which peers are accepted, which are
+ * refused, and for what reason.
  */
 #include "common/base/disk.h"
 #include "common/base/mem.h"
@@ -26,7 +27,7 @@
 #include <time.h>
 #include <unistd.h>
 
-static time_t behind; /* s that the wall clock is, of this process and of OpenSSL in it */
+static time_t behind; /* seconds by which the wall clock of this process (and of its OpenSSL) is slow */
 
 time_t time(time_t *out)
 {
@@ -61,7 +62,7 @@ static void those_of_the_farm_are_let_in(void **state)
 	accepts("root", "root", TLS_OPERATOR);
 }
 
-/* Both ends give it up, and both say why. */
+/* Both ends give up the handshake, and both report why. */
 static void gives_up(int rc, const char *from, const char *to, const char *caller_says, const char *listener_says)
 {
 	pair_shake(from, to, 100000);
@@ -85,16 +86,15 @@ static void others_are_not(void **state)
 		"does not accept this certificate");
 	refuses(pair_at(pair_ours, "node"), pair_at(pair_theirs, "farm"), "certificate is not accepted",
 		"does not accept this certificate");
-	/* A worker that plays coordinator to another: the purpose is wrong already. */
+	/* A worker that poses as a coordinator to another worker: its certificate already has the wrong purpose. */
 	refuses(pair_at(pair_ours, "node"), pair_at(pair_ours, "root"), "certificate is not accepted",
 		"does not accept this certificate");
-	/* A coordinator does not call. */
+	/* A coordinator never connects as a client. */
 	refuses(pair_at(pair_ours, "farm"), pair_at(pair_ours, "farm"), "does not accept this certificate",
 		"certificate is not accepted");
 }
 
-/* A folder made by hand: this caller trusts the farm but shows a certificate of somebody else, or the other way round.
- */
+/* Folders made by hand: a caller trusts this farm but shows a certificate of another one, or the other way round. */
 static void copy(const char *from, const char *to)
 {
 	static char bytes[1 << 16];
@@ -118,7 +118,7 @@ static void a_foreign_certificate_with_our_authority_beside_it(void **state)
 	snprintf(path, sizeof path, "%s/key.pem", mixed);
 	copy(pair_at(pair_theirs, "node/key.pem"), path);
 	refuses(mixed, pair_at(pair_ours, "farm"), "does not accept this certificate", "certificate is not accepted");
-	/* ... and the key of another certificate is noticed at home. */
+	/* ... and a key that belongs to another certificate is detected when the folder is opened. */
 	copy(pair_at(pair_ours, "node/key.pem"), path);
 	struct tls *t;
 	struct error e;
@@ -143,8 +143,8 @@ static FILE *file(const char *folder, const char *name, const char *mode)
 	return f;
 }
 
-/* A certificate that hslt-ca never makes, signed by our authority all the same: valid for servers and clients, with any
- * names. */
+/* Makes a certificate that hslt-ca would never make, though signed by our authority: valid for servers and clients,
+ * with any names. */
 static const char *forge_certificate(const char *name, const char *shown, const char *other_names)
 {
 	static char folder[256];
@@ -184,7 +184,7 @@ static const char *forge_certificate(const char *name, const char *shown, const 
 	return folder;
 }
 
-/* A caller that has the worst of intentions: any certificate or none, any version, and it accepts whoever answers. */
+/* A malicious caller: any certificate or none, any TLS version, and it accepts whichever server answers. */
 static void raw_caller(const char *folder, int version, const char *listener_says)
 {
 	SSL_CTX *context = SSL_CTX_new(TLS_client_method());
@@ -231,7 +231,7 @@ static void raw_caller(const char *folder, int version, const char *listener_say
 static void certificates_need_one_role_and_a_name(void **state)
 {
 	(void)state;
-	raw_caller(pair_at(pair_ours, "node"), TLS1_3_VERSION, ""); /* the caller of this test can be let in */
+	raw_caller(pair_at(pair_ours, "node"), TLS1_3_VERSION, ""); /* the caller of this test can succeed */
 	raw_caller(NULL, TLS1_3_VERSION, "the peer has no certificate");
 	raw_caller(pair_at(pair_ours, "node"), TLS1_2_VERSION, "unsupported protocol");
 	raw_caller(forge_certificate("good", "good", "URI:hslt:role:client"), TLS1_3_VERSION, "");
@@ -243,7 +243,8 @@ static void certificates_need_one_role_and_a_name(void **state)
 	raw_caller(forge_certificate("dns", "dns", "DNS:hslt:role:worker"), TLS1_3_VERSION, "no role");
 	raw_caller(forge_certificate("name", "../name", "URI:hslt:role:client"), TLS1_3_VERSION, "no name");
 	raw_caller(forge_certificate("line", "a\nb", "URI:hslt:role:client"), TLS1_3_VERSION, "no name");
-	/* Whose purpose would do, but who is no coordinator, cannot play one. */
+	/* A certificate whose purpose would do, but whose name is not the coordinator's, cannot be used to pose as one.
+	 */
 	const char *farm = forge_certificate("false", "farm", "URI:hslt:role:worker"); /* uses what pair_at returns */
 	refuses(pair_at(pair_ours, "node"), farm, "certificate of a worker, not of a coordinator",
 		"does not accept this certificate");
@@ -254,7 +255,7 @@ static void who_has_expired_is_not(void **state)
 	(void)state;
 	pair_issue(pair_ours, "brief", TLS_WORKER, 3.0 / 86400);
 	pair_shake(pair_at(pair_ours, "brief"), pair_at(pair_ours, "farm"), 100000);
-	while (!tls_link_is_open(pair_listener.link)) { /* the machine stood still meanwhile: once more */
+	while (!tls_link_is_open(pair_listener.link)) { /* if the machine stood still meanwhile, once more */
 		struct error e;
 		if (pair_listener.rc != -EKEYEXPIRED || !strstr(pair_listener.e.text, "expired"))
 			fail_msg("the listener says %d '%s'", pair_listener.rc, pair_listener.e.text);
@@ -272,7 +273,7 @@ static void who_has_expired_is_not(void **state)
 		 "expired by the clock of its machine", "expired");
 }
 
-/* A clock that is years wrong: whoever reads the sentence sees which. */
+/* A clock that is years off: the error sentence tells which clock. */
 static void a_wrong_clock_is_named(void **state)
 {
 	(void)state;
@@ -293,7 +294,7 @@ static void a_wrong_clock_is_named(void **state)
 	}
 }
 
-/* hslt-ca was killed, or its disk was full, after the authority's own list was written. */
+/* hslt-ca was killed, or its disk was full, after it had written the authority's own list. */
 static void an_interrupted_revocation_is_repeated(void **state)
 {
 	(void)state;
@@ -333,8 +334,8 @@ static size_t count_certificates(void)
 	return n;
 }
 
-/* Wherever it is full, who had a certificate has one, whoever gets none needs not say so the next time, and nothing is
- * listed that nobody has. */
+/* The disk may fill up at any write: a party that had a certificate still has one, a party that gets none may ask again
+ * as before, and no certificate is listed that does not exist. */
 static void a_full_disk_takes_no_certificate_away(void **state)
 {
 	(void)state;
@@ -378,8 +379,8 @@ static int rename_until(const char *from, const char *to)
 	return -1;
 }
 
-/* Wherever it ends: neither a key nor a certificate that is not recorded, and a pair that can be used. Once the key has
- * been replaced there is no way back: the certificate stays beside it. */
+/* Whichever step fails: no key or certificate is left unrecorded, and the pair that is there can be used. Once the key
+ * has been replaced it stays: the certificate then lies beside it. */
 static void an_error_leaves_nothing_behind(void **state)
 {
 	(void)state;
@@ -423,18 +424,18 @@ static void who_is_revoked_is_not(void **state)
 	assert_int_equal(count, 1);
 	assert_int_equal(authority_revoke(pair_ours, "gone", &count, &e), 0);
 	assert_int_equal(count, 0);
-	assert_int_equal(tls_link_recheck(pair_listener.link, &e), 0); /* nobody has read it */
+	assert_int_equal(tls_link_recheck(pair_listener.link, &e), 0); /* the new list has not been read yet */
 	assert_int_equal(tls_refresh(pair_listener.tls, &e), 1);
 	assert_int_equal(tls_link_recheck(pair_listener.link, &e), -EACCES);
 	assert_non_null(strstr(e.text, "revoked"));
-	/* The list does not lose its power with its file. */
+	/* A list stays in force after its file is removed. */
 	assert_int_equal(unlink(pair_at(pair_ours, "farm/crl.pem")), 0);
 	assert_int_equal(tls_refresh(pair_listener.tls, &e), -ENOENT);
-	assert_int_equal(tls_refresh(pair_listener.tls, &e), 0); /* it is said once */
+	assert_int_equal(tls_refresh(pair_listener.tls, &e), 0); /* this is reported once */
 	assert_int_equal(tls_link_recheck(pair_listener.link, &e), -EACCES);
 	time_t until = tls_self(pair_listener.tls)->until;
 	assert_int_equal(authority_issue(pair_ours, "farm", TLS_COORDINATOR, 50, true, &e), 0);
-	unlink(pair_at(pair_ours, "farm/crl.pem")); /* whoever renews need not bring a list */
+	unlink(pair_at(pair_ours, "farm/crl.pem")); /* a renewal need not bring a list */
 	assert_int_equal(tls_refresh(pair_listener.tls, &e), 1);
 	assert_true(tls_self(pair_listener.tls)->until != until);
 	assert_int_equal(tls_link_recheck(pair_listener.link, &e), -EACCES);
@@ -463,7 +464,7 @@ static void who_is_revoked_is_not(void **state)
 	accepts("twice", "twice", TLS_WORKER);
 }
 
-/* Certificates and lists may be a second old, and made on another machine. */
+/* Clocks may be a second behind that of the machine that made certificates and lists. */
 static void clocks_may_be_behind(void **state)
 {
 	(void)state;
@@ -489,8 +490,8 @@ static void append(const char *from, const char *to)
 	close(out);
 }
 
-/* How a farm changes its authority without a day on which nobody gets in: first both are trusted everywhere, then new
- * certificates are given out, then the old authority goes. */
+/* How a farm changes its authority without a day on which peers are refused: first both are trusted everywhere, then
+ * new certificates are issued, then the old authority is removed. */
 static void one_authority_replaces_another(void **state)
 {
 	(void)state;
@@ -522,7 +523,7 @@ static void one_authority_replaces_another(void **state)
 		assert_true(tls_link_is_open(pair_listener.link));
 		pair_hang_up();
 	}
-	/* Both lists hold. */
+	/* The lists of both authorities apply. */
 	assert_int_equal(authority_revoke(pair_theirs, "lost", &count, &e), 0);
 	assert_int_equal(authority_revoke(pair_ours, "old-node", &count, &e), 0);
 	copy(pair_at(pair_ours, "crl.pem"), pair_at(farm, "crl.pem"));
@@ -532,7 +533,7 @@ static void one_authority_replaces_another(void **state)
 	pair_shake(new_node, farm, 100000);
 	assert_true(tls_link_is_open(pair_listener.link));
 	pair_hang_up();
-	/* The old one goes: nobody of it gets in any more. */
+	/* The old authority is removed: its certificates are refused. */
 	copy(pair_at(pair_theirs, "ca.pem"), pair_at(farm, "ca.pem"));
 	copy(pair_at(pair_theirs, "crl.pem"), pair_at(farm, "crl.pem"));
 	pair_shake(pair_at(pair_ours, "node"), farm, 100000);

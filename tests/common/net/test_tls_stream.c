@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Streams of an open connection: what is said arrives, and what is cut, changed, repeated, or no TLS at all ends it. */
+/* Streams over an open TLS connection: bytes arrive unchanged, and a stream that is cut, changed, replayed, or not TLS
+ * at all ends the connection. */
 #include "tests/support/tls_pair.h"
 
 #include <errno.h>
@@ -63,7 +64,7 @@ static void what_is_said_arrives(void **state)
 	pair_hang_up();
 }
 
-/* A worker has said much at once, and then waits. */
+/* A worker sends much at once, and then waits. */
 static void bursts_leave_no_memory(void **state)
 {
 	(void)state;
@@ -77,14 +78,14 @@ static void bursts_leave_no_memory(void **state)
 	print_message("%zd bytes left of 60,000 sent\n", (ssize_t)(held - before));
 	assert_true(held < before + 8192);
 	write_bytes(&pair_listener, 60000);
-	pair_carry(&pair_listener, &pair_caller, 20000); /* in the middle of records */
+	pair_carry(&pair_listener, &pair_caller, 20000); /* stops in the middle of records */
 	assert_true(held < before + 8192);
 	assert_int_equal(pair_listener.got_size, 60100);
 	assert_int_equal(pair_caller.got_size, 60000);
 	pair_hang_up();
 }
 
-/* Nothing of a record that is cut off is believed. */
+/* No byte of an incomplete record is delivered. */
 static void half_a_record_says_nothing(void **state)
 {
 	(void)state;
@@ -119,7 +120,7 @@ static void a_changed_bit_ends_it(void **state)
 	}
 }
 
-/* A record once more: the numbers of TLS run on, so that it does not decrypt. */
+/* A replayed record does not decrypt, because TLS numbers its records. */
 static void a_replayed_record_ends_it(void **state)
 {
 	(void)state;
@@ -147,7 +148,7 @@ static void nonsense_ends_it(void **state)
 		unsigned char bytes[512];
 		for (size_t i = 0; i < sizeof bytes; i++)
 			bytes[i] = (unsigned char)((random = random * 1664525 + 1013904223) >> 24);
-		bytes[0] = 22;	 /* else it is known for plaintext at once */
+		bytes[0] = 22;	 /* otherwise it would be recognised as plaintext at once */
 		if (round % 2) { /* a record, well-formed on the outside */
 			bytes[1] = 3;
 			bytes[2] = 1;
@@ -190,7 +191,7 @@ static void plaintext_is_known(void **state)
 	assert_int_equal(tls_link_output(pair_listener.link, &bytes), sizeof tls_none_here);
 	assert_true(tls_is_first_byte(*bytes) && !tls_is_first_byte(0));
 	pair_close(&pair_listener);
-	/* The same words tell a caller with TLS that there is none. */
+	/* The same bytes tell a caller with TLS that the peer has none. */
 	pair_open(&pair_caller, pair_at(pair_ours, "node"), false);
 	pair_read(&pair_caller);
 	assert_int_equal(tls_link_take(pair_caller.link, tls_none_here, sizeof tls_none_here, &pair_caller.e), 0);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What plan_make decides: how long rounds, bootstrap, leases and epochs are, for jobs that end by samples, time or
- * error and with what a pilot has measured; how seeds are drawn; which numbers are refused. Texts of plans are in
+ * error and with the measurements of a pilot; how seeds are drawn; which numbers are refused. Texts of plans are in
  * test_plan_text.c, mixtures of mutations in test_plan_mixture.c.
  */
 #include "common/plan/plan.h"
@@ -24,8 +24,8 @@ static struct plan_request request(enum plan_kind kind, const char *mixture)
 	return r;
 }
 
-/* A round is 32 mutations a pixel of the crop, but no lease above 2^18 nor below 2^13; a bound on mutations has its own
- * rule. */
+/* A round has 32 mutations per pixel of the crop, but no lease has more than 2^18 or fewer than 2^13; a limit on
+ * mutations has its own rule. */
 static void rounds_without_a_bound_follow_the_film(void **state)
 {
 	(void)state;
@@ -81,7 +81,8 @@ static uint64_t lease_work(const struct plan *p)
 	return plan_round_mutations(p) / (p->groups * p->parts);
 }
 
-/* Bounds are tested after rounds: what has no other bound is asked often enough, the more so the less it asks for. */
+/* Limits are checked after rounds: a job with a time limit or a target error only needs rounds short enough for the
+ * check to be in time, and the shorter, the less it asks for. */
 static void samples_notice_time_and_error(void **state)
 {
 	(void)state;
@@ -106,17 +107,17 @@ static void samples_notice_time_and_error(void **state)
 	r.seconds = 0;
 	r.target_error = 0.5;
 	assert_int_equal(make_plan(&r).epoch, 1);
-	r.target_error = 0.02; /* 2,500 samples a pixel in 8 rounds of 16 groups */
+	r.target_error = 0.02; /* 2,500 samples per pixel in 8 rounds of 16 groups */
 	assert_int_equal(make_plan(&r).epoch, 19);
-	r.seconds = 1; /* the nearer bound counts */
+	r.seconds = 1; /* the limit that is met first decides */
 	assert_int_equal(make_plan(&r).epoch, 1);
 	r.spp = 1 << 20; /* a number of samples that does not fit into the time changes nothing */
 	assert_int_equal(make_plan(&r).epoch, 1);
-	r.seconds = 1e6; /* one that does has its own rule, whatever error is asked for */
+	r.seconds = 1e6; /* a number that does fit has its own rule, whatever error is asked for */
 	assert_true(make_plan(&r).epoch > 400 && ends_with_rule(&r, "in a lease"));
 }
 
-/* The same with chains: as much as without the number, or as an eighth of the time has room for. */
+/* With chains: a round is as long as without the number of samples, or as an eighth of the time allows. */
 static void a_time_also_ends_what_is_counted(void **state)
 {
 	(void)state;
@@ -137,14 +138,14 @@ static void a_time_also_ends_what_is_counted(void **state)
 	assert_true(ends_with_rule(&r, "for 8 rounds"));
 }
 
-/* The bootstrap of a short render is no more than a part of it. */
+/* The bootstrap of a short render takes only a part of its time. */
 static void a_bootstrap_follows_the_time(void **state)
 {
 	(void)state;
 	struct plan_request r = request(PLAN_CHAINS, "");
 	r.spp = 0;
 	r.seconds = 5;
-	assert_int_equal(make_plan(&r).bootstrap, 31296); /* 5 x 50,000 / 8, of equal leases */
+	assert_int_equal(make_plan(&r).bootstrap, 31296); /* 5 x 50,000 / 8, rounded to equal leases */
 	r.seconds = 0.1;
 	assert_int_equal(make_plan(&r).bootstrap, 16384);
 	r.seconds = 3600;
@@ -157,7 +158,7 @@ static void a_bootstrap_follows_the_time(void **state)
 	assert_int_equal(make_plan(&r).bootstrap, 31296);
 }
 
-/* Of a scene whose samples take many rays. */
+/* The plan for a scene whose samples take many rays. */
 static struct plan slow(enum plan_kind kind, double seconds, double bootstrap_rays, double step_rays)
 {
 	struct plan_request r = request(kind, "");
@@ -170,8 +171,8 @@ static struct plan slow(enum plan_kind kind, double seconds, double bootstrap_ra
 	return make_plan(&r);
 }
 
-/* At two million rays a second: a quarter of the time for the bootstrap and an eighth for the starts of chains, but for
- * the least of both. Usual scenes are not touched. */
+/* At two million rays a second: a quarter of the time for the bootstrap and an eighth for the starts of chains, but at
+ * least the minimum of both. Plans of usual scenes are unchanged. */
 static void a_slow_bootstrap_is_short(void **state)
 {
 	(void)state;
@@ -188,12 +189,12 @@ static void a_slow_bootstrap_is_short(void **state)
 			struct plan samples = slow(PLAN_SAMPLES, seconds, rays, 1);
 			assert_true((double)samples.bootstrap <= fmax(256, room / 4 + 64) && samples.bootstrap >= 256);
 		}
-	assert_int_equal(slow(PLAN_CHAINS, 0, 1e4, 1).bootstrap, 64 * 4000); /* 20 s a lease */
+	assert_int_equal(slow(PLAN_CHAINS, 0, 1e4, 1).bootstrap, 64 * 4000); /* 20 s per lease */
 	assert_int_equal(slow(PLAN_CHAINS, 0, 1, 1).bootstrap, 1000000);
 	struct plan_request r = request(PLAN_CHAINS, "");
 	r.seconds = 2;
 	r.rays = (struct plan_rays){1e5, 1};
-	r.bootstrap = 64000; /* what is asked for stays */
+	r.bootstrap = 64000; /* values that were asked for stay */
 	r.chains = 512;
 	assert_int_equal(make_plan(&r).bootstrap, 64000);
 	assert_int_equal(make_plan(&r).chains, 512);
@@ -201,7 +202,8 @@ static void a_slow_bootstrap_is_short(void **state)
 	assert_int_equal(plan_bootstrap_room(&r, 1), 256);
 }
 
-/* In proportion to the rays of a mutation, eight of which are usual; of samples by the room that the time has. */
+/* Rounds of chains shorten in proportion to the rays of a mutation, eight of which are usual; rounds of samples are
+ * limited by the time. */
 static void slow_rounds_are_short(void **state)
 {
 	(void)state;
@@ -217,8 +219,8 @@ static void slow_rounds_are_short(void **state)
 	assert_int_equal(slow(PLAN_SAMPLES, 1000, 1, 80).epoch, many / 10);
 }
 
-/* A round of sixteen samples a pixel that two threads need longer for than there is time has fewer groups, and as many
- * leases. */
+/* If two threads cannot compute a round of sixteen samples per pixel within the time limit, the round has fewer groups
+ * and as many leases. */
 static void a_round_fits_into_the_time(void **state)
 {
 	(void)state;
@@ -244,7 +246,8 @@ static void a_round_fits_into_the_time(void **state)
 	assert_int_equal(make_plan(&r).parts, 4);
 }
 
-/* Where a time or an error ends a job that leaves something to be found out. */
+/* Rays are counted only where a time limit or a target error ends the job and the plan leaves something to be decided.
+ */
 static void rays_are_counted_where_time_counts(void **state)
 {
 	(void)state;
@@ -262,12 +265,12 @@ static void rays_are_counted_where_time_counts(void **state)
 		assert_false(plan_wants_rays(&r));
 		r.target_error = 0;
 		r.spp = r.bootstrap = 0;
-		assert_true(plan_wants_rays(&r)); /* an estimate's */
+		assert_true(plan_wants_rays(&r)); /* those of an estimate */
 	}
 }
 
-/* More leases for more threads: the same chains, cut finer; what cannot be cut is refused, defaults are not mentioned.
- */
+/* More leases for more threads: the same chains, divided finer. Numbers of parts that cannot be had are refused;
+ * defaults are not mentioned. */
 static void parts_are_asked_for(void **state)
 {
 	(void)state;
@@ -289,12 +292,12 @@ static void parts_are_asked_for(void **state)
 	r.chains = 1024;
 	r.parts = 48;
 	assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
-	r.chains = 0; /* the rule's can be more */
+	r.chains = 0; /* the default number of chains may be larger */
 	p = make_plan(&r);
 	assert_int_equal(p.chains % (16 * 48), 0);
 	r.parts = 65;
 	assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
-	/* A lease of more chains than a message can carry is refused, and it is said what to do. */
+	/* A lease with more chains than a message can carry is refused, and the sentence says what to do. */
 	r.chains = PLAN_MAX_CHAINS;
 	r.parts = 64;
 	r.groups = 1;
@@ -307,14 +310,15 @@ static void parts_are_asked_for(void **state)
 	assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
 	r.parts = 32;
 	assert_int_equal(make_plan(&r).parts, 32);
-	r.parts = 5; /* of 34 rows one has 7 */
+	r.parts = 5; /* of 34 rows one part has 7 */
 	r.border = 1;
 	r.epoch = 3;
 	p = make_plan(&r);
 	assert_int_equal(plan_lease_mutations(&p), 7 * 66 * 3);
 }
 
-/* A pilot's speed bounds a lease to about 20 s for a thread, and noise of a tenth does not show. */
+/* A pilot's speed limits a lease to about 20 s of one thread, and noise of a tenth in the speed rarely changes the
+ * plan. */
 static void leases_take_twenty_seconds(void **state)
 {
 	(void)state;
@@ -330,7 +334,7 @@ static void leases_take_twenty_seconds(void **state)
 			p = make_plan(&r);
 			double seconds = (double)lease_work(&p) / speed;
 			assert_int_equal(plan_lease_mutations(&p), lease_work(&p)); /* 720 rows in 4 parts */
-			bool least = p.epoch == 1;				    /* a strip cannot be cut further */
+			bool least = p.epoch == 1; /* a strip cannot be divided further */
 			assert_true(seconds < 20 * 1.4143 || least);
 			assert_true(seconds > 20 / 1.4143 - 1e-9);
 			assert_true((p.epoch & (p.epoch - 1)) == 0);
@@ -347,10 +351,10 @@ static void leases_take_twenty_seconds(void **state)
 		r.speed *= 1.1;
 		differ += make_plan(&r).epoch != epoch;
 	}
-	assert_true(differ > 0 && differ < 25); /* log2 1.1 = 0.14 of all */
+	assert_true(differ > 0 && differ < 25); /* log2 1.1 = 0.14 of all plans */
 }
 
-/* Short jobs keep their plan, so that hslt-render and the farm agree without a pilot; so does a job with --epoch. */
+/* Short jobs keep their plan, so that hslt-render and the farm agree without a pilot; so do jobs with --epoch. */
 static void short_jobs_ask_for_no_pilot(void **state)
 {
 	(void)state;
@@ -369,7 +373,7 @@ static void short_jobs_ask_for_no_pilot(void **state)
 	r.spp = 0;
 	r.target_error = 0.02;
 	p = make_plan(&r);
-	r.speed = 100; /* so slow that the film's rule gives way */
+	r.speed = 100; /* so slow that the rule by film size no longer applies */
 	assert_true(make_plan(&r).epoch < p.epoch);
 	r.speed = 1e6;
 	assert_int_equal(make_plan(&r).epoch, p.epoch);
@@ -381,7 +385,7 @@ static void short_jobs_ask_for_no_pilot(void **state)
 	assert_true(ends_with_rule(&r, ""));
 }
 
-/* 11 MB of tiles per lease: at 0.1 MB/s of a thread an epoch lasts 110 s or more, at 10 MB/s the 20 s stand. */
+/* 11 MB of tiles per lease: at 0.1 MB/s per thread an epoch lasts 110 s or more; at 10 MB/s it stays at 20 s. */
 static void a_bandwidth_makes_epochs_longer(void **state)
 {
 	(void)state;
@@ -401,7 +405,7 @@ static void a_bandwidth_makes_epochs_longer(void **state)
 		assert_true(ends_with_rule(&r, "MB of tiles per lease"));
 		r.spp = 32; /* not longer than the job */
 		assert_true(make_plan(&r).rounds == 1);
-		r.speed = 0; /* nobody knows: something is assumed */
+		r.speed = 0; /* the speed is unknown: a default is assumed */
 		r.spp = 1 << 20;
 		uint64_t assumed = make_plan(&r).epoch;
 		r.bandwidth = 0;
@@ -409,7 +413,7 @@ static void a_bandwidth_makes_epochs_longer(void **state)
 	}
 }
 
-/* Systematic resampling, by hand: of 4 seeds over a total of 4 the marks stand at u, 1 + u, 2 + u, 3 + u. */
+/* Systematic resampling by hand: with 4 seeds and a total of 4, the marks are at u, 1 + u, 2 + u and 3 + u. */
 static void seeds_stand_at_even_marks(void **state)
 {
 	(void)state;
@@ -427,7 +431,7 @@ static void seeds_stand_at_even_marks(void **state)
 		assert_memory_equal(index, cases[i].index, sizeof index);
 	}
 	uint64_t two[2];
-	assert_true(plan_resample(&p, 0, even, 4, 0.6, 2, two)); /* 1.2 and 3.2 of 4 */
+	assert_true(plan_resample(&p, 0, even, 4, 0.6, 2, two)); /* marks at 1.2 and 3.2 of 4 */
 	assert_true(two[0] == 1 && two[1] == 3);
 }
 
@@ -446,7 +450,7 @@ static void the_least_bound_counts_in_whole_rounds(void **state)
 		assert_int_equal(p.chains, 16);
 		assert_int_equal(p.rounds, n <= 160 ? 1 : 2);
 	}
-	r.spp = 1; /* 2048 of them: 13 rounds of 160 */
+	r.spp = 1; /* 2048 samples: 13 rounds of 160 */
 	r.mutations = 1u << 20;
 	assert_int_equal(plan_make(&r, &p, &e), 0);
 	assert_int_equal(p.rounds, 13);

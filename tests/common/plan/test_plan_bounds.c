@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A plan ends: the error of a single group of samples is never known. */
+/* Every plan ends: a plan whose only bound is an error that can never be known, that of a single group of samples, is
+ * refused. */
 #include "common/plan/plan.h"
 
 #include <setjmp.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The mixture of mutations in a plan: what is one and what is not, and the texts that it appears in. */
+/* The mixture of mutations in a plan: which texts are valid mixtures, and in which texts of the plan they appear. */
 #include "common/plan/plan.h"
 #include "common/plan/plan_text.h"
 
@@ -51,7 +51,7 @@ static void settings_and_effects_are_kept_and_told(void **state)
 	assert_int_equal(plan_make(&r, &p, &e), 0);
 	plan_options(&p, 1, text, sizeof text);
 	assert_non_null(strstr(text, " --set tolerance=1e-05 --effects=-dispersion,+aperture --chains"));
-	p.accuracy[40] = 'x'; /* something behind the end */
+	p.accuracy[40] = 'x'; /* bytes after the end of the text */
 	assert_int_equal(plan_check(&p, &e), -EINVAL);
 	p.accuracy[40] = 0;
 	strcpy(p.effects, "a;b");
@@ -88,11 +88,11 @@ static void other_texts_are_none(void **state)
 		assert_non_null(strstr(e.text, "mixture"));
 	}
 	struct plan_request r = request(PLAN_CHAINS, "");
-	memset(r.mixture, 'a', sizeof r.mixture); /* no end */
+	memset(r.mixture, 'a', sizeof r.mixture); /* no terminating zero */
 	assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
 	r.mixture[sizeof r.mixture - 1] = 0;
 	assert_int_equal(plan_make(&r, &p, &e), 0);
-	memcpy(p.mutations, "a\0b", 4); /* something behind the end */
+	memcpy(p.mutations, "a\0b", 4); /* bytes after the end of the text */
 	assert_int_equal(plan_check(&p, &e), -EINVAL);
 	r = request(PLAN_SAMPLES, "a");
 	assert_int_equal(plan_make(&r, &p, &e), -EINVAL);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What a plan says of itself: changes of the request in the units that were asked for, plurals, options for a shell. */
+/* Texts about a plan: changes to the request in the units that were asked for, plurals, options for a shell. */
 #include "common/plan/plan_text.h"
 
 #include <setjmp.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Batches, grants and plans come out of the wire as they went in; what does not fit its plan or its payload is refused.
- */
+/* Batches, grants and plans are unpacked as they were packed; those that do not fit their plan or their payload are
+ * refused. */
 #include "common/wire/batch_wire.h"
 #include "common/base/mem.h"
 #include "common/wire/frame.h"
@@ -51,7 +51,7 @@ static void fill_tile(struct tile *t, uint32_t x, uint32_t y, uint32_t width, ui
 		t->xyz[i] = (float)(i * 0.37 + x - 5);
 }
 
-/* The second and the last tile of the crop, states of several sizes, one of them dead. */
+/* The second and the last tile of the crop, and chain states of several sizes, one of a chain that is dead. */
 static struct batch chain_batch(const struct plan *p)
 {
 	struct batch b = {.key = {7, LEASE_RENDER, 3, 0, 2},
@@ -92,7 +92,7 @@ static struct batch chain_batch(const struct plan *p)
 	return b;
 }
 
-/* Packs, takes the frame apart as a connection does. */
+/* Packs the batch, and takes the frame apart as a connection does. */
 static void pack_and_read(const struct batch *b, const struct plan *p, struct envelope *env, struct frame_reader *r)
 {
 	unsigned char *frame;
@@ -141,7 +141,7 @@ static void a_batch_travels(void **state)
 	assert_int_equal(back.moment_count, b.moment_count);
 	assert_memory_equal(back.moments, b.moments, b.moment_count * sizeof *b.moments);
 	batch_fini(&back);
-	/* Every cut of the payload is noticed, and nothing leaks (seen by the sanitizer). */
+	/* Every truncation of the payload is detected, and nothing leaks (as a sanitizer would report). */
 	for (size_t n = 0; n < r.payload.size; n += 97)
 		assert_int_equal(batch_unpack(&back, &p, env.message->lease_result, r.payload.bytes, n, &e), -EBADMSG);
 	env.message->lease_result->state_sizes[0] = UINT32_MAX;
@@ -187,7 +187,7 @@ static void strategies_are_the_plans(void **state)
 	batch_fini(&b);
 }
 
-/* The film has four tiles; whether there are more is known before any is read. */
+/* The film has four tiles: a header with more is refused before any tile is read. */
 static void tiles_are_counted_first(void **state)
 {
 	(void)state;
@@ -235,7 +235,7 @@ static void memory_may_end_anywhere(void **state)
 	batch_fini(&b);
 }
 
-/* As many classes and moments as the plan has, and none that cannot be. */
+/* There are as many classes and moments as the plan has, and impossible values are refused. */
 static void moments_are_the_plans(void **state)
 {
 	(void)state;
@@ -278,7 +278,7 @@ static void moments_are_the_plans(void **state)
 	assert_int_equal(batch_check(&b, &p, &e), 0);
 	b.moments[0] *= 1.01f;
 	assert_int_equal(batch_check(&b, &p, &e), -EBADMSG);
-	/* A proposal of which hardly anything was left: its moments are rounded to multiples of 2^-149, or to 0. */
+	/* A proposal of almost no light: its moments are rounded to multiples of 2^-149, or to 0. */
 	float *second = &b.moments[sequences * tiles];
 	for (uint64_t s = 0; s < sequences; s++)
 		b.moments[s * tiles] = 0;
@@ -311,7 +311,7 @@ static void moments_are_the_plans(void **state)
 	assert_int_equal(batch_moment_count(&p, LEASE_RENDER), 0);
 }
 
-/* No state is longer than the longest path makes it, whatever a worker sends. */
+/* No chain state is longer than that of the longest path, whatever a worker sends. */
 static void states_are_as_long_as_paths(void **state)
 {
 	(void)state;
@@ -362,11 +362,11 @@ static void weights_travel(void **state)
 	assert_memory_equal(back.weights, b.weights, b.weight_count * sizeof *b.weights);
 	assert_memory_equal(back.classes, b.classes, sizeof b.classes);
 	batch_fini(&back);
-	env.message->lease_result->independent_sum *= 1.001; /* not that of the weights */
+	env.message->lease_result->independent_sum *= 1.001; /* not the sum of the weights */
 	assert_int_equal(batch_unpack(&back, &p, env.message->lease_result, r.payload.bytes, r.payload.size, &e),
 			 -EBADMSG);
 	env.message->lease_result->independent_sum = b.independent_sum;
-	env.message->lease_result->weight_count = UINT64_MAX / 4 + 2; /* times 4 it is small again */
+	env.message->lease_result->weight_count = UINT64_MAX / 4 + 2; /* times 4 it overflows to a small number */
 	assert_int_equal(batch_unpack(&back, &p, env.message->lease_result, r.payload.bytes, r.payload.size, &e),
 			 -EBADMSG);
 	envelope_fini(&env);
@@ -410,7 +410,7 @@ static void grants_travel(void **state)
 	assert_memory_equal(g.states[1].bytes, "abc", 3);
 	grant_fini(&g);
 	g = grant_travels(&k, NULL, (struct chain_state[2]){{NULL, 0}, {NULL, 0}},
-			  2); /* the first payload of a connection, and none */
+			  2); /* of the first frame on a connection, and of a frame without payload */
 	assert_true(g.chain_count == 2 && g.states[0].size == 0 && g.states[1].size == 0);
 	grant_fini(&g);
 	g = grant_travels(&k, NULL, NULL, 0);
@@ -434,7 +434,7 @@ static void plans_travel(void **state)
 	m.n_unseen--;
 	assert_int_equal(plan_from_wire(&m, &back, &e), -EBADMSG);
 	m.n_unseen++;
-	m.groups = 0; /* plan_check has the last word */
+	m.groups = 0; /* plan_check refuses it */
 	assert_true(plan_from_wire(&m, &back, &e) < 0);
 	plan_to_wire(&p, &m);
 	m.kind = 17;
@@ -495,9 +495,9 @@ static void plans_travel(void **state)
 	assert_int_equal(plan_from_wire(&m, &back, &e), 0);
 }
 
-/* The most chains that a plan lets into a lease: the longest seeds, and the sizes of states, fit into a header of 1 MB,
- * which is what a coordinator takes. A worker takes four times as much, and 256 MB of states: 16 KB each, more than any
- * has. */
+/* The most chains that a plan allows in a lease: the longest seeds, and the sizes of chain states, fit into a header of
+ * 1 MB, the limit of a coordinator. A worker accepts four times as much, and 256 MB of states: 16 KB each, more than
+ * any state has. */
 static void the_largest_lease_travels(void **state)
 {
 	(void)state;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Packing and unpacking of messages. What is packed is read back, and the macros make the same bytes as protobuf-c's
- * functions. Refused, with an error and no memory left behind: unknown fields, damaged bytes, texts that are not UTF-8,
- * and messages that would take far more memory than they have bytes. Running out of memory is an error of its own, not
- * the sender's fault.
+ * Packing and unpacking of messages. A packed message is read back unchanged, and the macros make the same bytes as
+ * protobuf-c's functions. Refused, with an error and without leaks: unknown fields, damaged bytes, texts that are not
+ * UTF-8, and messages that would take far more memory than they have bytes. Running out of memory is an error of its
+ * own, not the sender's fault.
  */
 #include "common/wire/envelope.h"
 #include "common/wire/frame.h"
@@ -53,7 +53,7 @@ static void goes_out_and_comes_in(void **state)
 	assert_int_equal(env.message->hello->role, FARM__ROLE__ROLE_WORKER);
 	envelope_fini(&env);
 	for (size_t n = 0; n < size - FRAME_PREFIX - 4;
-	     n++) { /* cut anywhere: refused or another message, never a crash */
+	     n++) { /* cut anywhere: refused, or read as another message, but never a crash */
 		if (envelope_unpack(&env, bytes + FRAME_PREFIX, n, &e) == 0)
 			envelope_fini(&env);
 		assert_null(env.blocks);
@@ -74,8 +74,8 @@ static void assert_same(const Farm__Envelope *a, const Farm__Envelope *b)
 	mem_free(y);
 }
 
-/* A message made by the macros has the bytes of one that protobuf-c's functions have initialised: every kind, empty;
- * and one of which some members are given. */
+/* A message made by the macros has the same bytes as one initialised by protobuf-c's functions: every kind without
+ * members, and one kind with some members. */
 static void the_macros_make_the_same_messages(void **state)
 {
 	(void)state;
@@ -134,7 +134,7 @@ static void the_macros_make_the_same_messages(void **state)
 		    &m);
 }
 
-/* Whatever bit of a hello of this version is another one: nobody takes it for one. */
+/* A hello of this version with any bit flipped is never taken for that hello. */
 static void a_changed_hello_is_none(void **state)
 {
 	(void)state;
@@ -155,7 +155,7 @@ static void a_changed_hello_is_none(void **state)
 		envelope_fini(&env);
 		bytes[FRAME_PREFIX + bit / 8] ^= (unsigned char)(1u << bit % 8);
 	}
-	assert_true(noticed > 4 * header); /* the others make another message of it, or none */
+	assert_true(noticed > 4 * header); /* the other flips give another message, or none */
 	mem_free(bytes);
 }
 
@@ -168,7 +168,7 @@ static int unpack_code(const char *bytes, size_t size)
 	return rc;
 }
 
-/* That is no fault of whoever sent it. */
+/* The sender is not at fault. */
 static void memory_is_out(void **state)
 {
 	(void)state;
@@ -187,13 +187,14 @@ static void what_is_not_known_is_refused(void **state)
 	assert_int_equal(unpack_code("", 0), -EBADMSG);
 	assert_int_equal(unpack_code("\x1a\x00", 2), 0);		    /* a heartbeat */
 	assert_int_equal(unpack_code("\x1a\x02\x78\x01", 4), -EBADMSG);	    /* with an unknown field 15 inside */
-	assert_int_equal(unpack_code("\x1a\x00\xf8\x3f\x01", 5), -EBADMSG); /* and beside it */
+	assert_int_equal(unpack_code("\x1a\x00\xf8\x3f\x01", 5), -EBADMSG); /* with an unknown field beside the
+									     * heartbeat */
 	/* Submit{files{unknown}}: deep inside a repeated field (Submit is field 40, files is field 8) */
 	assert_int_equal(unpack_code("\xc2\x02\x02\x42\x00", 5), 0);
 	assert_int_equal(unpack_code("\xc2\x02\x04\x42\x02\x78\x01", 7), -EBADMSG);
 }
 
-/* A megabyte of empty strings would take some 60 MB: cut off at 16 bytes a byte. */
+/* A megabyte of empty strings would take some 60 MB: refused above 16 bytes of memory per byte of message. */
 static void a_bomb_is_defused(void **state)
 {
 	(void)state;
@@ -208,7 +209,7 @@ static void a_bomb_is_defused(void **state)
 	free(bytes);
 }
 
-/* Thousands of small messages may wait, and are counted by what they hold. */
+/* Thousands of small messages may wait, so each is counted by the memory that it takes. */
 static void memory_is_counted(void **state)
 {
 	(void)state;
@@ -243,10 +244,10 @@ static void text_is_checked(void **state)
 	assert_false(envelope_text_ok("a\nb", 9));
 	assert_false(envelope_text_ok("a\xc2\x9b"
 				      "b",
-				      9));		   /* a control character of terminals */
+				      9));		   /* a terminal control character */
 	assert_false(envelope_text_ok("\xc0\xaf", 9));	   /* overlong */
 	assert_false(envelope_text_ok("\xed\xa0\x80", 9)); /* a surrogate */
-	assert_false(envelope_text_ok("\xe2\x82", 9));	   /* cut */
+	assert_false(envelope_text_ok("\xe2\x82", 9));	   /* truncated */
 	assert_false(envelope_text_ok("\xff", 9));
 }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Frames come out whole however the bytes are cut, and nothing beyond the limits is believed. */
+/* Frames are read back whole however their bytes are cut, and lengths beyond the limits are refused. */
 #include "common/wire/frame.h"
 
 #include <stdarg.h>
@@ -10,7 +10,7 @@
 
 #include <string.h>
 
-/* The second one is checked, by checksums that were computed elsewhere (a bit at a time, Python). */
+/* The second frame has checksums that were computed independently (bit by bit, in Python). */
 static const unsigned char two_frames[] = {0,	 0,    0,    2,	  0,  0, 0, 3, 'h',  'i',  'a',	 'b',  'c', /* */
 					   0,	 0,    0,    1,	  0,  0, 0, 1, 0xda, 0x06, 0xef, 0x2c, 0x9e,
 					   0x67, 0x09, 0x20, 'x', 'y'};
@@ -64,7 +64,7 @@ static void any_changed_bit_is_noticed(void **state)
 		assert_int_equal(frame_reader_take(&r, changed, sizeof changed, &at, &e), 1);
 		while ((rc = frame_reader_take(&r, changed + at, sizeof changed - at, &used, &e)) == 0 && used)
 			at += used;
-		assert_int_equal(rc, -EILSEQ); /* also of the lengths: nobody waits for so many bytes */
+		assert_int_equal(rc, -EILSEQ); /* the checksum covers the lengths: nobody waits for so many bytes */
 		frame_reader_fini(&r);
 	}
 }
@@ -87,7 +87,7 @@ static int first_answer(const unsigned char prefix[8], struct frame_limits limit
 	int rc = frame_reader_take(&r, prefix, 8, &used, &e);
 	size_t held = r.header.capacity + r.payload.capacity;
 	frame_reader_fini(&r);
-	assert_true(rc <= 0 && held == 0); /* nothing is allocated for a promise */
+	assert_true(rc <= 0 && held == 0); /* nothing is allocated for an announced length */
 	return rc;
 }
 
