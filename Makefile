@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 # make            programs into build/bin
 # make test       unit and end-to-end tests (SAN=address,undefined for sanitizers, FULL=1 for the long forms)
-# make test-numerics   what is hard on the numbers, one row a case
-# make test-mutants   plants faults of one line, one at a time, and asks whether a test notices
+# make test-numerics   numerically hard cases, one row each
+# make test-mutants   plants single-line faults, one at a time, and checks that a test detects each
 # make calibration     stated errors against true ones, over scenes of three kinds; the table of tests/image/README.md
 # make test-sim        10,000 schedules of faults in virtual time
-# make test-faults   what happens to machines, one fault after the other; writes the tables of tests/e2e/README.md
+# make test-faults   injects faults of machines, one after the other; writes the tables of tests/e2e/README.md
 # make test-states   chain states that one worker spoils, with 50 seeds
-# make fuzz-numbers   scenes with extreme numbers against a farm of sanitized workers, FUZZ_SECONDS (60) long
-# make corpus DIR=...   tries every scene file under a folder: loaded, or refused for what
-# make man completion   what the programs print with --man and --completion, into build/man and build/completion
+# make fuzz-numbers   scenes with extreme numbers on a farm of sanitized workers, FUZZ_SECONDS (60) long
+# make corpus DIR=...   tries every scene file under a folder: how many load, and why the others are refused
+# make man completion   the output of the programs' --man and --completion, into build/man and build/completion
 # make pictures accuracy   the pictures of the documentation, and the reports on accuracy settings
 # make demo bench fuzz install uninstall clean
 
@@ -21,23 +21,24 @@ SAN      ?=
 BUILD    ?= build$(if $(SAN),/san)
 PREFIX   ?= /usr/local
 PYTHON   ?= python3
-# Debian's awk, which makes tables here, reads and writes numbers as the locale has them, some with commas.
+# Debian's awk makes tables in the build; in some locales it reads and writes numbers with a decimal comma.
 export LC_ALL := C
 
 EMBREE   := $(if $(wildcard /usr/include/embree4/rtcore.h),-lembree4,-lembree3)
-# A later compiler or library may warn of what is no fault: only the project's own tests insist (deploy/test.sh --ci).
+# Later compilers and libraries may warn about correct code: so only the project's own tests set WERROR (deploy/test.sh
+# --ci).
 WERROR   ?=
 IS_CLANG := $(findstring clang,$(shell $(CC) --version))
 WARN     := -Wall -Wextra -Wconversion -Wshadow -Wmissing-prototypes -Wstrict-prototypes -Wvla -Wpointer-arith \
             -Wcast-qual -Wwrite-strings -Wundef -Wformat=2 -Wold-style-definition $(WERROR)
-# At -O1 and with sanitizers gcc 12 does not see the bounds of loop counters, and warns of texts that fit.
+# With -O1 and sanitizers gcc 12 does not track the bounds of loop counters, and warns about texts that do fit.
 WARN     += $(if $(SAN),$(if $(IS_CLANG),,-Wno-format-truncation))
 OPT      ?= $(if $(SAN),-O1,-O3)
-# Invalid operations trap (worker/render/math/fptrap.h): gcc expects that, clang must be told.
+# Invalid operations trap (worker/render/math/fptrap.h): gcc's code expects that by default, clang needs an option.
 TRAPS    := $(if $(IS_CLANG),-ffp-exception-behavior=maytrap)
 CFLAGS   := -std=c17 $(OPT) $(if $(SAN),-g1,-g) -ffp-contract=off -fno-fast-math -fno-math-errno -fno-strict-aliasing -fno-common $(TRAPS) $(WARN) \
             $(if $(SAN),-fsanitize=$(SAN) -fno-sanitize-recover=all -fno-omit-frame-pointer) $(EXTRA_CFLAGS)
-# From 3.2 on, OpenEXR's headers look for each other in their own folder.
+# From version 3.2 on, OpenEXR's headers include each other without naming their folder.
 OPENEXR  := $(patsubst -I%,-isystem %,$(filter -I%,$(shell pkg-config --cflags OpenEXR 2>/dev/null)))
 CPPFLAGS := -D_GNU_SOURCE -I. -I$(BUILD)/gen $(OPENEXR) -MMD -MP
 LDFLAGS  := $(if $(SAN),-fsanitize=$(SAN)) $(EXTRA_LDFLAGS)
@@ -54,7 +55,7 @@ DAEMON_SRC := $(filter-out worker/daemon/main.c,$(wildcard worker/daemon/*.c))
 CLI_MAIN   := $(wildcard worker/cli/*/hslt_*.c)
 CLI_SRC    := $(filter-out $(CLI_MAIN),$(wildcard worker/cli/*/*.c))
 PROTO      := $(wildcard proto/*.proto)
-# protobuf-c 1.5 deprecates its own protoc-c: it is a plug-in of protoc.
+# protobuf-c 1.5 deprecates protoc-c: there the generator is a plug-in of protoc.
 PROTOC     := $(if $(shell command -v protoc 2>/dev/null),protoc,protoc-c)
 
 obj = $(patsubst %.c,$(BUILD)/obj/%.o,$(1))
@@ -73,7 +74,7 @@ CTL_CLI    := $(patsubst coordinator/ctl/hslt_%.c,hslt-%,$(wildcard coordinator/
 PROGRAMS   := $(if $(wildcard coordinator/main.c),hslt-coordinator) $(if $(wildcard worker/daemon/main.c),hslt-worker) \
               $(WORKER_CLI) $(CTL_CLI)
 
-# What a failed command left is not what it should have made.
+# A failed command may leave a partly written target: delete it.
 .DELETE_ON_ERROR:
 .PHONY: all programs tests test-syntax test demo bench fuzz fuzzers install uninstall clean
 all: programs
@@ -127,42 +128,43 @@ TEST_SRC     := $(shell find tests -name 'test_*.c' 2>/dev/null | sort)
 TEST_SUPPORT := $(wildcard tests/support/*.c tests/sim/sim_*.c)
 TEST_BIN     := $(patsubst tests/%.c,$(BUILD)/tests/%,$(TEST_SRC))
 LIB_TEST     := $(BUILD)/lib/libhslt-test.a
-# Some hundred programs of the same libraries: lld links one in a third, gold in half of the time that ld takes. Only ld and gold leave
-# calls within an object file alone where something is wrapped.
+# Some hundred programs with the same libraries: lld links each in a third, gold in half of the time that ld takes.
+# Tests that wrap functions use ld or gold, because only these leave calls within an object file alone.
 FAST_LD      := $(firstword $(foreach ld,lld gold,$(if $(shell command -v ld.$(ld) 2>/dev/null),-fuse-ld=$(ld))))
-# Whatever is linked with it can run out of memory when a test says so (tests/support/failing_memory.h).
+# Programs linked with these options can run out of memory when a test demands it (tests/support/failing_memory.h).
 MEMORY_WRAP  := -Wl,--wrap=mem_alloc,--wrap=mem_grow,--wrap=mem_strdup,-u,__wrap_mem_alloc
 $(LIB_TEST): $(call obj,$(TEST_SUPPORT))
-# A test's own code runs once, and is compiled as fast as possible; what it calls is built as it is used.
+# A test's own code runs once, so it is compiled quickly; the code under test is built as in the programs.
 $(call obj,$(TEST_SRC)): CFLAGS += -O1 -g1
 $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(LIB_TEST) $(LIB_DAEMON) $(LIB_CLI) $(LIB_COORD) $(LIB_RENDER) $(LIB_COMMON)
 	$(link) $(if $(TEST_WRAP),$(TEST_WRAP),$(FAST_LD)) $(MEMORY_WRAP) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
-# It notes which random numbers are asked for.
+# The test records which random numbers are requested.
 $(BUILD)/tests/worker/render/test_groups: TEST_WRAP := -Wl,--wrap=rng_uniform4,--wrap=rng_bits4
-# A file system without hard links, or without renames that replace nothing; a name with two addresses.
+# Simulates a file system without hard links, or without renames that refuse to replace; and a host name with two
+# addresses.
 $(BUILD)/tests/common/net/test_client: TEST_WRAP := -Wl,--wrap=link,--wrap=renameat2,--wrap=getaddrinfo
 $(BUILD)/tests/common/net/test_pool: TEST_WRAP := -Wl,--wrap=uv_thread_create
 $(BUILD)/tests/worker/daemon/test_supervise: TEST_WRAP := -Wl,--wrap=fork
 $(BUILD)/tests/coordinator/server/test_listen: TEST_WRAP := -Wl,--wrap=getaddrinfo
-# What tests/run.sh ends a test by. It needs no library, and no sanitizer: it is no test.
+# Enforces the time limits of tests for tests/run.sh. It needs no library and no sanitizer, since it is not a test.
 LIMIT := $(BUILD)/tests/limit/limit
 $(LIMIT): tests/limit/limit.c
 	@mkdir -p $(@D)
 	$(CC) $(CPPFLAGS) $(filter-out -fsanitize% -fno-sanitize%,$(CFLAGS)) $< -o $@
-# A worker with faults, for end-to-end tests: the daemon's objects, with functions of its own between some of them. The build id is
-# hslt-worker's, and so is the numeric fingerprint.
+# A worker with faults, for end-to-end tests: the daemon's objects, some of whose calls are wrapped. It has
+# hslt-worker's build id, and so its numeric fingerprint.
 FAULTY_WORKER := $(BUILD)/tests/e2e/faulty_worker
 FAULTY_WRAP   := -Wl,--wrap=render_lease,--wrap=batch_pack,--wrap=conn_send_frame
 $(FAULTY_WORKER): $(BUILD)/bin/hslt-worker $(call obj,tests/e2e/faulty_worker.c worker/daemon/main.c) $(LIB_DAEMON) $(LIB_RENDER) $(LIB_COMMON)
 	@mkdir -p $(@D); id=$$(LC_ALL=C readelf -n $< | sed -n 's/.*Build ID: //p'); \
 	$(CC) $(LDFLAGS) -Wl,--build-id=$${id:+0x}$${id:-none} $(FAULTY_WRAP) -o $@ $(filter-out $<,$^) $(LIBS_RENDER) $(LIBS_COMMON)
-# Sanitized runs take 1/20 of the samples, and leave out what only draws more of them: other tests run the same code.
+# Sanitized runs take 1/20 of the samples, and skip tests that only draw more samples: other tests run the same code.
 SAN_WITHOUT := /tests/(image/|(numerics/test_(agree|random)|worker/render/(test_choose|mutation/test_(balance|forced|broken)))$$)
 TEST_RUN    := $(if $(SAN),$(shell printf '%s\n' $(TEST_BIN) | grep -vE '$(SAN_WITHOUT)'),$(TEST_BIN))
 # A build without sanitizers also compiles the fuzzers (linked with clang only), the benchmarks and the calibration, so that they keep building.
 TEST_MORE   := $(if $(SAN),,$(call obj,$(wildcard tests/fuzz/*.c tests/bench/*.c tests/image/*.c)))
 tests: $(TEST_RUN) $(LIMIT) $(FAULTY_WORKER) $(TEST_MORE)
-# What a second compiler says of the tests, without building them.
+# Checks the tests with a second compiler, without building them.
 test-syntax: $(addprefix $(BUILD)/syntax/,$(TEST_SRC) $(TEST_SUPPORT) $(wildcard tests/bench/*.c tests/image/*.c))
 $(BUILD)/syntax/%: % | $(GEN_H) generated
 	@mkdir -p $(@D)
@@ -171,29 +173,31 @@ test: programs tests $(BUILD)/load/load
 	$(if $(SAN),HSLT_TEST_WITHOUT="$${HSLT_TEST_WITHOUT:+$$HSLT_TEST_WITHOUT|}"'$(SAN_WITHOUT)' HSLT_TEST_SCALE=$${HSLT_TEST_SCALE:-20}) sh tests/run.sh $(BUILD)
 .SECONDARY:
 
-# The farm in virtual time: 10,000 schedules of faults; 200 are part of the tests. HSLT_SIM_SEED=N: that one, with all that is said.
+# The farm in virtual time: 10,000 schedules of faults, of which 200 are part of the tests. HSLT_SIM_SEED=N runs one
+# schedule, with its whole transcript.
 .PHONY: test-sim
 test-sim: $(BUILD)/tests/sim/test_farm
 	FULL=1 $(BUILD)/tests/sim/test_farm
 
-# Lays the sources out as .clang-format says (by clang-format 14); tests/lint/format.sh checks it.
+# Lays the sources out as .clang-format says (with clang-format 14); tests/lint/format.sh checks it.
 .PHONY: format
 format:
 	git ls-files '*.[ch]' '*.inc' | grep -v /data/ | xargs clang-format -i --style=file
 
-# Faults of one line each, planted in a copy of HEAD: which test notices (tests/mutants/README.md).
+# Plants single-line faults in a copy of HEAD, and checks which of them a test detects (tests/mutants/README.md).
 .PHONY: test-mutants
 test-mutants:
 	CC="$(CC)" sh tests/mutants/run.sh
 
-# What is hard on the numbers, one row a case; the same programs are part of the tests.
+# Numerically hard cases, one row each; the same programs are part of the tests.
 NUMERICS_BIN := $(filter $(BUILD)/tests/worker/render/halfvec/% $(BUILD)/tests/numerics/% $(BUILD)/tests/worker/render/test_%_numbers \
 	$(BUILD)/tests/worker/render/test_number_%,$(TEST_BIN))
 .PHONY: test-numerics
 test-numerics: programs $(NUMERICS_BIN)
 	$(if $(SAN),HSLT_TEST_SCALE=$${HSLT_TEST_SCALE:-20}) sh tests/numerics/run.sh $(BUILD)
 
-# What happens to machines while a job runs, each fault as often as the tables of tests/e2e/README.md say, which it writes.
+# Injects faults into machines while a job runs, each as often as the tables of tests/e2e/README.md say, and writes
+# these tables.
 .PHONY: test-faults
 test-faults: programs $(FAULTY_WORKER) $(BUILD)/tests/coordinator/power_loss/test_durability
 	sh tests/e2e/faults.sh $(BUILD) --write
@@ -210,7 +214,8 @@ fuzzers: $(FUZZ_BIN)
 fuzz:
 	MAKE="$(MAKE)" sh tests/fuzz/run.sh
 
-# A worker that spoils chain states among honest ones, 50 seeds: the bits of hslt-render; one of them is part of the tests.
+# A worker that spoils chain states among honest ones, with 50 seeds: the image must have the bits of hslt-render's. The
+# tests run one seed.
 .PHONY: test-states
 test-states: programs $(FAULTY_WORKER)
 	SEEDS="$$(seq -s ' ' 50)" sh tests/e2e/states.sh $(BUILD)
@@ -226,7 +231,8 @@ fuzz-numbers: $(BUILD)/tests/worker/render/test_scene_numbers
 corpus: programs
 	@sh tests/corpus/corpus.sh $(BUILD)/bin/hslt-scene "$(DIR)"
 
-# Benchmarks: one program from tests/bench/*.c; a table on stdout and $(BUILD)/bench.json. BENCH="path tiles" runs only these.
+# Benchmarks: one program from tests/bench/*.c; writes a table to stdout and $(BUILD)/bench.json. BENCH="path tiles"
+# runs only these two.
 BENCH_SRC := $(wildcard tests/bench/*.c)
 $(BUILD)/bench/bench: $(call obj,$(BENCH_SRC)) $(LIB_TEST) $(LIB_CLI) $(LIB_RENDER) $(LIB_COMMON)
 	$(link) $(BENCH_WRAP) $(MEMORY_WRAP) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
@@ -239,12 +245,13 @@ bench: programs $(BUILD)/bench/bench $(if $(filter effects,$(BENCH)),plain)
 pictures: programs
 	$(PYTHON) tests/bench/pictures.py $(BUILD) $(BUILD)/pictures $(PICTURES)
 
-# The reports of tests/bench/accuracy/README.md as pages and tables, into build/accuracy: about 20 minutes of one core.
+# The reports shown in tests/bench/accuracy/README.md, as pages and tables in build/accuracy: about 20 minutes of one
+# core.
 .PHONY: accuracy
 accuracy: programs
 	sh tests/bench/accuracy/reports.sh $(BUILD)/bin $(BUILD)/accuracy
 
-# Stated errors against true ones: about an hour of one core. CALIBRATION="--renders 8 --lengths 2" for less.
+# Compares stated errors with true ones: about an hour of one core. CALIBRATION="--renders 8 --lengths 2" for less.
 CALIBRATION_SRC := $(filter-out tests/image/test_%.c,$(wildcard tests/image/*.c))
 $(BUILD)/calibration/calibration: $(call obj,$(CALIBRATION_SRC)) $(LIB_TEST) $(LIB_CLI) $(LIB_RENDER) $(LIB_COMMON)
 	$(link) $(MEMORY_WRAP) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
@@ -260,7 +267,7 @@ $(BUILD)/load/load: $(call obj,$(LOAD_SRC)) $(LIB_CLI) $(LIB_RENDER) $(LIB_COMMO
 load: programs $(BUILD)/load/load
 	$(BUILD)/load/load --bin $(BUILD)/bin $(LOAD)
 
-# A renderer that knows nothing of colour, dispersion and apertures, to measure what asking for them costs.
+# A renderer compiled without colour, dispersion and apertures, to measure the cost of checking for them.
 .PHONY: plain
 plain:
 	$(MAKE) BUILD=$(BUILD)/plain EXTRA_CFLAGS="$(EXTRA_CFLAGS) -DHSLT_PLAIN" $(BUILD)/plain/bin/hslt-render
@@ -269,7 +276,7 @@ plain:
 demo: programs
 	sh deploy/demo-run.sh $(BUILD) build/demo
 
-# Made of the programs' tables of options (common/base/option.h).
+# Made from the programs' tables of options (common/base/option.h).
 MAN        := $(PROGRAMS:%=$(BUILD)/man/%.1)
 COMPLETION := $(PROGRAMS:%=$(BUILD)/completion/%)
 .PHONY: man completion

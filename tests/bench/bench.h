@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The benchmarks' table: each figure is the median of at least ten measurements with the order-statistic interval that
- * holds the median with 97.8 % (the 2nd least to the 2nd largest of ten). Times are CPU seconds, by the thread's
- * clock where getrusage would round to ticks; what is compared is measured in turns within the same minute. One thread.
+ * contains the median with 97.8 % (from the 2nd least to the 2nd largest of ten). Times are CPU seconds, by the
+ * thread's clock where getrusage would round to ticks; values that are compared are measured in turns within the same
+ * minute. One thread.
  */
 #ifndef TESTS_BENCH_BENCH_H
 #define TESTS_BENCH_BENCH_H
@@ -27,22 +28,22 @@ double series_median(const struct series *s);
 
 double bench_cpu_seconds(void); /* of this thread */
 
-/* The heading of the rows that follow; also their prefix in the JSON. */
+/* Prints the heading of the rows that follow; the name is also their prefix in the JSON. */
 void bench_group(const char *name, const char *says);
 void bench_row(const char *name, const struct series *s, const char *unit, enum bench_target kind, double target);
 void bench_single(const char *name, double value, const char *unit, enum bench_target kind, double target);
 void bench_skip(const char *why);
 __attribute__((noreturn)) void bench_die(const struct error *e);
-/* mem_alloc, or bench_die. */
+/* Like mem_alloc, but ends the bench if out of memory. */
 void *bench_alloc(size_t count, size_t size);
 
-/* Keeps the compiler from dropping what it computes. */
+/* Keeps the compiler from removing computations whose results are stored here. */
 extern volatile double bench_sink;
 
-/* One a file. bin: the folder of the programs. */
+/* Each benchmark is one file. bin: the folder of the programs. */
 void bench_rays(const char *bin);
 void bench_hslt(const char *bin);
-void bench_equal_time(const char *bin); /* most of an hour: only when named */
+void bench_equal_time(const char *bin); /* most of an hour: runs only when named */
 void bench_tiles(const char *bin);
 void bench_parts(const char *bin);
 void bench_loading(const char *bin);
@@ -50,6 +51,6 @@ void bench_sharing(const char *bin);
 void bench_sending(const char *bin);
 void bench_farm(const char *bin);
 void bench_memory(const char *bin);
-void bench_effects(const char *bin); /* minutes of valgrind: only when named */
+void bench_effects(const char *bin); /* minutes of valgrind: runs only when named */
 
 #endif

@@ -4,11 +4,11 @@
     blender -b --factory-startup -P tests/bench/cycles.py -- BUILD [SCENE ...]
 
 Every scene is rendered SEEDS times by Cycles, by `path` and by the default, one thread each, in turns. No reference is needed:
-the error is what the images of one renderer differ among themselves, so that materials that mean something else in the other
-renderer do not count as noise, nor would a bias. Cycles has no clamping, no filter of caustics, no adaptive sampling and no
-denoiser, since these change what the image converges to, and a box filter, as exported scenes have here. Prints for each scene
-the product of error and CPU time: relMSE (docs/design.md, rule 4, the mean of all seeds as the reference) of all pixels and of
-all but the worst 0.1 %, times the CPU seconds of rendering, without Blender's start and export. Fails where a program fails.
+the error is the spread of one renderer's images. So a material that the renderers interpret differently does not count as noise,
+and neither would a bias. Cycles runs without clamping, caustics filter, adaptive sampling and denoiser, since these change what
+the image converges to, and with a box filter, which exported scenes have here. Prints for each scene the product of error and CPU
+time: relMSE (docs/design.md, rule 4, with the mean of all seeds as the reference) of all pixels and of all but the worst 0.1 %,
+times the CPU seconds of rendering, without Blender's start and export. Fails if a program fails.
 """
 import json
 import math
@@ -98,7 +98,7 @@ def room():
 
 
 def indirect():
-    """The lamp shines at the ceiling; a golden ball."""
+    """A lamp that shines at the ceiling, and a golden ball."""
     walls()
     plane(lamp(60), 1, (0, 0, 3.6))
     ball(diffuse("yellow", (0.6, 0.6, 0.2)), 0.7, (-0.8, 0.3, 0.7))
@@ -195,7 +195,7 @@ def pixels(file):
 
 
 def relmse(images):
-    """Of one image, all pixels and trimmed."""
+    """Returns the error of one renderer's images: over all pixels, and without the worst ones."""
     a = numpy.array(images)
     n, mean = len(a), a.mean(0)
     floor = (0.01 * mean.mean(0)) ** 2

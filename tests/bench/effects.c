@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Instructions a mutation (callgrind), of whole renders of two lengths, so that building and the bootstrap fall out:
- * for each effect in a scene that calls for it, as it is and with the effect forced off; in a scene that does not, as
- * it is and forced on; and where colour, dispersion and aperture are off, against a renderer compiled without them
- * (make plain). Counts of one thread of one plan: they do not vary from run to run.
+ * Instructions per mutation (callgrind), from whole renders of two lengths, so that building and the bootstrap cancel
+ * out: for each effect in a scene that calls for it, as it is and with the effect forced off; in a scene that does not,
+ * as it is and forced on; and with colour, dispersion and aperture off, against a renderer compiled without them (make
+ * plain). The counts are of one thread and one plan, and do not vary from run to run.
  */
 #include "tests/bench/bench.h"
 
@@ -18,7 +18,7 @@
 #define COLOURED " -D wall=0.5,0.4,0.3"
 enum { CHAINS = 16, SHORT = 256, LONG = 1280 };
 
-/* All instructions of one render; NAN: the program failed. */
+/* Returns the number of instructions of one render; NAN if the program failed. */
 static double instructions(const char *bin, const char *how, unsigned steps)
 {
 	char line[4096], text[512];
@@ -49,8 +49,8 @@ static double a_mutation(const char *bin, const char *how)
 }
 
 static const struct {
-	const char *effect, *on, *off; /* scenes that call for it, and that do not */
-	bool may_go;		       /* it can be forced off */
+	const char *effect, *on, *off; /* scenes that call for the effect, and that do not */
+	bool may_go;		       /* the effect can be forced off */
 } rows[] = {
 	{"colour", BOX COLOURED, BOX, false},
 	{"wavelength", BOX COLOURED, BOX, true},
@@ -89,7 +89,8 @@ static void measure_effect(const char *bin, size_t i)
 	add(effect, "off: leaving it out saves", 100 * (1 - off / forced), "%");
 }
 
-/* The same strategies by hand: what the analysis leaves out must cost what a mixture without it does. */
+/* The strategies chosen by the analysis, named by hand: leaving out a strategy must cost what a mixture without it
+ * costs. */
 static void by_hand(const char *bin)
 {
 	static const char mixture[] = " --mutations bidirectional=0.05,rejoin=0.8";
@@ -100,7 +101,7 @@ static void by_hand(const char *bin)
 		     BENCH_AT_MOST, 1);
 }
 
-/* Colour, dispersion and aperture off, against a renderer without a question about them. */
+/* Colour, dispersion and aperture off, against a renderer without the branches for them. */
 static void measure_questions(const char *bin)
 {
 	static const struct {

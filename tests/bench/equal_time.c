@@ -2,14 +2,22 @@
 /*
  * Relative errors squared times CPU seconds, one thread, pilot and bootstrap included: the default against hslt,
  * pssmlt, bdpt and path, and the breakup against its two parts unbroken, each with several seeds, with and without the
- * worst pixels. What the default chooses has the same bits with `--integrator`: it is rendered once, and the default
- * is charged the pilot on top, so that two times of the same samples do not differ by the machine's load. The reference
- * is two long renders R, S by what the default chooses, of different seeds, kept in build/bench-references: the mean of
- * (A - R)(A - S) is the squared error of A, whatever the errors of R and S are. A third figure leaves out the pixels in
- * which these two differ most. HSLT_BENCH_SECONDS: other than 10 for each picture. HSLT_BENCH_REFERENCE: the two take
- * other than ten times that together. HSLT_BENCH_SEEDS: other than 5.
- * HSLT_BENCH_METHODS: only the first so many; with 6, 7 and 8, bdpt8, erpt and erpt4 too, which are not among those
- * that the default is held against. HSLT_BENCH_RANDOM=0-9: random scenes (tests/support/random_scene.h) instead.
+ * worst pixels.
+ *
+ * If the default chooses an integrator, its image has the same bits as with `--integrator`: so it is rendered once, and
+ * the default is charged the pilot in addition. Otherwise the machine's load would make two times of the same samples
+ * differ.
+ *
+ * The reference is two long renders R, S by the integrator that the default chooses, with different seeds, kept in
+ * build/bench-references: the mean of (A - R)(A - S) is the squared error of A, whatever the errors of R and S are. A
+ * third figure leaves out the pixels in which these two differ most.
+ *
+ * HSLT_BENCH_SECONDS: seconds per picture instead of 10.
+ * HSLT_BENCH_REFERENCE: seconds of both references together instead of ten times that.
+ * HSLT_BENCH_SEEDS: number of seeds instead of 5.
+ * HSLT_BENCH_METHODS: only the first so many methods; 6, 7 and 8 add bdpt8, erpt and erpt4, which the default is not
+ * compared with.
+ * HSLT_BENCH_RANDOM=0-9: random scenes (tests/support/random_scene.h) instead.
  */
 #include "common/base/mem.h"
 #include "common/exr/image_file.h"
@@ -29,14 +37,14 @@
 #include <sys/stat.h>
 
 enum { REFERENCE_TIMES = 10, REFERENCE_MOST = 10000, AROUND = 3 /* pixels */, SEEDS_MOST = 32 };
-enum { HALVES = 2, REFERENCE_SEED = 99 /* and the next */ };
-#define TRIM 0.001   /* share of the pixels left out, the worst */
-#define UNKNOWN 0.01 /* and of those in which the reference's halves differ most, which no method has a part in */
-enum { ALL, TRIMMED, KNOWN, KINDS }; /* pixels that count */
+enum { HALVES = 2, REFERENCE_SEED = 99 /* the second reference has the next seed */ };
+#define TRIM 0.001		     /* share of the pixels that is left out, the worst ones */
+#define UNKNOWN 0.01		     /* share left out where the references differ most, whatever the method */
+enum { ALL, TRIMMED, KNOWN, KINDS }; /* which pixels count */
 static const char *const kind_names[KINDS] = {"all pixels", "trimmed", "where the reference is known"};
 
 static const struct trial_scene {
-	const char *name, *file; /* of the project, or of the folder that HSLT_SCENES names */
+	const char *name, *file; /* a file of the project, or of the folder that HSLT_SCENES names */
 	bool shipped;
 	uint32_t width, height;
 } scenes[] = {
@@ -86,7 +94,7 @@ enum { METHODS = sizeof methods / sizeof *methods, DEFAULT = 0, PEERS_END = 5, B
 
 struct shot {
 	struct canvas_image image;
-	double cpu, pilot; /* of which the pilot */
+	double cpu, pilot; /* pilot: part of cpu */
 	char integrator[16];
 };
 
@@ -105,7 +113,7 @@ static struct plan_request request_of(const struct world *w, const struct method
 	return r;
 }
 
-/* What the default renders with, and what it costs to find out. */
+/* Runs the pilot: the integrator that the default chooses, and the CPU seconds of the choice. */
 static void choose_integrator(const struct world *w, struct plan_request *r, struct shot *out)
 {
 	struct error e;
@@ -142,7 +150,7 @@ static void render_shot(const struct world *w, const struct method *m, uint64_t 
 	canvas_free(run.canvas);
 }
 
-/* The number of samples per pixel that takes about that long. */
+/* Returns the number of samples per pixel that takes about so many seconds. */
 static uint64_t shoot_for(const struct world *w, const struct method *m, double seconds, uint64_t seed,
 			  struct shot *out)
 {
@@ -150,20 +158,21 @@ static uint64_t shoot_for(const struct world *w, const struct method *m, double 
 		render_shot(w, m, spp, seed, out);
 		if (out->cpu > 0.85 * seconds)
 			return spp;
-		/* The bootstrap and what a round costs: only a run that is not much shorter tells. */
+		/* The bootstrap and the cost of a round: only a run that is not much shorter than the real one shows
+		 * them. */
 		double factor = fmin(seconds / out->cpu * (out->cpu < 0.1 * seconds ? 0.12 : 1), 100);
 		spp = (uint64_t)fmax((double)spp + 1, round((double)spp * factor));
 		canvas_image_fini(&out->image);
 	}
 }
 
-/* What images are held against, three values for each pixel. */
+/* What images are compared with; three values per pixel. */
 struct measure {
 	size_t pixels;
 	int width, height;
 	struct canvas_image half[HALVES];
-	double *own;	       /* squared errors of the halves' mean */
-	double *scale, *known; /* what squared errors are divided by */
+	double *own;	       /* squared errors of the mean of both references */
+	double *scale, *known; /* divisors of squared errors */
 };
 
 static size_t values_of(const struct canvas_image *i)
@@ -171,7 +180,7 @@ static size_t values_of(const struct canvas_image *i)
 	return (size_t)i->width * i->height * 3;
 }
 
-/* Colours only, floats as they lie in memory. */
+/* Reads colours only, as floats in this machine's byte order. */
 static bool read_reference(const char *path, struct canvas_image *i)
 {
 	size_t n = values_of(i);
@@ -202,7 +211,7 @@ static void make_half(const struct world *w, const struct trial_scene *s, double
 	mkdir("build/bench-references", 0777);
 	snprintf(path, sizeof path, "build/bench-references/%s-%ux%u-%.0fs-%u", s->name, s->width, s->height, seconds,
 		 half);
-	render_shot(w, by, 1, REFERENCE_SEED, &shot); /* for its size */
+	render_shot(w, by, 1, REFERENCE_SEED, &shot); /* only to get the size */
 	if (!read_reference(path, &shot.image)) {
 		canvas_image_fini(&shot.image);
 		shoot_for(w, by, seconds, REFERENCE_SEED + half, &shot);
@@ -211,7 +220,7 @@ static void make_half(const struct world *w, const struct trial_scene *s, double
 	*out = shot.image;
 }
 
-/* By magnitude: products may be negative. */
+/* Orders by magnitude: products may be negative. */
 static int descending(const void *a, const void *b)
 {
 	double x = fabs(*(const double *)a), y = fabs(*(const double *)b);
@@ -228,8 +237,8 @@ static double half_mean(const struct measure *m, size_t i)
 	return 0.5 * ((double)m->half[0].rgb[i] + (double)m->half[1].rgb[i]);
 }
 
-/* What squared errors are divided by, as in worker/cli/image/compare.h, but for the mean of the reference around each
- * pixel instead of the pixel itself: hard scenes leave a reference noisy, and where it happens to be dark all would
+/* Divisors of squared errors, as in worker/cli/image/compare.h, but from the mean of the reference around each pixel
+ * instead of the pixel itself: in hard scenes the reference is noisy, and where it happens to be dark every image would
  * look wrong. */
 static double *scales_of(const struct measure *m)
 {
@@ -251,7 +260,7 @@ static double *scales_of(const struct measure *m)
 	return scale;
 }
 
-/* The same, and infinite where the halves differ most. */
+/* Like scales_of(), but infinite where the two references differ most. */
 static double *scales_where_known(const struct measure *m)
 {
 	double *own = doubles(m->pixels), *sorted = doubles(m->pixels), *known = doubles(3 * m->pixels);
@@ -292,7 +301,7 @@ static void measure_free(struct measure *m)
 	mem_free(m->known);
 }
 
-/* relMSE of squares by pixel and channel, without a share of the pixels, the worst. */
+/* Returns the relMSE from squares by pixel and channel, without the given share of the worst pixels. */
 static double relative(size_t pixels, const double *square, const double *scale, double trim)
 {
 	size_t out = (size_t)(trim * (double)pixels);
@@ -306,7 +315,7 @@ static double relative(size_t pixels, const double *square, const double *scale,
 	return fmax(sum, 0) / (double)(pixels - out);
 }
 
-/* By how far the image is from the reference, without the reference's own part. */
+/* Returns the squared difference between image and reference, without the reference's own error. */
 static double error_by_reference(const struct canvas_image *a, const struct measure *m, const double *scale,
 				 double trim)
 {
@@ -319,7 +328,7 @@ static double error_by_reference(const struct canvas_image *a, const struct meas
 	return e;
 }
 
-/* By how far the image's independent groups are from each other. */
+/* Returns the error from the spread of the image's independent groups. */
 static double error_by_spread(const struct canvas_image *a, const struct measure *m)
 {
 	double *square = doubles(3 * m->pixels);
@@ -338,16 +347,16 @@ static double brightness(const struct canvas_image *i)
 	return sum;
 }
 
-/* Of one method, seed by seed: relMSE times CPU seconds. */
+/* Results of one method, one for each seed: relMSE times CPU seconds. */
 struct trial {
 	uint64_t spp;
 	double value[KINDS][SEEDS_MOST], mean[KINDS], bright[SEEDS_MOST], spread[SEEDS_MOST], cpu[SEEDS_MOST];
 	double brightness, by_spread;
-	double pilot;		     /* its share of the CPU seconds */
-	char chosen[SEEDS_MOST][16]; /* integrators */
+	double pilot;		     /* CPU seconds of the pilot, which are part of the cost */
+	char chosen[SEEDS_MOST][16]; /* names of integrators */
 };
 
-/* Of seed k, of the sums over all seeds. */
+/* Adds seed k to the sums over all seeds. */
 static void count_seed(struct trial *out, unsigned seeds, unsigned k)
 {
 	for (int t = 0; t < KINDS; t++)
@@ -376,8 +385,8 @@ static void take_shot(const struct world *w, const struct method *m, double seco
 	canvas_image_fini(&shot.image);
 }
 
-/* The default's of seed k, whose methods are all taken: the same as one of them but for the pilot, or a render of its
- * own. */
+/* Takes the default's result for seed k, after all methods have run: the result of the chosen method plus the pilot, or
+ * a render of its own. */
 static void take_default(const struct world *w, double seconds, unsigned seeds, unsigned k, size_t count,
 			 const struct measure *by, struct trial *of)
 {
@@ -401,7 +410,7 @@ static void take_default(const struct world *w, double seconds, unsigned seeds, 
 	take_shot(w, &methods[DEFAULT], seconds, seeds, k, by, out);
 }
 
-/* What |t| exceeds with a probability of 5 %. */
+/* Returns the value that |t| exceeds with a probability of 5 %. */
 static double student_95(double degrees)
 {
 	double low = 0, high = 1000;
@@ -412,12 +421,12 @@ static double student_95(double degrees)
 	return high;
 }
 
-/* Mean of the first over that of the second, with a 95 % interval: of the ratio's logarithm, by the spread between
- * seeds, which both share, as they share the minute in which they were rendered. */
+/* Prints the ratio of both means with a 95 % interval: that of the ratio's logarithm, from the spread between seeds.
+ * Both methods are rendered with the same seeds, and each seed within the same minute. */
 static void print_ratio(const char *says, const struct trial *a, const struct trial *b, int t, unsigned seeds)
 {
 	double ratio = a->mean[t] / b->mean[t], square = 0;
-	if (!(a->mean[t] > 0 && b->mean[t] > 0)) { /* the reference's errors are the larger ones */
+	if (!(a->mean[t] > 0 && b->mean[t] > 0)) { /* the reference's errors are larger */
 		printf("  %s: not known, the reference is too noisy\n", says);
 		return;
 	}
@@ -477,7 +486,7 @@ static void compare_all(const struct world *w, const struct trial_scene *s, doub
 			     BENCH_INFORMS, 0);
 }
 
-/* A whole number of the environment, within 1 and most; else the default. */
+/* Returns a whole number from the environment, between 1 and `most`, or the default. */
 static unsigned env_count(const char *name, unsigned usual, unsigned most)
 {
 	const char *text = getenv(name);
@@ -490,7 +499,7 @@ struct lengths {
 	unsigned seeds, methods, reference;
 };
 
-/* Frees the world. */
+/* Runs all methods on one scene; frees the world. */
 static void run_scene(struct world *w, const struct trial_scene *s, const struct lengths *l)
 {
 	char says[128];

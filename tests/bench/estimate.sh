@@ -1,14 +1,14 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
-# Does hslt-render --estimate hold what it promises? Each row: a pilot with one seed says what a target costs, a render with
-# another seed goes there. Wanted: in 80 % of the rows the processor time lies in the predicted 90 % interval, and the median
-# of predicted over real is within a factor 1.25. Beside it the same in mutations, which do not depend on who else uses the
-# machine.
+# Does hslt-render --estimate hold what it promises? In each row a pilot with one seed predicts the cost of a target,
+# and a render with another seed goes there. Required: in 80 % of the rows the processor time lies in the predicted 90 %
+# interval, and the median of predicted over real is within a factor 1.25. The same is shown in mutations, which do not
+# depend on other processes of the machine.
 #
-#   sh tests/bench/estimate.sh [BUILD [ROWS]]      ROWS: a pattern of scenes, such as 'demo|box' (all)
+#    sh tests/bench/estimate.sh [BUILD [ROWS]]      ROWS: a pattern of scenes, such as 'demo|box' (all)
 #
-# HSLT_SCENES names a folder of public scenes; without it those rows are left out. PILOT: seconds of a pilot (15). THREADS (1).
-# About an hour on one core.
+# HSLT_SCENES names a folder of public scenes; without it those rows are left out. PILOT: seconds of a pilot (15).
+# THREADS (1). About an hour on one core.
 set -eu
 BUILD=${1:-build}
 ROWS=${2:-.}
@@ -20,7 +20,7 @@ DIR=$(mktemp -d "${TMPDIR:-/tmp}/hslt-estimate.XXXXXX")
 trap 'rm -rf "$DIR"' EXIT
 trap 'exit 130' INT TERM
 
-# range FILE TARGET KEY: low, expected, high of the target's row
+# range FILE TARGET KEY: prints low, expected and high of the target's row
 range() {
 	awk -v target="$2" -v key="\"$3\":{" '{
 		n = split($0, row, "{\"error\":")
@@ -33,12 +33,12 @@ range() {
 	}' "$1"
 }
 
-# number FILE KEY
+# number FILE KEY: prints that number
 number() {
 	grep -o '"'"$2"'": *[-0-9.e+]*' "$1" | head -n 1 | sed 's/.*: *//'
 }
 
-# row NAME SCENE TARGET SEED EPOCH [OPTION...]
+# row NAME SCENE TARGET SEED EPOCH [OPTION...]: measures and prints one row
 row() {
 	name=$1 scene=$2 target=$3 seed=$4 epoch=$5
 	shift 5
@@ -81,7 +81,7 @@ row three-spheres "$public/three-spheres.xml" 0.13 1 128
 row three-spheres "$public/three-spheres.xml" 0.10 2 128
 row three-spheres "$public/three-spheres.xml" 0.085 3 128
 
-# of the rows: how many hold, and the median of predicted over real
+# over the rows: how many intervals hold, and the median of predicted over real
 awk '
 	function median(x, n,   i, j, t) {
 		for (i = 2; i <= n; i++)

@@ -2,7 +2,7 @@
 /*
  * Benchmarks farm, memory and sending: a coordinator with workers on loopback against hslt-render on the same plan, in
  * CPU time and throughput; peak memory of coordinator and worker; bytes that hslt-submit sends the first and the second
- * time. Programs that are not built skip the benchmark with a message; one that fails ends it.
+ * time. If a program is not built, the benchmark is skipped with a message; a program that fails ends the bench.
  */
 #include "common/base/mem.h"
 #include "common/plan/plan.h"
@@ -85,7 +85,7 @@ static void start_render(const struct farm *f, struct process *p, const char *op
 		      f->folder, which, options);
 }
 
-/* 32 mutations a pixel, a fast preview: longer jobs send less for each mutation. */
+/* 32 mutations per pixel, as for a quick preview: longer jobs send less per mutation. */
 enum { MUTATIONS = 1 << 19 };
 #define JOB "--integrator pssmlt --size 128x128 --bootstrap 65536 --mutations 524288"
 #define TWICE "--integrator pssmlt --size 128x128 --bootstrap 131072 --mutations 1048576"
@@ -135,7 +135,7 @@ static void two_workers(const char *bin)
 	farm_stop(&f);
 }
 
-/* Peak memory of a coordinator of its own that ran one job. */
+/* Returns the peak memory of a coordinator that ran one job. */
 static double coordinator_peak(const char *bin, const char *options)
 {
 	struct farm f;
@@ -149,7 +149,7 @@ static double coordinator_peak(const char *bin, const char *options)
 static void coordinator_memory(const char *bin)
 {
 #define SMALL "--integrator path --size 128x128 --groups 16 --epoch 1 "
-	/* Three rounds touch all films: the prefix and the two open ones of each group. */
+	/* Three rounds touch all films: for each group the sum of complete rounds, and the two open rounds. */
 	double films = 16 * 3 * 8.0 * 3 * 128 * 128, few = coordinator_peak(bin, SMALL "--spp 48"),
 	       many = coordinator_peak(bin, SMALL "--spp 1536");
 	bench_single("coordinator's peak, 3 rounds of leases", 1e-6 * few, "MB", BENCH_INFORMS, 0);
@@ -209,7 +209,7 @@ static void worker_memory(const char *bin)
 
 enum { SENT_CELLS = 930 };
 
-/* The seconds of a submission; *bytes: what it sent. */
+/* Returns the seconds of a submission; *bytes: the bytes that it sent. */
 static double send_scene(const struct farm *f, const struct relay *r, uint16_t port, unsigned seed, double *bytes)
 {
 	struct process p;
@@ -223,7 +223,7 @@ static double send_scene(const struct farm *f, const struct relay *r, uint16_t p
 	return p.cpu_seconds;
 }
 
-/* Nobody renders what is submitted. */
+/* Submits without any worker, so that nothing is rendered. */
 static void send_once(const char *bin)
 {
 	static const char xml[] =
@@ -248,7 +248,7 @@ static void send_once(const char *bin)
 	farm_stop(&f);
 }
 
-/* All programs are there; says which is missing. */
+/* Returns whether all programs are there; names the missing one. */
 static bool has_programs(const char *bin)
 {
 	static const char *const needed[] = {"hslt-coordinator", "hslt-worker", "hslt-submit", "hslt-render"};

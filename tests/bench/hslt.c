@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What HSLT's mutations cost: how many are made in the CPU time in which Embree alone casts a million rays, rays,
- * acceptance, walks that fail; the share of time inside Embree; the breakup against its two parts unbroken.
+ * What HSLT's mutations cost: the number of mutations made in the CPU time in which Embree alone casts a million rays;
+ * rays, acceptance and failing walks; the share of time inside Embree; the breakup against its two parts unbroken.
  */
 #include "tests/bench/bench.h"
 #include "tests/bench/scenes.h"
@@ -10,10 +10,10 @@
 
 #include <stdio.h>
 
-/* What the reference renderer of the method does with these scenes, by the same measure. */
+/* Figures of the method's reference renderer on these scenes, measured in the same way. */
 struct reference {
 	const char *file;
-	double mutations, rays, failed; /* failed: % of walks */
+	double mutations, rays, failed; /* failed: percentage of walks */
 };
 static const struct reference references[] = {
 	{"three-spheres.xml", 25300, 5.2, 15.6},
@@ -21,14 +21,15 @@ static const struct reference references[] = {
 	{"half-sunk-rough.xml", 13700, 9.6, 19.3},
 };
 
-/* Proposals of half vectors but for so few that chains would not be chains without. */
+/* Only half-vector proposals, except for the few others without which chains could not move everywhere. */
 #define ALONE "hslt=1,bidirectional=0.000001"
 #define BROKEN_UP "hslt=0.95,bidirectional=0.05"
 #define UNBROKEN "halfvec=0.475,multichain=0.475,bidirectional=0.05"
 
 struct figures {
 	double seconds, mutations, rays, accepted;
-	double there, failed, occluded, back, not_back; /* walks; occluded: they arrived where an edge is */
+	double there, failed, occluded, back, not_back; /* walks; occluded: they arrived, but an edge of the path is
+							 * occluded */
 };
 
 static double sum(const uint64_t *n, unsigned first, unsigned last)
@@ -96,7 +97,7 @@ static void measure_rate(struct world *w, const struct reference *r)
 	subject_release(&alone);
 }
 
-/* Share of the time that the same rays take Embree alone, and the rest by mutation. */
+/* Share of the time that Embree alone takes for the same rays, and the rest divided by mutations. */
 static void measure_share(struct world *w, double least_share)
 {
 	struct subject s;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What it costs to load a scene: a binary PLY of a million triangles against reading its bytes and building Embree's
+ * The cost of loading a scene: a binary PLY of a million triangles against reading its bytes and building Embree's
  * structure, and many small shapes against half as many.
  */
 #include "common/base/mem.h"
@@ -14,7 +14,7 @@
 enum { CELLS = 708 };
 enum { FEW = 5000, MANY = 10000, SHAPE_MAX = 160 };
 
-/* Cubes and spheres side by side. */
+/* Makes cubes and spheres side by side. */
 static struct bench_file make_small(unsigned count)
 {
 	struct bench_file f = {bench_alloc((size_t)(count + 2) * SHAPE_MAX, 1), 0};
@@ -37,7 +37,7 @@ static double load_seconds(const struct memory_file *files, struct world **out)
 	return bench_cpu_seconds() - begin;
 }
 
-/* From a file that the system has in memory. */
+/* Returns the seconds of reading a file from the system's page cache. */
 static double read_seconds(FILE *from, struct bench_file *into, size_t size)
 {
 	struct error e;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Nanoseconds of the renderer's parts, to see what is worth a look: random blocks, spectra, the film, each BSDF. */
+/* Nanoseconds taken by parts of the renderer, to see which parts are worth optimising: random blocks, spectra, the
+ * film, each BSDF. */
 #include "common/base/arena.h"
 #include "tests/bench/bench.h"
 #include "tests/support/nodes.h"
@@ -15,7 +16,7 @@ enum { CALLS = 1 << 14, POINTS = 1 << 10 };
 struct setting {
 	struct wavelengths wl[POINTS];
 	double u[POINTS][4];
-	vec3 wo[POINTS], wi[POINTS]; /* upper hemisphere */
+	vec3 wo[POINTS], wi[POINTS]; /* in the upper hemisphere */
 	const void *subject;
 	void *film;
 };

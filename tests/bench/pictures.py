@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Renders the pictures that the documentation shows, beside each other, into FOLDER/NAME.png.
+"""Renders the pictures of the documentation, panel beside panel, into FOLDER/NAME.png.
 usage: pictures.py BUILD FOLDER [NAME...]; without NAME: all.
 
-A panel takes a number of samples per pixel, or CPU seconds of the whole program, scene and pilot included. Fails where
-a program fails or no length comes within a quarter of the time that is asked for. Seconds depend on the machine, so
-pictures of equal time differ from one to another.
+A panel takes a number of samples per pixel, or CPU seconds of the whole program, scene and pilot included. Fails if a
+program fails, or if no length comes within a quarter of the requested time. Seconds depend on the machine, so pictures
+of equal time differ between machines.
 """
 import json
 import os
@@ -15,18 +15,18 @@ import sys
 import tempfile
 import zlib
 
-STEP = 16  # samples a pixel: one of each group
+STEP = 16  # samples per pixel: one of each group
 BENCH, SCENES = "tests/bench/scenes/", "tests/scenes/"
 
 
 def equal_time(scene, reference, seconds=9, times=5):
-    """The default and three integrators in equal time, and a reference by other random numbers."""
+    """The default and three integrators in equal time, and a reference with other random numbers."""
     panels = [(scene, seconds, 1, ["--integrator", i] if i else []) for i in (None, "path", "bdpt", "pssmlt")]
     return panels + [(scene, times * seconds, 2, ["--integrator", reference])]
 
 
 def with_and_without(scene, spp, option, value):
-    """The path tracer by this setting and by the usual one."""
+    """The path tracer with this setting and with the default."""
     return [(scene, spp, 0, ["--integrator", "path", option, value]), (scene, spp, 0, ["--integrator", "path"])]
 
 
@@ -44,7 +44,7 @@ PICTURES = {  # size of a panel, gap, stops of exposure, whether lengths are sec
 
 
 def render(build, size, panel, spp, out):
-    """Processor seconds, and what was rendered with."""
+    """Returns the processor seconds, and the name of the integrator that rendered."""
     scene, _, seed, options = panel
     stats = out + ".json"
     args = [build + "/bin/hslt-render", scene, "-o", out, "--size", "%dx%d" % size, "--spp", str(spp), "--seed", str(seed),
@@ -58,8 +58,8 @@ def render(build, size, panel, spp, out):
 
 
 def render_for(build, size, panel, out):
-    """The last of a few renders, each as long as the one before it says. Programs have a start that costs as much
-    whatever their length: the first two tell it."""
+    """Renders until the time is right, and returns the last render. The number of samples follows from the renders
+    before: the difference of two gives the rate without the program's start, whose cost is constant."""
     scene, seconds, _, _ = panel
     spp, known = STEP, []
     for _ in range(8):

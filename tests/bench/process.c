@@ -105,7 +105,7 @@ bool process_is_running(const struct process *p)
 	return waitid(P_PID, (id_t)p->pid, &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == 0;
 }
 
-/* A worker's rendering is done by a child of the process that was started (worker/daemon/supervise.h). */
+/* A worker renders in a child of the process that was started (worker/daemon/supervise.h). */
 static size_t with_children(pid_t pid, pid_t all[16])
 {
 	char path[64];
@@ -163,7 +163,8 @@ double process_wait_peak(struct process *p)
 {
 	double peak = 0;
 	while (process_is_running(p)) {
-		/* Not the largest: before it runs the program, it is a copy of this process. */
+		/* The last value and not the largest: before the process runs the program, it is a copy of this
+		 * process. */
 		double bytes = process_peak_bytes(p, NULL);
 		peak = bytes > 0 ? bytes : peak;
 		usleep(1000);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Programs run and watched by the benchmarks: CPU time, peak memory. One thread.
- * What still runs when the bench ends is killed. */
+/* Runs programs for the benchmarks and measures their CPU time and peak memory. One thread. Programs that still run
+ * when the bench ends are killed. */
 #ifndef TESTS_BENCH_PROCESS_H
 #define TESTS_BENCH_PROCESS_H
 
@@ -11,30 +11,31 @@
 enum { PROCESS_ARGS = 32 };
 
 struct process {
-	pid_t pid;	    /* 0: ended */
-	double cpu_seconds; /* of an ended one */
+	pid_t pid;	    /* 0: the process has ended */
+	double cpu_seconds; /* of a process that has ended */
 	int code;
 };
 
-/* BIN/name is there. */
+/* Returns whether BIN/name exists. */
 bool process_exists(const char *bin, const char *name);
-/* line: the program's name in BIN and its arguments, separated by spaces; its output goes into LOG. */
+/* Starts a program. line: its name in BIN and its arguments, separated by spaces; its output goes to LOG. */
 __attribute__((format(printf, 4, 5))) void process_start(struct process *p, const char *bin, const char *log,
 							 const char *format, ...);
-/* Waits; ends the bench when the exit code is not 0. */
+/* Waits for the process; ends the bench if its exit code is not 0. */
 void process_wait(struct process *p);
-/* As process_wait. Its peak of resident memory, looked at every millisecond: that of wait4 includes what this process
- * held when it forked. */
+/* Like process_wait(), and returns the peak of resident memory, sampled every millisecond: the peak of wait4 includes
+ * the memory that this process held when it forked. */
 double process_wait_peak(struct process *p);
-void process_stop(struct process *p); /* SIGTERM, waits */
+void process_stop(struct process *p); /* sends SIGTERM and waits */
 bool process_is_running(const struct process *p);
-/* Of a running one and its children. */
+/* CPU seconds so far of a running process and its children. */
 double process_cpu_seconds(const struct process *p);
-double process_peak_bytes(const struct process *p, double *now); /* resident; now may be NULL */
+double process_peak_bytes(const struct process *p, double *now); /* peak of resident memory; *now: the present value, if
+								  * not NULL */
 
 double wall_seconds(void);
 
-/* folder: ends with XXXXXX, which is replaced. */
+/* folder: ends with XXXXXX, which is replaced by the name of a new folder. */
 void process_make_folder(char *folder);
 void process_remove_folder(const char *folder); /* with its contents */
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What the renderer makes of Embree's rays: an integrator's rate against the same rays sent through the door alone, and
- * against Embree itself with a scene of its own.
+ * The renderer's ray rate: an integrator against the same rays traced through worker/render/geom/accel.h alone, and
+ * against Embree with a scene of its own.
  */
 #include "tests/bench/bench.h"
 #include "tests/bench/scenes.h"
@@ -9,7 +9,7 @@
 
 #include <stdio.h>
 
-/* The world stays the caller's. ratio: the least share of Embree's rate, 0: none is asked for. */
+/* ratio: the least share of Embree's rate that is required; 0: none. The world stays the caller's. */
 static void measure(struct world *w, const char *integrator, double least_share)
 {
 	struct subject s;

@@ -82,7 +82,7 @@ enum walk_end __wrap_halfvec_walk(struct path_context *c, struct full_path *y, u
 	walking = true;
 	enum walk_end end = __real_halfvec_walk(c, y, b, c_end, target, visible, limits, stale, s);
 	walking = false;
-	/* Only a walk back knows that the path which it looks for can be seen. */
+	/* Only a walk back knows that the path which it must reproduce is visible. */
 	(visible ? record_walks.back : record_walks.there)[end]++;
 	return end;
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The rays that the renderer sends through the door (worker/render/geom/accel.h), kept to be sent again, and how its
- * walks in half vector space end. The bench is linked with --wrap for these functions, so that the renderer itself
- * knows nothing of it. One thread.
+ * Records the rays that the renderer traces through worker/render/geom/accel.h, so that they can be traced again, and
+ * how its walks in half-vector space end. The bench wraps these functions at link time (--wrap), so the renderer itself
+ * contains no code for it. One thread.
  */
 #ifndef TESTS_BENCH_RECORD_H
 #define TESTS_BENCH_RECORD_H
@@ -20,12 +20,12 @@ struct recorded_ray {
 };
 
 void record_start(struct recorded_ray *rays, size_t room);
-size_t record_stop(void); /* how many came; those beyond the room are not kept */
+size_t record_stop(void); /* returns the number of rays kept; rays beyond the buffer are dropped */
 
 enum { WALK_ENDS = WALK_ITERATIONS + 1 };
-struct recorded_walks { /* since the program began, by enum walk_end */
+struct recorded_walks { /* since the program started, by enum walk_end */
 	uint64_t there[WALK_ENDS], back[WALK_ENDS];
-	uint64_t occluded; /* of those there that are blocked: they arrived, but an edge is occluded */
+	uint64_t occluded; /* walks in `there` that arrived, but whose path has an occluded edge */
 };
 extern struct recorded_walks record_walks;
 

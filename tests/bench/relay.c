@@ -26,7 +26,7 @@ static struct sockaddr_in loopback(uint16_t port)
 		.sin_family = AF_INET, .sin_port = htons(port), .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
 }
 
-/* The bytes that were passed on; 0: the stream has ended, or the other side is gone. */
+/* Returns the number of bytes passed on; 0: the stream has ended, or the other side is gone. */
 static size_t pass_bytes(int from, int to)
 {
 	char piece[1 << 16];
@@ -40,7 +40,7 @@ static size_t pass_bytes(int from, int to)
 	return n > 0 ? (size_t)n : 0;
 }
 
-/* Until one side hangs up. */
+/* Passes bytes on until one side hangs up. */
 static void serve_connection(struct relay *r, int client, int coordinator)
 {
 	struct pollfd ends[2] = {{client, POLLIN, 0}, {coordinator, POLLIN, 0}};

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Counts the bytes that a client sends: passes one connection at a time on to a port of loopback, by a thread of its
- * own. A failure to set it up ends the bench.
+ * Counts the bytes that a client sends: a thread passes one connection at a time on to a port on loopback. Ends the
+ * bench if it cannot be set up.
  */
 #ifndef TESTS_BENCH_RELAY_H
 #define TESTS_BENCH_RELAY_H
@@ -10,10 +10,10 @@
 
 struct relay;
 
-/* port: of the relay. */
+/* Starts the relay; *port becomes its port. */
 struct relay *relay_start(uint16_t target, uint16_t *port);
-/* Of all connections so far, from the client. */
+/* Returns the bytes that clients have sent on all connections so far. */
 uint64_t relay_sent(const struct relay *r);
-void relay_stop(struct relay *r); /* after the last connection has ended */
+void relay_stop(struct relay *r); /* call it after the last connection has ended */
 
 #endif

@@ -39,7 +39,8 @@ __attribute__((format(printf, 2, 3))) static void text_line(struct text *t, cons
 	va_end(ap);
 }
 
-/* A grid of (cells + 1) x (cells + 1) vertices of a surface over the unit square, two triangles a cell. */
+/* Appends a grid of (cells + 1) x (cells + 1) vertices of a surface over the unit square, with two triangles per cell.
+ */
 static void grid(struct text *t, int cells, void (*surface)(double u, double v, double p[3]))
 {
 	int side = cells + 1;

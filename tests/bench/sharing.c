@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What is loaded once although a scene names it often: an image in many materials, against one material and against
- * as many files; the mesh of a shapegroup with many instances, against one instance and against copies. Seconds are
- * those of loading in this process. Memory is the peak of hslt-render for one sample per pixel, minus that for a scene
- * without image and mesh.
+ * Assets that are loaded once although a scene names them often: an image in many materials, against one material and
+ * against as many files; the mesh of a shapegroup with many instances, against one instance and against copies. Seconds
+ * are those of loading in this process. Memory is the peak of hslt-render for one sample per pixel, minus that for a
+ * scene without image and mesh.
  */
 #include "common/base/mem.h"
 #include "tests/bench/bench.h"
@@ -51,8 +51,8 @@ static void put_place(FILE *f, int i)
 		3 * (i / 100));
 }
 
-/* MATERIALS rectangles with a material each, which use the images p0.png, p1.png, ... in turn; with one material for
- * all of them if images is 0. */
+/* Writes MATERIALS rectangles with a material each, which use the images p0.png, p1.png, ... in turn; with images 0,
+ * all of them share one material. */
 static void write_textured(const struct place *p, const char *name, int images)
 {
 	FILE *f = scene_begin(p, name);
@@ -70,7 +70,7 @@ static void write_textured(const struct place *p, const char *name, int images)
 	scene_end(f);
 }
 
-/* A gradient with noise, so that it costs what a photograph costs to decode. */
+/* Writes gradients with noise, which cost as much to decode as a photograph. */
 static void write_images(const struct place *p)
 {
 	unsigned char *rgb = bench_alloc((size_t)IMAGE_SIDE * IMAGE_SIDE, 3), *png;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What benchmarks run (subject.h): a lease through the integrator's own function, and Embree by itself with the rays
- * that it cast. The raw scene is built without the filters, exact hits and null faces of worker/render/geom/accel.h,
- * so the ratio of both is the price of these.
+ * What the benchmarks measure (subject.h): a lease through the integrator's own function, and Embree alone with the
+ * rays that the lease traced. The raw scene is built without the filters, exact hits and null faces of
+ * worker/render/geom/accel.h, so the ratio of both is the cost of these.
  */
 #include "tests/bench/subject.h"
 
@@ -264,7 +264,7 @@ void subject_release(struct subject *s)
 	mem_free(s->seeds);
 }
 
-/* The plane and the spheres of three-spheres.xml; rays from anywhere between them in any direction. */
+/* The plane and the spheres of three-spheres.xml; rays start anywhere between them, in any direction. */
 struct small {
 	RTCDevice device;
 	RTCScene scene;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A lease of an integrator that can be run again and again, the rays that it sends through the door
- * (worker/render/geom/accel.h), and the same rays for Embree alone: a scene of its own (robust, no filters, the same
- * triangles, Embree's spheres). One thread.
+ * A lease of an integrator that can be run again and again, the rays that it traces through worker/render/geom/accel.h,
+ * and the same rays for Embree alone, with a scene of its own (robust, no filters, the same triangles, Embree's
+ * spheres). One thread.
  */
 #ifndef TESTS_BENCH_SUBJECT_H
 #define TESTS_BENCH_SUBJECT_H
@@ -18,32 +18,32 @@ struct subject {
 	uint64_t *seeds;
 	struct recorded_ray *rays;
 	struct subject_scene *raw;
-	size_t count; /* of rays */
+	size_t count; /* number of rays */
 };
 
-/* Samples a pixel or mutations a chain such that about 2^19 rays are traced. mutations: of integrators that have them;
- * NULL: what suits the scene. The world stays the caller's. */
+/* Chooses samples per pixel or mutations per chain such that about 2^19 rays are traced. mutations: the mixture, for
+ * integrators that have one; NULL: the one that suits the scene. The world stays the caller's. */
 void subject_make(struct subject *s, struct world *w, const char *integrator, const char *mutations);
 void subject_release(struct subject *s);
 
-/* Other random numbers, of chains also other starts; as much work as before. */
+/* Sets other random numbers, and for chains other starts; the amount of work stays the same. */
 void subject_reseed(struct subject *s, uint64_t seed);
 
-/* The caller's batch_fini. */
+/* The caller frees the batch with batch_fini. */
 void subject_run(const struct subject *s, struct batch *b);
-/* Runs it for nothing but the time: the rays it cast. */
+/* Runs the lease to measure time only; returns the number of rays it traced. */
 uint64_t subject_render(const struct subject *s);
 
-/* Keeps the rays of one run, and builds Embree's scene. */
+/* Records the rays of one run, and builds Embree's scene. */
 void subject_record(struct subject *s);
 double subject_replay_raw(const struct subject *s); /* CPU seconds */
 double subject_replay_door(const struct subject *s);
 
-/* CPU seconds in which Embree alone builds its scene of a world's triangles and spheres. */
+/* Returns the CPU seconds in which Embree alone builds its scene of a world's triangles and spheres. */
 double subject_build_raw(const struct world *w);
 
-/* CPU seconds in which Embree alone finds the closest hits of a million incoherent rays among 2 triangles and 3
- * spheres. */
+/* Returns the CPU seconds in which Embree alone finds the closest hits of a million incoherent rays among 2 triangles
+ * and 3 spheres. */
 double subject_million_rays(void);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What the coordinator does with each pixel of a partial result: decode the EXR tiles, check the batch, add it to the
- * film. */
+/* The coordinator's work on each pixel of a partial result: decoding the EXR tiles, checking the batch, adding it to
+ * the film. */
 #include "common/base/mem.h"
 #include "common/film/canvas.h"
 #include "common/exr/exr_tile.h"
@@ -81,7 +81,7 @@ void bench_tiles(const char *bin)
 			 .max_depth = 8};
 	struct canvas *c;
 	struct error e;
-	mem_keep(16 << 20); /* as the coordinator does */
+	mem_keep(16 << 20); /* the same setting as in the coordinator */
 	write_tiles(wire);
 	if (canvas_new(&c, &p, -30, NULL, &e))
 		bench_die(&e);

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-# Tries every scene file under a folder: `sh corpus.sh HSLT-SCENE FOLDER [OPTION...]` (make corpus DIR=FOLDER). Options go to
-# hslt-scene check: --lenient, --path. XML without a <scene>, without a sensor of its own or included, and those that others include, are no
-# scenes. Prints how many load, what refuses the others first, and how often; with ALL=1 every reason, and in how many scenes it
-# occurs. Exit code 1 when one crashed or took more than LIMIT (60) seconds.
+# Tries every scene file under a folder: `sh corpus.sh HSLT-SCENE FOLDER [OPTION...]` (make corpus DIR=FOLDER). Options
+# (--lenient, --path) are passed to hslt-scene check. These XML files are not taken for scenes: files without a <scene>,
+# files with neither a sensor nor an include, and files that others include. Prints how many scenes load, and for the
+# others the first error, with the number of scenes that have it; with ALL=1 every error. The exit code is 1 if
+# hslt-scene crashed or took more than LIMIT (60) seconds.
 set -u
 scene=$1 folder=$2
 shift 2
@@ -10,7 +11,8 @@ shift 2
 work=$(mktemp -d) && trap 'rm -rf "$work"' EXIT
 find "$folder" -type f \( -name "*.xml" -o -name "*.gltf" -o -name "*.glb" \) | sort >"$work/all"
 : >"$work/reasons" && : >"$work/bad"
-# What others include. Names are relative to the scene's folder, which may be the one above that of an included file; $NAME is any.
+# Files that others include. Names are relative to the scene's folder, which may be the parent of an included file's
+# folder; $NAME may stand for anything.
 while IFS= read -r file; do
 	here=${file%/*}
 	sed -n 's/.*<include[^>]*filename="\([^"]*\)".*/\1/p' "$file" | sed 's/\$[A-Za-z_0-9]*/*/g' |
@@ -18,7 +20,8 @@ while IFS= read -r file; do
 			find "$here" "${here%/*}" -path "$here/$name" -o -path "${here%/*}/$name"
 		done
 done <"$work/all" | sort -u >"$work/included"
-# The first complaints without their places, numbers and the list of what is supported. They begin with the scene's folder.
+# The first error of each scene, without place, numbers and the list of what is supported. The lines begin with the
+# scene's folder.
 reasons() {
 	while IFS= read -r line; do
 		printf '%s\n' "${line#"${file%/*}/"}"

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The coordinator of the fuzzers (farm.h): its spool, made once by a conversation with scripted peers and then copied
- * for each run, its loop turned by hand, its peers as TCP and UNIX connections that are read without blocking.
+ * The coordinator of the fuzzers (farm.h): its spool is made once by a conversation with scripted peers and copied for
+ * each run; its loop runs only when called; its peers are TCP and UNIX connections that are read without blocking.
  *
- * It is settled when all peers have hung up and no job is being written or read. What should work and does not ends
- * the program, which libFuzzer reports.
+ * It is settled when all peers have hung up and no job is being written or read. Anything that should work and does not
+ * ends the program, which libFuzzer reports as a finding.
  */
 #include "tests/fuzz/farm.h"
 
@@ -76,7 +76,7 @@ int farm_world_open(struct farm_world *w, struct error *e)
 	c.journal_bytes = 1 << 12; /* so that there are checkpoints */
 	c.max_connections = 16;
 	c.heartbeat_seconds = c.hello_seconds = c.stall_seconds =
-		3600; /* what is found must not depend on the machine's load */
+		3600; /* findings must not depend on the machine's load */
 	for (unsigned i = 0; i < FARM_PEERS; i++)
 		w->peers[i].fd = -1;
 	int rc = server_open(&w->server, &c, e);
@@ -169,9 +169,10 @@ void farm_call(struct farm_world *w, unsigned peer, bool status_socket)
 		p->fd = -1;
 		return;
 	}
-	struct linger reset = {1, 0}; /* thousands of calls leave nothing behind in the kernel */
+	struct linger reset = {1, 0}; /* with thousands of calls, closed connections must not pile up in the kernel */
 	setsockopt(p->fd, SOL_SOCKET, SO_LINGER, &reset, sizeof reset);
-	setsockopt(p->fd, IPPROTO_TCP, TCP_NODELAY, &(int){1}, sizeof(int)); /* said is heard at the next turn */
+	setsockopt(p->fd, IPPROTO_TCP, TCP_NODELAY, &(int){1}, sizeof(int)); /* sent at once, to be read in the next
+									      * turn */
 	frame_reader_init(&p->reader, (struct frame_limits){1 << 22, 1 << 24});
 	farm_turn(w);
 }
@@ -267,7 +268,7 @@ struct plan farm_plan(uint64_t job)
 				 .chains = 4,
 				 .epoch = 100};
 	if (job == FARM_CHAINS)
-		r.target_error = 1e-4; /* so that its error is looked at */
+		r.target_error = 1e-4; /* so that its error is estimated */
 	if (job == FARM_CHAINS || job == FARM_ENDED)
 		snprintf(r.integrator, sizeof r.integrator, "hslt"),
 			snprintf(r.mixture, sizeof r.mixture, "independent=0.1,hslt=0.9");
@@ -434,7 +435,7 @@ static void send_result(struct farm_world *w, unsigned worker, struct lease_key 
 	require(noted || a->verdict == FARM__VERDICT__VERDICT_MERGED, a->text);
 	mem_free(frame);
 	batch_fini(&b);
-	if (noted) /* now the other one's */
+	if (noted) /* now it is the other job's */
 		send_result(w, worker + 1, k);
 }
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A client and a coordinator that says what it likes: all of it at once, whatever is asked, then it hangs up. The first
- * byte says what the client wants: a list, a submission, to wait for a job, a file.
+ * A client against a coordinator that sends arbitrary bytes: all of them at once, whatever is asked, and then it hangs
+ * up. The first byte chooses what the client does: list, submit, wait for a job, fetch a file.
  */
 #include "common/base/mem.h"
 #include "common/net/client.h"

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Whole conversations with a live coordinator: workers, clients and strangers who say what they like, and readers of
- * the status. In the script the speaker says hello by itself where it has a role. The world begins anew when something
- * was stored.
+ * Whole conversations with a live coordinator: workers, clients and strangers that send arbitrary messages, and readers
+ * of the status. A speaker with a role says hello before the script's messages. The coordinator starts anew when an
+ * input has stored something.
  */
 #include "common/base/mem.h"
 #include "common/wire/batch_wire.h"
@@ -15,7 +15,7 @@
 
 enum speaker { WORKER_ONE, WORKER_TWO, CLIENT_ONE, CLIENT_TWO, STRANGER, READER, WORKER_THREE, ONE_HANGS_UP, SPEAKERS };
 
-enum { WORLD_MOST = 200 /* inputs; their blobs stay in the spool */ };
+enum { WORLD_MOST = 200 /* inputs after which the world starts anew, because their blobs stay in the spool */ };
 
 static struct {
 	struct farm_world *world;
@@ -120,7 +120,7 @@ static void send_requests(struct seed *s, uint8_t who, uint64_t job)
 	SEED_SAY(s, who, JOB_GET, job_get, &g);
 }
 
-/* Two workers differ, and a third one decides. */
+/* The results of two workers differ, and a third worker decides. */
 static void write_dispute(void)
 {
 	struct seed s = {0};
@@ -143,7 +143,7 @@ static void write_results(void)
 		last,
 		{.job = FARM_BOOTSTRAP, .kind = LEASE_BOOTSTRAP, .group = 1},
 		{.job = FARM_SAMPLES, .kind = LEASE_RENDER},
-		{.job = FARM_CHAINS, .kind = LEASE_RENDER}, /* a repeat */
+		{.job = FARM_CHAINS, .kind = LEASE_RENDER}, /* a repeated result */
 	};
 	struct seed s = {0};
 	for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
@@ -156,7 +156,7 @@ static void write_results(void)
 		say_result(&s, WORKER_TWO, keys[i]);
 		seed_end(&s, "both", i);
 	}
-	send_requests(&s, WORKER_ONE, last.job); /* to its end */
+	send_requests(&s, WORKER_ONE, last.job); /* until the job ends */
 	for (uint64_t epoch = 0; epoch < p.rounds; epoch++) {
 		struct lease_key k = last;
 		k.epoch = epoch;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* One message, without its frame: the parser, and all that is made of what it says (plans, requests, keys, grants). */
+/* One message without its frame: the parser, and everything that is made from its content (plans, requests, keys,
+ * grants). */
 #include "common/wire/batch_wire.h"
 #include "tests/fuzz/messages.h"
 #include "common/plan/plan_text.h"

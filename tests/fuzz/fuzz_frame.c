@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Bytes from a peer, cut into frames whose bounds are the fuzzer's; what is made of messages that carry payloads. The
- * bytes come in pieces, as from a network.
+ * Bytes from a peer, cut into frames whose limits the fuzzer chooses, and the handling of messages that carry payloads.
+ * The bytes arrive in pieces, as from a network.
  */
 #include "common/wire/batch_wire.h"
 #include "common/wire/frame.h"
@@ -64,7 +64,8 @@ static void read_all(const uint8_t *bytes, size_t size)
 	frame_reader_fini(&r);
 }
 
-/* The frames of an input with the checksums that belong to them: what is behind these is to be reached. malloc'd. */
+/* Returns the frames of an input with correct checksums, so that the code behind the check is reached. The caller frees
+ * it. */
 static uint8_t *check_all(const uint8_t *bytes, size_t size, size_t *out_size)
 {
 	uint8_t *all = NULL;
@@ -94,6 +95,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 	uint8_t *checked = check_all(bytes, size, &out_size);
 	read_all(checked, out_size);
 	free(checked);
-	read_all(bytes, size); /* whose checksums are hardly ever right */
+	read_all(bytes, size); /* with the input's own checksums, which are hardly ever right */
 	return 0;
 }

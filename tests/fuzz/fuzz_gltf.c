@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * libFuzzer: scenes in glTF, as .gltf and as .glb, up to the shapes' meshes and the settings. The first byte says
- * which, and whether what is not supported is left out. The scene's own bytes stand for every other file, too.
+ * libFuzzer: scenes in glTF, as .gltf and as .glb, up to the shapes' meshes and the settings. The first byte says which
+ * format, and whether unsupported features are left out. Every other file that the scene names has the scene's own
+ * bytes.
  */
 #include "tests/fuzz/seeds.h"
 #include "tests/support/gltf_files.h"

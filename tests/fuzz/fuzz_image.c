@@ -8,7 +8,7 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 {
-	static const char *const names[] = {"i", "i.tga"}; /* which TGA is recognised by */
+	static const char *const names[] = {"i", "i.tga"}; /* TGA is recognised by the name only */
 	const struct memory_file files[] = {{names[0], bytes, size}, {names[1], bytes, size}, {0}};
 	struct asset_source assets = memory_assets(files);
 	for (int k = 0; k < 2; k++) {

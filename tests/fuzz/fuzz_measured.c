@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * libFuzzer: files of measured materials of both kinds. What is read scatters light: everywhere finite and not
- * negative.
+ * libFuzzer: files of measured materials of both kinds. A material that is read must scatter finite, non-negative light
+ * everywhere.
  */
 #include "tests/fuzz/seeds.h"
 #include "tests/support/measured_file.h"

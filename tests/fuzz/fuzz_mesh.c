@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * libFuzzer: files of meshes. The first byte says what the rest is taken for.
+ * libFuzzer: files of meshes. The first byte chooses the format as which the rest is read.
  */
 #include "tests/fuzz/seeds.h"
 #include "tests/support/memory_assets.h"

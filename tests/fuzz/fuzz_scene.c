@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A job's files, from the scene file to the world before Embree has it: the scene, a mesh, and a picture or a grid in
- * one input (the scene up to the first zero byte, u16 BE size of the mesh, mesh, picture). Scenes that ask for many
- * triangles by displacement get what they ask for, so those are left out here.
+ * A job's files, from the scene file up to the world before Embree has it: the scene, a mesh, and a picture or a grid
+ * in one input (the scene up to the first zero byte, u16 BE size of the mesh, mesh, picture). Scenes that ask for many
+ * triangles by displacement would get them, so these are left out here.
  */
 #include "tests/fuzz/messages.h"
 #include "tests/support/memory_assets.h"

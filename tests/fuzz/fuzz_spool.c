@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A coordinator that starts on a spool which came back damaged. The first byte says which file, and what the others
- * are: its bytes, places of it that are changed, or what is in it behind checksums that fit. It may refuse to start,
- * begin a job anew or fail it; if it starts, it answers.
+ * A coordinator that starts on a damaged spool. The first byte says which file is damaged and how: the file's whole
+ * content, changes at some places, or content behind valid checksums. The coordinator may refuse to start, begin a job
+ * anew or fail it; if it starts, it must answer.
  */
 #include "common/base/mem.h"
 #include "common/base/checked_file.h"
@@ -57,13 +57,13 @@ static void path_in(const char *spool, const char *name, char path[512])
 	snprintf(path, 512, "%s/%s", spool, name);
 }
 
-/* The journal of the job in its bootstrap, which has no checkpoint yet. */
+/* The path of the journal of the job in its bootstrap, which has no checkpoint yet. */
 static void journal_path(const char *spool, char path[512])
 {
 	snprintf(path, 512, "%s/jobs/j%d/journal.0", spool, FARM_BOOTSTRAP);
 }
 
-/* u24 BE place, xor */
+/* Each edit: u24 BE position, one byte to xor. */
 static void apply_edits(const uint8_t *edits, size_t size, uint8_t *bytes, size_t count)
 {
 	for (size_t i = 0; i + EDIT <= size && i < EDIT * EDITS_MOST && count; i += EDIT) {
@@ -89,7 +89,7 @@ static void write_checked(const char *path, const void *bytes, size_t size)
 	checked_file_close(&s);
 }
 
-/* Each: kind, u16 BE size, body. */
+/* Each record: kind, u16 BE size, body. */
 static void write_journal(const char *spool, const uint8_t *bytes, size_t size)
 {
 	char path[512], folder[512];
@@ -110,7 +110,8 @@ static void write_journal(const char *spool, const uint8_t *bytes, size_t size)
 	journal_release(j);
 }
 
-/* A new job's submission and plan: what the database would hold; the first two bytes say where one ends. */
+/* Writes the submission and plan of a new job, as the database would hold them; the first two bytes say where the first
+ * one ends. */
 static void write_submission(const char *spool, const uint8_t *bytes, size_t size)
 {
 	struct ledger *l;
@@ -142,7 +143,7 @@ static void damage(const char *spool, enum what what, const uint8_t *bytes, size
 	char path[512];
 	size_t n;
 	switch (what) {
-	case RECORD: /* of a job that an earlier coordinator finished */
+	case RECORD: /* of a job that an earlier version finished */
 		path_in(spool, "jobs/j7", path);
 		mkdir(path, 0777);
 		path_in(spool, "jobs/j7/job.json", path);
@@ -267,7 +268,7 @@ static size_t take_file(const char *path)
 	return n;
 }
 
-/* What an earlier coordinator kept of such a job, as j7. */
+/* Writes the files that an earlier version kept of such a job, as j7. */
 static void write_old_seeds(const struct ledger_job *job)
 {
 	Stored__Row m;

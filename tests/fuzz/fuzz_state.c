@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * States of chains as a worker gets them, in real worlds: the first byte says in which, the others are the state. Id
- * and step are put right, and for every other input the contribution, too: as somebody would who wants to be believed.
- * What resumes must go on for some mutations, and what it saves then must resume again. Invalid operations are not
- * watched: clang makes some of its own. (tests/worker/render/chain/test_path_chain.c watches them.)
+ * Chain states as a worker receives them, in real worlds: the first byte chooses the world, the others are the state.
+ * Its id and step are corrected, and for every other input the contribution as well, as a forger would. A chain that
+ * resumes must continue for some mutations, and the state that it saves then must resume again. Invalid operations are
+ * not trapped, because clang generates some of its own. (tests/worker/render/chain/test_path_chain.c traps them.)
  */
 #include "common/base/mem.h"
 #include "tests/fuzz/seeds.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Tiles as workers send them. The first byte says which: a tile of a film; the result of a lease with one tile, or with
+ * Tiles as workers send them. The first byte chooses: a tile of a film; the result of a lease with one tile, or with
  * two, whose message is made here so that the bytes reach the decoder; an image as the coordinator keeps it.
  */
 #include "common/base/mem.h"
@@ -11,7 +11,7 @@
 
 #include <string.h>
 
-enum { WIDTH = TILE_SIZE + 2, HEIGHT = 3 /* two tiles, small ones */ };
+enum { WIDTH = TILE_SIZE + 2, HEIGHT = 3 /* two tiles, the second one small */ };
 
 static void read_tile(const uint8_t *bytes, size_t size)
 {
@@ -26,7 +26,7 @@ static void read_tile(const uint8_t *bytes, size_t size)
 	mem_free(t.xyz);
 }
 
-/* Samples, so that there are neither states nor moments. */
+/* Reads the result of a lease of samples, so that there are neither chain states nor moments. */
 static void read_result(const uint8_t *bytes, size_t size, bool two)
 {
 	static const struct plan_request request = {.integrator = "path",
@@ -56,7 +56,7 @@ static void read_result(const uint8_t *bytes, size_t size, bool two)
 	m.classes = classes;
 	m.n_tile_sizes = 1;
 	m.tile_sizes = sizes;
-	if (two && size > 2) { /* two, and where one ends is for the fuzzer */
+	if (two && size > 2) { /* with two tiles the fuzzer chooses where the first one ends */
 		m.n_tile_sizes = 2;
 		sizes[0] = (uint32_t)bytes[size - 1] << 8 | bytes[size - 2];
 		size -= 2;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * TLS in memory. The first byte says what the others are: what a stranger says to a listener or to a caller; places
- * where one direction of a handshake and what follows is changed; records to an established link; a certificate.
- * Whatever is changed, no link may open to somebody else, and what is received is a prefix of what was sent.
+ * TLS in memory. The first byte says what the others are: bytes that a stranger sends to a listener or to a caller;
+ * changes to one direction of a handshake and of the stream after it; records for an established link; a certificate.
+ * Whatever is changed, no link may open to a stranger, and the received bytes are a prefix of those sent.
  */
 #include "common/net/authority.h"
 #include "tests/fuzz/folders.h"
@@ -97,9 +97,9 @@ static void pass_bytes(struct end *x, const void *bytes, size_t size)
 	}
 }
 
-/* ---- two ends, and somebody between them ---- */
+/* ---- two ends, and an attacker between them ---- */
 
-struct edits { /* of one direction: u16 BE place, xor */
+struct edits { /* changes to one direction: u16 BE position, one byte to xor */
 	const uint8_t *bytes;
 	size_t size, passed;
 	const struct end *from;
@@ -196,7 +196,7 @@ static void send_records(const uint8_t *bytes, size_t size)
 		abort();
 	pass_bytes(&listener, bytes, size);
 	if (listener.got_size)
-		abort(); /* nothing is received from anybody without the keys */
+		abort(); /* without the keys nothing may be received from a peer */
 	if (tls_link_recheck(listener.link, &e))
 		abort();
 	tls_link_free(caller.link);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A live worker and a coordinator that says what it likes. Its thread pool is one here that works when it is told to,
- * on small leases only: long work is what a coordinator may ask for. Everything it fetched is forgotten after each
- * input but the cache.
+ * A live worker against a coordinator that sends arbitrary messages. Its thread pool is replaced by one that works only
+ * when told to, and on small leases only, since a coordinator may ask for long work. Everything that was fetched is
+ * forgotten after each input, except for the cache.
  */
 #include "common/base/log.h"
 #include "common/base/mem.h"
@@ -163,7 +163,7 @@ static void hang_up(void)
 		run_loop();
 }
 
-/* The worker waits a while before it calls again; here it does not. */
+/* A real worker waits before it calls again; this one does not. */
 static void send_answer(void)
 {
 	struct agent *a = now.agent;
@@ -200,7 +200,7 @@ static bool is_building(const struct task *t)
 	return false;
 }
 
-/* Runs a task and hands it back, as a thread of the pool does. */
+/* Runs a task and returns it, as a thread of the pool does. */
 static void run_next_task(void)
 {
 	struct thread_pool *c = now.agent->thread_pool;
@@ -251,7 +251,7 @@ static void step(const struct step *s)
 	drain_socket();
 }
 
-/* Files of the cache are read by libuv's pool, which nobody tells when to work; a worker that ends waits for it. */
+/* Files of the cache are read by libuv's pool, which this fuzzer does not control; a worker that ends waits for it. */
 static void finish_reading(void)
 {
 	for (struct job_cache *b = now.agent->job_caches; b;) {
@@ -330,7 +330,7 @@ static void grant_lease(struct seed *s, const struct lease_key *k)
 {
 	Farm__LeaseKey key;
 	Farm__LeaseGrant g;
-	uint64_t seeds[2] = {UINT64_MAX, UINT64_MAX}; /* of a black bootstrap */
+	uint64_t seeds[2] = {UINT64_MAX, UINT64_MAX}; /* seeds of a bootstrap that found no light */
 	struct plan plan = farm_plan(k->job);
 	farm__lease_grant__init(&g);
 	lease_key_to_wire(k, &key);

@@ -2,10 +2,10 @@
 /*
  * Scripts of messages (messages.h) and their mutation by protobuf-c's descriptors.
  *
- * script_mutate takes the input apart, adds, repeats, drops, swaps or changes steps, and puts it together again. A
- * changed step is parsed as an Envelope, one field at a random depth gets another value (boundaries, a neighbour,
- * bytes by libFuzzer), and it is packed. What does not parse is left to libFuzzer as bytes. All memory comes from one
- * buffer that each mutation starts anew: nothing needs to be freed.
+ * script_mutate parses the input into steps, adds, repeats, drops, swaps or changes some, and writes them again. A
+ * changed step is parsed as an Envelope, one field at a random depth gets another value (a boundary, a neighbour, bytes
+ * from libFuzzer), and the message is packed again. A step that does not parse is mutated by libFuzzer as bytes. All
+ * memory comes from one buffer that each mutation starts anew, so nothing needs to be freed.
  */
 #include "tests/fuzz/messages.h"
 
@@ -182,7 +182,7 @@ static ProtobufCMessage *fresh(const ProtobufCMessageDescriptor *d)
 	return m;
 }
 
-/* One value of a field, where it lies. */
+/* Changes one value of a field in place. */
 static void change_value(const ProtobufCFieldDescriptor *f, void *at)
 {
 	uint64_t n = 0;
@@ -240,7 +240,7 @@ static void change_list(const ProtobufCFieldDescriptor *f, void *at, size_t *cou
 	}
 }
 
-/* Of the alternatives of a message, the one that is there, or now and then another. */
+/* Chooses a field. Of a message's alternatives, the one that is set, or now and then another. */
 static const ProtobufCFieldDescriptor *choose_field(ProtobufCMessage *m)
 {
 	const ProtobufCMessageDescriptor *d = m->descriptor;
@@ -271,7 +271,7 @@ static void change_message(ProtobufCMessage *m)
 		change_value(f, at);
 }
 
-/* NULL: it has become too much. */
+/* Returns NULL if the message has become too large. */
 static const uint8_t *change_packed(const uint8_t *bytes, size_t *size)
 {
 	ProtobufCMessage *m = protobuf_c_message_unpack(&farm__envelope__descriptor, &allocator, *size, bytes);
@@ -390,21 +390,21 @@ static size_t change_script(struct step *steps, size_t count, unsigned speakers)
 {
 	size_t at = count ? random_below(count) : 0;
 	switch (count ? random_below(12) : 0) {
-	case 0: /* something new */
+	case 0: /* add a step */
 		if (count == SCRIPT_STEPS)
 			return count;
 		memmove(steps + at + 1, steps + at, (count - at) * sizeof *steps);
 		steps[at] = (struct step){.who = (uint8_t)random_below(speakers), .header = now.bytes};
 		change_step(&steps[at], speakers);
 		return count + 1;
-	case 1: /* again */
+	case 1: /* repeat a step */
 		if (count < SCRIPT_STEPS)
 			steps[count++] = steps[at];
 		return count;
-	case 2: /* not at all */
+	case 2: /* drop a step */
 		memmove(steps + at, steps + at + 1, (count - at - 1) * sizeof *steps);
 		return count - 1;
-	case 3: { /* in another order */
+	case 3: { /* swap steps */
 		size_t other = random_below(count);
 		struct step s = steps[at];
 		steps[at] = steps[other];
@@ -421,7 +421,7 @@ size_t script_mutate(uint8_t *bytes, size_t size, size_t room, unsigned seed, un
 {
 	struct step steps[SCRIPT_STEPS];
 	begin(seed);
-	uint8_t *copy = allocate(NULL, size + 1); /* the input may grow over what the steps point at */
+	uint8_t *copy = allocate(NULL, size + 1); /* the input may overwrite the bytes that the steps point at */
 	if (!copy || random_below(32) == 0)
 		return LLVMFuzzerMutate(bytes, size, room);
 	if (size)

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What the fuzzers of conversations share: an input is a script of steps, each of which is said by somebody and is a
- * frame (an Envelope and its payload). Any bytes are a script; the mutator keeps steps whole and changes the fields of
- * their messages by the schema, so that what comes out gets through the parser. One thread.
+ * Shared by the fuzzers of conversations: an input is a script of steps, each of which has a speaker and a frame (an
+ * Envelope and its payload). Any bytes are a script; the mutator keeps steps whole and changes the fields of their
+ * messages by the schema, so that the results pass the parser. One thread.
  */
 #ifndef TESTS_FUZZ_MESSAGES_H
 #define TESTS_FUZZ_MESSAGES_H
@@ -12,9 +12,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { SCRIPT_STEPS = 64 /* more are not read */ };
+enum { SCRIPT_STEPS = 64 /* further steps are ignored */ };
 
-/* In the input: who, u16 BE header size, u16 BE payload size, header, payload; what is cut off is as long as it is. */
+/* In the input: speaker, u16 BE header size, u16 BE payload size, header, payload; a truncated part is as long as what
+ * is there. */
 struct step {
 	uint8_t who;
 	const uint8_t *header, *payload;
@@ -22,18 +23,18 @@ struct step {
 };
 
 size_t script_read(const uint8_t *bytes, size_t size, struct step steps[SCRIPT_STEPS]);
-/* 0: it does not fit. */
+/* Returns the size written; 0: it does not fit. */
 size_t script_write(const struct step *steps, size_t count, uint8_t *bytes, size_t room);
-/* Behind what is there already; new size, or the old one when it does not fit. */
+/* Appends a step; returns the new size, or the old one if the step does not fit. */
 size_t script_add(uint8_t *bytes, size_t size, size_t room, uint8_t who, const Farm__Envelope *m, const void *payload,
 		  size_t payload_size);
 
-/* For LLVMFuzzerCustomMutator: who is below `speakers`. */
+/* For LLVMFuzzerCustomMutator: speakers are numbered below `speakers`. */
 size_t script_mutate(uint8_t *bytes, size_t size, size_t room, unsigned seed, unsigned speakers);
-/* The same for one packed Envelope. */
+/* Like script_mutate(), for one packed Envelope. */
 size_t message_mutate(uint8_t *bytes, size_t size, size_t room, unsigned seed);
 
-/* libFuzzer's. */
+/* Provided by libFuzzer. */
 size_t LLVMFuzzerMutate(uint8_t *bytes, size_t size, size_t room);
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size);
 int LLVMFuzzerInitialize(int *argc, char ***argv);

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-# Whole scenes with extreme numbers against a farm of real workers: `make fuzz-numbers FUZZ_SECONDS=600`.
+# Whole scenes with extreme numbers on a farm of real workers: `make fuzz-numbers FUZZ_SECONDS=600`.
 #   sh tests/fuzz/numbers.sh BUILD SECONDS [FIRST]
-# The programs are BUILD's (sanitized ones tell more), the scenes those of tests/worker/render/test_scene_numbers.c from FIRST on
-# (default: by the clock). Three lanes submit them one after the other and wait. Each is refused with file and line (1), rendered
-# (0, 4, 5), or its job fails with a sentence that a worker said (3); every fifth goes through hslt-render, too. No worker ends, no
-# process that renders is lost, no program is ended by a signal. The last line has the counts.
+# The programs are those of BUILD (preferably sanitized), the scenes those of tests/worker/render/test_scene_numbers.c
+# from number FIRST on (default: by the clock). Three lanes submit scenes, each waiting for its job before the next. Each
+# scene must be refused with file and line (exit code 1), be rendered (0, 4, 5), or its job must fail with a sentence from
+# a worker (3); every fifth scene is also given to hslt-render. No worker may end, no render process may be lost, and no
+# program may be ended by a signal. The last line has the counts.
 SECONDS_TO_RUN=${2:-60}
 FIRST=${3:-$(($(date +%s) % 100000 * 1000))}
 . "$(dirname "$0")/../e2e/lib.sh"
@@ -19,7 +20,7 @@ has_place() {
 	grep -q '\.\(xml\|obj\):[1-9][0-9]*' "$1"
 }
 
-# verdict INDEX PROGRAM CODE LOG
+# verdict INDEX PROGRAM CODE LOG: judges the exit code of one scene
 verdict() {
 	case $3 in
 	0 | 4 | 5) echo rendered ;;

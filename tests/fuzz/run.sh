@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-# Fuzzers: builds every tests/fuzz/fuzz_*.c with clang and runs each for FUZZ_SECONDS (60), as many at a time as there are processors.
+# Fuzzers: builds every tests/fuzz/fuzz_*.c with clang and runs each for FUZZ_SECONDS (60), one per processor at a time.
 #
 #     sh tests/fuzz/run.sh                      FUZZ_TARGETS="frame tile": only these
 #     sh tests/fuzz/run.sh --build GOAL...      builds these goals of the Makefile as the fuzzers are built, and runs nothing
 #
-# Seeds: what a target makes of today's messages, tests/fuzz/corpus/NAME, the small files of tests/scenes. Nothing is written into
-# the tree: what is found stays in BUILD/findings and ends the run with 1; a corpus that grows is BUILD/corpus.
-# A finding is a crash, an input that takes 10 s, an allocation of 512 MB, or 2 GB in all. Runs of less than a minute are for every day
-# and any machine: they begin with the same random number each time, and an input may take a minute.
+# Seeds: those that a target makes from the present messages, tests/fuzz/corpus/NAME, and the small files of tests/scenes.
+# Nothing is written into the tree: findings go to BUILD/findings and make the exit code 1; a growing corpus is kept in
+# BUILD/corpus. A finding is a crash, an input that takes 10 s, an allocation of 512 MB, or 2 GB in all. Runs of less than
+# a minute are meant for daily use on any machine: they always begin with the same random number, and an input may take a
+# minute.
 set -u
 cd "$(dirname "$0")/../.." || exit 1
 BUILD=${BUILD:-build/fuzz}
@@ -18,12 +19,12 @@ SECONDS_EACH=${FUZZ_SECONDS:-60}
 jobs=$(nproc 2>/dev/null || echo 1)
 mkdir -p "$BUILD"
 
-# figure NAME LOG: the last value of libFuzzer's progress lines
+# figure NAME LOG: prints the last value of libFuzzer's progress lines
 figure() {
 	sed -n "s/.* $1: \([0-9]*\).*/\1/p" "$2" | tail -n 1
 }
 
-# one SOURCE: runs a target for its time, and says what it found
+# one SOURCE: runs a target for its time, and reports its findings
 one() {
 	name=$(basename "$1" .c)
 	corpus=$BUILD/corpus/$name log=$BUILD/$name.log

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Seeds of the fuzzers of conversations, made from the messages of now: a target that is started with
- * HSLT_FUZZ_SEEDS=FOLDER writes its own there and ends.
+ * Seeds of the fuzzers of conversations, made from the present messages: a target that is started with
+ * HSLT_FUZZ_SEEDS=FOLDER writes its seeds there and ends.
  */
 #ifndef TESTS_FUZZ_SEEDS_H
 #define TESTS_FUZZ_SEEDS_H
@@ -19,10 +19,10 @@ struct seed {
 bool seeds_wanted(void);
 void seed_say(struct seed *s, uint8_t who, const Farm__Envelope *m, const void *payload, size_t size);
 void seed_raw(struct seed *s, uint8_t who, const char *text);
-void seed_end(struct seed *s, const char *name, uint64_t number); /* writes it; it is empty then */
+void seed_end(struct seed *s, const char *name, uint64_t number); /* writes the seed, and empties it */
 void seed_file(const char *name, uint64_t number, const void *bytes, size_t size);
 
-/* A message without payload: the kind as the envelope's case and as its member. */
+/* Adds a message without payload; the kind is given as the envelope's case and as its member. */
 #define SEED_SAY(seed, who, KIND, kind, message)                \
 	do {                                                    \
 		Farm__Envelope seed_m;                          \

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * make calibration: is the error that an image states its error? Small renders of scenes of three kinds
- * (calibration_scenes.h), by each integrator, at three lengths, which differ in their seeds only, against references
- * made with other seeds. Writes the table of README.md to stdout, and ends with 1 where the intervals that were stated
- * hold the true relMSE in less than 90 % of the renders of a length, or in more than 99 % of a hundred or more. The
- * reference's own variance is subtracted from each comparison; a case whose reference has more than a tenth of the
- * renders' relMSE is left out, and said so. All scenes at the shortest length come first. SIGTERM ends it after the
- * case that is being measured, with the verdict on what there is.
+ * make calibration: is the error that an image states its true error? Small renders of scenes of three kinds
+ * (calibration_scenes.h), by each integrator, at three lengths, which differ only in their seeds, are compared with
+ * references made with other seeds. Writes the table of README.md to stdout; the exit code is 1 if the stated intervals
+ * contain the true relMSE in less than 90 % of the renders of a length, or in more than 99 % of a hundred or more.
+ *
+ * The reference's own variance is subtracted from each comparison; a case whose reference has more than a tenth of the
+ * renders' relMSE is left out, with a message. All scenes at the shortest length come first. SIGTERM ends the program
+ * after the present case, with the verdict on the cases so far.
  */
 #include "tests/image/calibration_scenes.h"
 #include "common/base/program.h"
@@ -28,10 +29,10 @@ enum { KINDS = 3, SCENES_MOST = 32 };
 
 static const struct {
 	const char *name;
-	uint64_t spp; /* samples or mutations a pixel of the shortest renders */
+	uint64_t spp; /* samples or mutations per pixel of the shortest renders */
 } integrators[INTEGRATORS] = {{"path", 128}, {"bdpt8", 128},  {"bdpt", 64}, {"erpt", 64},
 			      {"erpt4", 96}, {"pssmlt", 128}, {"hslt", 128}};
-/* times: its samples over those of the shortest; reference: the part of a scene's seconds that its reference takes. */
+/* times: samples relative to the shortest length; reference: the part of a scene's seconds that its reference takes. */
 static const struct {
 	uint64_t times;
 	double reference;
@@ -47,11 +48,11 @@ static void end(int signal)
 }
 
 struct reference {
-	double part;				    /* of the scene's seconds; 0: not made */
-	double rgb[VALUES], variance, floor_square; /* variance: its relMSE */
+	double part;				    /* part of the scene's seconds; 0: there is no reference yet */
+	double rgb[VALUES], variance, floor_square; /* variance: relMSE of the reference */
 };
 
-/* A pilot tells how many samples the seconds buy. */
+/* A pilot determines how many samples the seconds allow. */
 static void make_reference(const struct calibration_scene *s, const struct world *w, double part, double times,
 			   struct reference *r)
 {
@@ -91,7 +92,7 @@ static double realised_error(const struct reference *r, const struct canvas_imag
 struct figures {
 	int renders, stated, held;
 	double own, estimate; /* sums of relMSE: realised, estimated */
-	double far, values;   /* pixels' channels beyond three of their errors; all */
+	double far, values;   /* channels of pixels: further from the truth than three errors; all */
 };
 
 static void add_image(const struct reference *r, const struct canvas_image *img, struct figures *f)
@@ -109,12 +110,12 @@ static void add_image(const struct reference *r, const struct canvas_image *img,
 	f->values += VALUES;
 }
 
-/* What to measure, and what was: all[kind][integrator][length], of cases whose references can tell. */
+/* What to measure, and the results: all[kind][integrator][length], of cases whose references are good enough. */
 struct calibration {
 	uint32_t renders;
 	int last;
 	const char *seeds, *scene, *integrator;
-	double times; /* as long are the references as their scenes say */
+	double times; /* factor on the time of all references */
 	struct reference references[SCENES_MOST];
 	struct figures all[KINDS][INTEGRATORS][LENGTHS];
 };
@@ -127,7 +128,7 @@ static int kind_of(const struct calibration_scene *s)
 	return kind;
 }
 
-/* One row of the table. */
+/* Measures one row of the table. */
 static void run_case(struct calibration *c, const struct calibration_scene *s, const struct world *w,
 		     const struct reference *r, size_t k, int length)
 {
@@ -163,7 +164,7 @@ static bool is_asked(const struct calibration *c, size_t k)
 	return !c->integrator || strcmp(c->integrator, integrators[k].name) == 0;
 }
 
-/* All scenes at one length; returns how many were begun. */
+/* Measures all scenes at one length; returns how many were begun. */
 static int run_length(struct calibration *c, int length)
 {
 	int scenes = 0;
@@ -198,7 +199,7 @@ static void put_figures(const struct figures *f)
 		printf(" - (%d) |", f->renders);
 }
 
-/* A row: one integrator at one length, scenes of each kind and all. */
+/* Returns one row: one integrator at one length, for scenes of each kind and for all. */
 static struct figures judge_integrator(const struct calibration *c, size_t k, int length)
 {
 	struct figures sum = {0};

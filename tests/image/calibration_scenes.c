@@ -29,7 +29,7 @@
 	"'/><rgb name='color1' value='" b "'/><transform name='to_uv'><scale x='" n "' y='" n "'/></transform></texture></bsdf>"
 /* clang-format on */
 
-/* A part of a ring of metal that stands on the floor. */
+/* A part of a metal ring that stands on the floor. */
 #define BENT(degrees)                                                                           \
 	WALL("<scale x='0.28' y='0.3'/><translate z='-1'/><rotate y='1' angle='" degrees "'/>", \
 	     "<translate y='-0.7'/>", METAL("0.05"))
@@ -47,7 +47,7 @@
 #define HOLDS(id) "<ref name='interior' id='" id "'/>"
 #define FLOOR WALL("<scale value='8'/><rotate x='1' angle='-90'/>", "<translate y='-1'/>", GREY("0.4,0.4,0.4"))
 
-/* The three kinds in turns, so that an interrupted run has some of each. */
+/* The three kinds alternate, so that an interrupted run has some scenes of each. */
 const struct calibration_scene calibration_scenes[] = {
 	{"tree", "box", "box", "box.xml", NULL, "path", 25},
 	{"public", "cornell-box", "cornell-box", "scene.xml", NULL, "path", 35},

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Scenes by which stated errors are compared with true ones: those of the tree, the public ones (HSLT_SCENES), and
- * small hard ones made for it, in which light comes rarely, in clumps, or into dark surroundings.
+ * Scenes for comparing stated errors with true ones: those of the project, the public ones (HSLT_SCENES), and small
+ * hard ones made for this purpose, in which light is rare, comes in clumps, or falls on dark surroundings.
  */
 #ifndef TESTS_IMAGE_CALIBRATION_SCENES_H
 #define TESTS_IMAGE_CALIBRATION_SCENES_H
@@ -10,15 +10,15 @@
 
 struct calibration_scene {
 	const char *kind, *name;   /* kind: tree, public, made */
-	const char *folder, *file; /* NULL: `text` */
+	const char *folder, *file; /* NULL: the scene is `text` */
 	const char *text;
-	const char *reference; /* the integrator that makes its reference */
-	double seconds;	       /* of processor that a reference takes, about */
+	const char *reference; /* the integrator that renders the reference */
+	double seconds;	       /* approximate processor seconds of a reference */
 };
 
 extern const struct calibration_scene calibration_scenes[]; /* ends with a NULL name */
 
-/* NULL: it is a public one, and HSLT_SCENES is not set. The caller frees it. */
+/* Returns NULL if the scene is a public one and HSLT_SCENES is not set. The caller frees the world. */
 struct world *calibration_world(const struct calibration_scene *s, uint32_t width, uint32_t height);
 
 #endif

@@ -51,7 +51,7 @@ enum { DIFFUSE, GLASS, SCENES };
 
 static struct world *build(int scene, uint32_t width, uint32_t height)
 {
-	if (scene == GLASS) /* a caustic: fireflies for path */
+	if (scene == GLASS) /* a caustic, in which path gives fireflies */
 		return world_of_text(width, height, ROOM LAMP("1.2", "6,5,4") BALL("<bsdf type='dielectric'/>"));
 	return world_of_text(width, height,
 			     ROOM LAMP("0.8", "6,5,4")
@@ -60,7 +60,7 @@ static struct world *build(int scene, uint32_t width, uint32_t height)
 
 struct reference {
 	struct world *world;
-	double *rgb, variance, floor_square, b; /* variance: its relMSE */
+	double *rgb, variance, floor_square, b; /* variance: relMSE of the reference */
 	uint32_t values;
 };
 
@@ -101,7 +101,7 @@ struct kase {
 	int scene;
 	uint64_t spp, epoch, bootstrap;
 	uint32_t chains;
-	double median; /* how far it may be from 1 */
+	double median; /* allowed deviation from 1 */
 };
 
 struct figures {
@@ -123,7 +123,7 @@ static double realised_error(const struct reference *r, const struct canvas_imag
 	return sum / r->values - r->variance;
 }
 
-/* `shrink`: the fault to plant, what all errors are divided by. */
+/* `shrink`: the planted fault: all errors are divided by it. */
 static struct figures figures_of(const struct reference *r, const struct repeats *s, double b, double shrink)
 {
 	struct figures f = {0};
@@ -179,7 +179,7 @@ static void check(const struct kase *c)
 	struct reference *r = reference_of(c->scene);
 	how.count = RENDERS;
 	repeats_run(r->world, &how, NULL, NULL, &s);
-	/* The mean of 200 b's stands for b: it has no more than a fourteenth of the error of one. */
+	/* The mean of 200 values of b replaces the true b: its error is at most a fourteenth of that of one value. */
 	double b = 0;
 	for (uint32_t i = 0; i < RENDERS; i++)
 		b += s.images[i].b / RENDERS;
@@ -208,8 +208,7 @@ CASE(room_hslt, "diffuse room", "hslt", DIFFUSE, 640, 240, 4096, 16, 0.1)
 CASE(glass_path, "glass, fireflies", "path", GLASS, 256, 4, 1024, 0, 0.1)
 CASE(glass_erpt, "glass, fireflies", "erpt", GLASS, 192, 3, 1024, 0, 0.1)
 CASE(glass_erpt4, "glass, fireflies", "erpt4", GLASS, 192, 3, 1024, 0, 0.1)
-/* Where b is hardly known the estimate is too large rather than too small: its denominators lean on the neighbourhood.
- */
+/* Where b is hardly known the estimate is too large rather than too small: its divisors include the neighbourhood. */
 CASE(glass_pssmlt, "glass, little known of b", "pssmlt", GLASS, 160, 60, 1024, 16, 0.15)
 CASE(glass_hslt, "glass", "hslt", GLASS, 640, 240, 2048, 16, 0.1)
 

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What a scene does not call for changes nothing: each effect is forced on where it is off, and the image stays. Bit
- * for bit (sums of each block of each group) where nothing else is drawn by it; else the two agree by t between 32
- * groups, level 1e-6 a comparison, and find 2 % on a block and 0.5 % on the mean (agree.h prints both). What follows
- * "all in chains" takes minutes, and runs with FULL=1.
+ * An effect that a scene does not call for changes nothing: each effect is forced on where it is off, and the image
+ * stays the same. Bit for bit (sums of each block of each group) if the effect draws nothing different; otherwise the
+ * two images agree by t over 32 groups, level 1e-6 per comparison, with a power that finds 2 % on a block and 0.5 % on
+ * the mean (agree.h prints both). The cases after "all in chains" take minutes, and run only with FULL=1.
  */
 #include "worker/render/render.h"
 #include "tests/support/agree.h"
@@ -33,7 +33,7 @@
 #define BALL(bsdf)                                                                                               \
 	"<shape type='sphere'><point name='center' value='0,-0.6,-0.3'/><float name='radius' value='0.8'/>" bsdf \
 	"</shape>"
-/* A floor from above under a wide lamp, and glass under the sky: nearly the same everywhere, so that chains agree in
+/* A floor seen from above under a wide lamp, and glass under the sky: nearly uniform, so that chains agree within
  * seconds. */
 #define FROM_ABOVE \
 	"<integrator type='path'><integer name='max_depth' value='2'/></integrator>" SENSOR("0,3,0.5", "0,0,0")
@@ -117,7 +117,7 @@ static void test_bits(void **state)
 	check_bits(VIEW WALLS POINT, "area-light");
 	check_bits(VIEW WALLS POINT, "emitter-move");
 	check_bits(VIEW BALL("<bsdf type='conductor'><string name='material' value='none'/></bsdf>") LAMP, "diffuse");
-	/* Glass in a closed box is left out of the world, unless something is forced on. */
+	/* Glass in a closed box is left out of the world unless an effect is forced on. */
 	/* clang-format off */
 	check_bits(
 		VIEW WALLS LAMP
@@ -131,7 +131,7 @@ static void test_bits(void **state)
 		"</shape>",
 		"textures");
 	/* clang-format on */
-	/* The floor alone scatters: longer paths than two edges carry nothing, but are tried. */
+	/* Only the floor scatters: paths of more than two edges carry nothing, but are tried. */
 	/* clang-format off */
 	check_bits(
 		DEPTH
@@ -148,8 +148,9 @@ static void test_bits(void **state)
 
 static const struct comparison {
 	const char *name, *scene, *effects, *effect, *integrator;
-	uint64_t spp, forced_spp;	/* one wavelength a path is noisier than four, four than grey */
-	const char *mutations, *forced; /* half of them independent, so that blocks agree to 2 % in seconds */
+	uint64_t spp, forced_spp; /* one wavelength per path is noisier than four, and four are noisier than grey */
+	const char *mutations, *forced; /* half of the mutations are independent, so that blocks agree to 2 % within
+					 * seconds */
 } comparisons[] = {
 	{"colour", VIEW WALLS LAMP, "+colour", "colour", "path", 1536, 1536, NULL, NULL},
 	{"dispersion", GLASS_UNDER_THE_SKY, "+dispersion", "dispersion", "path", 256, 512, NULL, NULL},

@@ -29,7 +29,7 @@
 enum { WIDTH = 256 };
 static const double mean_tolerance = 0.03, trim = 0.001;
 
-/* Of each pixel that is compared, and the relMSE that is allowed with them, most of which is noise. */
+/* Samples for each pixel that is compared, and the relMSE that is allowed with them, most of which is noise. */
 static uint32_t samples_per_pixel(void)
 {
 	return test_full() ? 256 : 128;
@@ -42,10 +42,10 @@ static double most_rel_mse(void)
 
 struct subject {
 	const char *folder;
-	uint32_t max_depth; /* 0: the scene's */
+	uint32_t max_depth; /* 0: as in the scene */
 };
 
-/* Means of equal boxes, WIDTH of them in a row. */
+/* Means of equal boxes, WIDTH of them per row. */
 static void shrink_picture(struct picture *p)
 {
 	struct error e = {""};
@@ -73,7 +73,7 @@ static void render(const struct world *w, const struct subject *s, uint64_t fewe
 	shrink_picture(xyz);
 }
 
-/* accuracy: NULL, or the setting that is not the default. */
+/* accuracy: NULL, or a setting other than the default. */
 static void render_in_colour(const struct subject *s, const char *accuracy, uint64_t fewer, struct picture *rgb)
 {
 	worlds_accuracy = accuracy;
@@ -89,7 +89,7 @@ static void render_in_colour(const struct subject *s, const char *accuracy, uint
 	}
 }
 
-/* Prints; what: of which pictures. */
+/* Prints the comparison; what: names the pictures. */
 static struct compare_result measure(const struct picture *ours, const struct picture *reference,
 				     const struct subject *s, const char *what)
 {
@@ -110,7 +110,7 @@ static void check_result(const struct compare_result *r)
 	assert_true(r->rel_mse <= most_rel_mse());
 }
 
-/* All channels become the luminance: errors over three channels are then those of one. */
+/* Replaces all channels by the luminance, so that errors over three channels are those of one. */
 static void keep_luminance(struct picture *p)
 {
 	for (size_t i = 0; i < (size_t)p->image.width * p->image.height; i++) {
@@ -175,8 +175,8 @@ static void cornell_box_in_colour(void **state)
 	compare_in_colour(&cornell_box);
 }
 
-/* The scene says maxDepth 5, but its reference shows direct light only: its plates do not mirror the lit wall and
- * floor. At two edges the pictures agree. */
+/* The scene says maxDepth 5, but its reference shows direct light only: the plates do not reflect the lit wall and
+ * floor. With paths of two edges the pictures agree. */
 static const struct subject veach_mis = {"veach-mis", 2}, veach_mis_as_written = {"veach-mis", 0};
 
 static void veach_mis_in_rgb(void **state)

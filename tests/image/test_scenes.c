@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The default integrator against bdpt on whole scenes: those that are shipped, and the public ones where HSLT_SCENES
- * names their folder. Within the errors of both, at the level of all comparisons; how small a bias would have been
- * found is printed. FULL=1: all of them, with more samples.
+ * The default integrator against bdpt on whole scenes: the project's, and the public ones if HSLT_SCENES names their
+ * folder. Both must agree within their errors, at one level for all comparisons together; the smallest bias that would
+ * have been found is printed. FULL=1: all scenes, with more samples.
  */
 #include "worker/render/render.h"
 #include "tests/support/agree.h"

@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A farm under load: the real coordinator in a process of its own, its real protocol over TLS, and workers that render
- * nothing: they say hello, fetch the job's files, ask for leases, wait as long as a lease would take, and send a batch
- * that was made once. One process, one thread, one loop for all of them. What goes wrong in the generator itself ends
- * it.
+ * A farm under load: the real coordinator in a process of its own, the real protocol over TLS, and workers that do not
+ * render: they say hello, fetch the job's files, ask for leases, wait as long as a lease would take, and send a batch
+ * that was made once. One process, one thread and one loop for all workers. An error in the generator itself ends it.
  */
 #ifndef TESTS_LOAD_LOAD_H
 #define TESTS_LOAD_LOAD_H
@@ -13,42 +12,42 @@
 
 #include <stdbool.h>
 
-/* What becomes of a worker, from the last ones of the crowd on. */
+/* What a worker does. Those that misbehave are the last ones of the crowd. */
 enum load_kind {
 	LOAD_HONEST,
-	LOAD_DIES,   /* in a third of its leases: hangs up without a word, and calls again */
-	LOAD_LIES,   /* every result holds what is no number */
-	LOAD_HOARDS, /* claims 4,096 threads, takes what it gets, and says nothing but heartbeats */
-	LOAD_HANGS,  /* in a third of its leases: says nothing more, not even heartbeats; when it is disconnected it
-			connects again */
+	LOAD_DIES,   /* in a third of its leases it hangs up without a word, and connects again */
+	LOAD_LIES,   /* every result contains values that are not numbers */
+	LOAD_HOARDS, /* claims 4,096 threads, takes the leases that it gets, and sends only heartbeats */
+	LOAD_HANGS,  /* in a third of its leases it falls silent, without heartbeats; once disconnected it connects
+		      * again */
 	LOAD_KINDS
 };
 
 struct load_settings {
-	unsigned bad[LOAD_KINDS];			      /* how many; LOAD_HONEST is the rest */
-	unsigned workers, width, height, groups, parts, jobs; /* jobs 0: as many as keep all of them busy */
-	double minutes, interval, ramp;			      /* s between a worker's batches; connections a second */
+	unsigned bad[LOAD_KINDS]; /* number of workers of each kind; LOAD_HONEST: all others */
+	unsigned workers, width, height, groups, parts, jobs; /* jobs: 0: as many as keep all workers busy */
+	double minutes, interval, ramp;			      /* interval: s between batches; ramp: connections/s */
 	double heartbeat;
-	unsigned want;	       /* leases that a worker holds: one in work, the others at hand */
-	bool insecure, losses; /* losses: nothing else is judged */
+	unsigned want;	       /* leases that a worker holds: one in work, the others waiting */
+	bool insecure, losses; /* losses: only lost and wrong results are judged */
 	const char *bin, *spool, *options;
 };
 
-/* ---- what was measured ---- */
+/* ---- measurements ---- */
 
 struct load_times { /* ms */
 	float *v;
 	size_t count, room;
 };
 void load_times_add(struct load_times *t, double ms);
-double load_times_at(struct load_times *t, double share); /* sorts; NAN: none */
+double load_times_at(struct load_times *t, double share); /* sorts; NAN: there are none */
 
 /* ---- content: one batch of each kind, sent under every key ---- */
 
 struct load_content;
 struct load_content *load_content_new(const struct plan *p);
 void load_content_free(struct load_content *c);
-size_t load_content_bytes(const struct load_content *c); /* a render batch's payload */
+size_t load_content_bytes(const struct load_content *c); /* payload of the result of a render lease */
 unsigned char *load_content_frame(const struct load_content *c, const struct lease_key *k, size_t *size);
 
 /* ---- the crowd ---- */
@@ -57,12 +56,12 @@ struct load_worker;
 struct load_job {
 	uint64_t id;
 	struct plan plan;
-	bool known; /* a JobInfo with its plan has come */
+	bool known; /* a JobInfo with its plan has arrived */
 	struct blob_file {
 		unsigned char hash[32];
 		uint64_t size;
 	} file;
-	uint64_t *acknowledged; /* [slot]: epochs of it that were; a bit beyond for each out of order is an error */
+	uint64_t *acknowledged; /* [slot]: epochs acknowledged so far; one out of order counts as disordered */
 };
 
 struct load {
@@ -74,33 +73,33 @@ struct load {
 	struct load_job *jobs;
 	unsigned job_count;
 	struct load_worker *workers;
-	unsigned connecting, connected, closed; /* closed: against our will */
+	unsigned connecting, connected, closed; /* closed: by the coordinator, unexpectedly */
 	bool measuring, leaving;
 	uint64_t random;
-	/* counted from the first to the last moment */
+	/* counted from start to end */
 	uint64_t grants, again, merged, bootstrap_merged, repeated, refused, revoked, given_back, disordered, faults;
 	uint64_t deaths, lies, lies_refused, lies_merged, hoarded, hangs;
-	/* counted while measuring */
+	/* counted only while measuring */
 	uint64_t batches, bytes;
 	struct load_times grant, first_grant, ack, send, beat, late;
-	char fault[256]; /* the first one */
+	char fault[256]; /* the first fault */
 };
 
 double load_now(void);				      /* s */
 double load_uniform(struct load *l);		      /* [0,1) */
-struct load_worker *load_workers_new(unsigned count); /* NULL: no memory */
+struct load_worker *load_workers_new(unsigned count); /* NULL: out of memory */
 void load_connect(struct load *l, unsigned index);
-/* No more leases; what is being worked on is given back, what was sent is waited for. */
+/* Asks for no more leases; gives back those in work, and waits for the acknowledgement of sent results. */
 void load_leave(struct load *l);
-unsigned load_unanswered(const struct load *l); /* results that were sent and not acknowledged */
+unsigned load_unanswered(const struct load *l); /* results that were sent and are not acknowledged */
 void load_close(struct load *l);
 
 /* ---- the coordinator, its certificates and jobs ---- */
 
 void load_die(const char *format, ...) __attribute__((format(printf, 1, 2), noreturn));
-/* Submits a job as a client would; fills in its id. */
+/* Submits a job as a client would, and sets its id. */
 void load_submit(struct load *l, const char *host_port, const char *tls, unsigned index);
-/* Mutations that the coordinator has counted for the job, by the status socket. */
+/* Returns the mutations that the coordinator has counted for the job, from the status socket. */
 double load_counted(const struct load *l, const char *socket, uint64_t job);
 
 #endif

@@ -8,7 +8,7 @@
 enum { STATE_BYTES = 1024 };
 
 struct kind {
-	struct envelope env; /* the message; its key is filled in */
+	struct envelope env; /* the message; only its key changes */
 	unsigned char *frame;
 	const unsigned char *payload;
 	size_t payload_size;
@@ -44,7 +44,7 @@ static void *require(size_t count, size_t size)
 	return p;
 }
 
-/* Every tile of the film, as a chain leaves it that went everywhere. */
+/* Makes every tile of the film, as a chain that went everywhere leaves them. */
 static void make_tiles(struct batch *b, const struct plan *p)
 {
 	float mean = (float)((double)p->epoch / (double)plan_extended_pixels(p));

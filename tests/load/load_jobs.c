@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Jobs as a client submits them, and what the status socket says of them. */
+/* Submits jobs as a client does, and reads what the status socket says about them. */
 #include "tests/load/load.h"
 
 #include "common/base/mem.h"
@@ -12,7 +12,7 @@
 
 enum { EPOCH = 1 << 20 };
 
-/* Without end, and never looked at: rounds of long epochs. */
+/* A job that does not end and whose error is never estimated: rounds of long epochs. */
 static struct plan_request request_of(const struct load_settings *s, unsigned index)
 {
 	return (struct plan_request){.integrator = "hslt",

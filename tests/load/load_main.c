@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The load test's options, phases and report (docs/benchmarks.md says what it has measured).
+ * The load test's options, phases and report (docs/benchmarks.md has measured figures).
  *
  * It makes certificates, starts the coordinator, connects the fake workers of load_worker at the rate of --ramp, lets
- * each send a batch, and then measures for --minutes: processor time, memory and bytes written of the coordinator, how
- * long leases take, how late its loop is. At the end what the images hold is compared with the results that the
- * workers were told had been merged. A missed bound is exit code 1.
+ * each send a batch, and then measures for --minutes: processor time, memory and bytes written by the coordinator,
+ * durations of leases, delays of its loop. At the end the content of the images is compared with the results that were
+ * acknowledged to workers as merged. If a bound is missed, the exit code is 1.
  */
 #include "tests/load/load.h"
 
@@ -310,7 +310,7 @@ static void finish_load(void)
 	load_close(&load);
 }
 
-/* Once a second: connected, measured, left. */
+/* Runs once a second: connects, then measures, then leaves. */
 static void on_phase(uv_timer_t *t)
 {
 	(void)t;
@@ -337,7 +337,7 @@ static void on_phase(uv_timer_t *t)
 	}
 }
 
-/* How late the generator itself is: what it measures is not better than that. */
+/* Measures the delay of the generator itself, which limits what it can measure. */
 static void on_lag(uv_timer_t *t)
 {
 	double now = load_now();
@@ -373,7 +373,7 @@ static bool check_bound(const char *what, double value, const char *unit, double
 	return met;
 }
 
-/* Batches that are in the sums more or less often than they were acknowledged. */
+/* Returns the number of batches that are in the sums more or less often than they were acknowledged. */
 static double count_miscounted(void)
 {
 	uint64_t counted = 0;

@@ -2,9 +2,9 @@
 /*
  * A fake worker of the load test: the worker's side of the conversation in proto/README.md, without rendering. It says
  * hello, asks for leases, fetches the job's files, waits as long as a lease would take, sends a prepared result and
- * waits for its acknowledgement. Workers of other kinds than honest (load.h) hang up, send results that are no numbers,
- * hoard leases, or fall silent. What the protocol does not allow is counted as a fault of the run; a plan that is not
- * the job's ends it.
+ * waits for its acknowledgement. Workers of the dishonest kinds (load.h) hang up, send results that are no numbers,
+ * hoard leases, or fall silent. Messages against the protocol are counted as faults of the run; a plan that differs
+ * from the job's ends the run.
  */
 #include "tests/load/load.h"
 
@@ -21,23 +21,23 @@ enum lease_state { FREE, WAITING, WORKING, SENDING, SENT };
 struct held {
 	enum lease_state state;
 	struct lease_key key;
-	double since; /* s: of SENDING and SENT, when all of it was handed over, or began to be */
+	double since; /* s; SENDING: when sending began; SENT: when all of it was handed over */
 };
 
 struct load_worker {
 	struct load *load;
-	struct conn *conn; /* NULL: gone */
+	struct conn *conn; /* NULL: not connected */
 	uv_timer_t work, beat;
 	unsigned index;
-	int closing; /* timers, of a connection that is gone */
+	int closing; /* timers of the closed connection that still have to close */
 	enum load_kind kind;
 	bool hangs;
-	uint64_t jobs_ready; /* bits: it has the job's files */
+	uint64_t jobs_ready; /* bit set: jobs whose files the worker has */
 	uint64_t jobs_asked;
 	struct held held[LEASES];
-	double wish[WISHES]; /* when it could have been given each lease that it waits for; NAN: not yet */
+	double wish[WISHES]; /* for each lease it waits for, when it could have been granted; NAN: not yet */
 	unsigned wishes;
-	double beat_at; /* 0: answered */
+	double beat_at; /* 0: the heartbeat was answered */
 	bool first, asked;
 };
 
@@ -125,7 +125,7 @@ static void ask_file(struct load_worker *w, const Farm__File *f)
 	send_message(w, &m, FARM__ENVELOPE__BODY_BLOB_GET);
 }
 
-/* The scenes are one small file each. */
+/* Each scene is one small file. */
 static void take_job(struct load_worker *w, const Farm__JobInfo *info)
 {
 	struct load *l = w->load;
@@ -175,7 +175,7 @@ static void send_result(struct load_worker *w, struct held *h)
 	h->since = load_now();
 	add_wish(w, NAN);
 	if (w->kind == LOAD_LIES) {
-		memset(frame + size / 2, 0xff, 64); /* pixels of no value */
+		memset(frame + size / 2, 0xff, 64); /* pixels that are not numbers */
 		l->lies++;
 	}
 	if (l->measuring) {
@@ -185,8 +185,8 @@ static void send_result(struct load_worker *w, struct held *h)
 	conn_send_frame(w->conn, frame, size);
 }
 
-/* true: instead of sending what is ready it is gone. Not while an answer to another result is under way, which would
- * not be counted. */
+/* Returns true if the worker disconnects instead of sending a finished result. It does not do so while the answer to
+ * another result is under way, which would not be counted. */
 static bool ends_badly(struct load_worker *w)
 {
 	struct load *l = w->load;
@@ -223,8 +223,8 @@ static void work_on(struct load_worker *w)
 	if (!h || !job_of(l, h->key.job, &i) || !(w->jobs_ready >> i & 1))
 		return;
 	h->state = WORKING;
-	/* Leases of the bootstrap are short; the crowd is spread over the interval by when each begins with its first
-	 * other one. */
+	/* Leases of the bootstrap are short; workers begin their first render lease at different times, which spreads
+	 * the crowd over the interval. */
 	double seconds = l->s.interval * (0.9 + 0.2 * load_uniform(l));
 	if (h->key.kind == LEASE_BOOTSTRAP)
 		seconds = fmin(1, seconds) * (0.5 + 0.5 * load_uniform(l));
@@ -249,7 +249,7 @@ static void take_grant(struct load_worker *w, const Farm__LeaseGrant *m)
 		fail_worker(w, "a lease that cannot be");
 		return;
 	}
-	if (find(w, &k)) { /* it was overdue, and no other worker is free */
+	if (find(w, &k)) { /* the lease was overdue, and no other worker is free */
 		l->again++;
 		return;
 	}
@@ -272,7 +272,7 @@ static void take_grant(struct load_worker *w, const Farm__LeaseGrant *m)
 	work_on(w);
 }
 
-/* Each epoch of a slot once, one after the other. */
+/* Each epoch of a slot must come once, in order. */
 static void count_merged(struct load *l, const struct lease_key *k)
 {
 	unsigned i;
@@ -318,7 +318,7 @@ static void take_revoke(struct load_worker *w, const Farm__LeaseRevoke *m)
 	struct error e;
 	struct lease_key k;
 	struct held *h = lease_key_from_wire(m->key, &k, &e) ? NULL : find(w, &k);
-	if (!h || h->state > WORKING) /* its result is under way and will be a repeat */
+	if (!h || h->state > WORKING) /* its result is under way and will count as a repeat */
 		return;
 	if (h->state == WORKING)
 		uv_timer_stop(&w->work);
@@ -399,7 +399,7 @@ static void on_message(void *user, struct envelope *env, const unsigned char *pa
 			fail_worker(w, m->blob_chunk->error);
 		break;
 	case FARM__ENVELOPE__BODY_FAULT:
-		if (w->kind != LOAD_HANGS) /* which is to time out */
+		if (w->kind != LOAD_HANGS) /* a worker that hangs must time out */
 			fail_worker(w, m->fault->text);
 		break;
 	case FARM__ENVELOPE__BODY_JOB_END:
@@ -444,7 +444,7 @@ static void on_drained(void *user)
 			w->wish[i] = now;
 }
 
-/* Both timers: a worker that dies or hangs connects again as a restart of the same worker. */
+/* Called for both timers: a worker that died or hung connects again, as a restart of the same worker. */
 static void on_timer_closed(uv_handle_t *h)
 {
 	struct load_worker *w = h->data;

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plants a fault: plant.py FILE OLD NEW prints FILE with NEW where OLD stands; plant.py --check LIST says which faults of a list
-cannot be planted. OLD has to stand there once. White space does not count, for the formatter breaks lines where it likes."""
+"""Plants a fault: plant.py FILE OLD NEW prints FILE with OLD replaced by NEW; plant.py --check LIST prints the faults of a list
+that cannot be planted. OLD must occur exactly once. White space is ignored, because the formatter breaks lines."""
 import re
 import sys
 
@@ -15,7 +15,7 @@ def pattern(old):
 
 
 def plant(path, old, new):
-    """The text with the fault; None: OLD does not stand there once."""
+    """Returns the text with the fault; None: OLD does not occur exactly once."""
     with open(path) as f:
         text, count = pattern(old).subn(lambda _: new, f.read())
     return text if count == 1 else None

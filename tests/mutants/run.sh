@@ -1,29 +1,29 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
-# Plants one fault at a time and asks whether a test notices: make test-mutants.
+# Plants one fault at a time, and checks that a test detects it: make test-mutants.
 #
 #     sh tests/mutants/run.sh [LIST]        LIST: tests/mutants/list.txt
 #
-# A line of the list: FILE, what stands there (once in the file; white space does not count), what is put in its place, the tests to
-# run (TEST@ROOM: in one of their rooms); tabs between, # begins a comment. The commit at HEAD is copied to build/mutants and built
-# there once, by ccache where it is installed. A fault is caught when a test of its line fails; one that does not compile is a fault
-# of the list. One line for each, with the seconds that it took, then a table by folder. Ends with 1 when less than 95 % are caught or
-# a line is faulty.
+# A line of the list has four fields, separated by tabs: FILE, the text to replace (which occurs once in the file; white
+# space is ignored), the replacement, and the tests to run (TEST@ROOM: in one of their rooms). # begins a comment. The
+# commit at HEAD is copied to build/mutants and built there once, with ccache if it is installed. A fault is caught when
+# one of its tests fails; a fault that does not compile is an error of the list. Prints one line per fault, with its
+# seconds, then a table by folder. The exit code is 1 if less than 95 % are caught or a line is faulty.
 list=${1:-tests/mutants/list.txt}
 list=$(cd "$(dirname "$list")" && pwd)/$(basename "$list")
 tree=build/mutants
 command -v ccache > /dev/null && CC="ccache ${CC:-gcc}"
 rm -rf "$tree" && mkdir -p "$tree" && git archive HEAD | tar x -C "$tree" && cp "$list" "$tree/list" && cd "$tree" || exit 1
 list=list
-# run TEST [SECONDS], or TEST@ROOM: with that room alone. Ended by processor time, as by tests/run.sh: on a busy machine a limit of wall
-# clock would catch everything.
+# run TEST [SECONDS], or TEST@ROOM: runs the test, or one of its rooms only. The limit is processor time, as in
+# tests/run.sh: with a limit of wall clock a busy machine would seem to catch every fault.
 run() {
 	case $1 in
 	*@*) ROOM=${1#*@} build/tests/limit/limit "${2:-900}" 900 "build/tests/${1%@*}" < /dev/null > /dev/null 2>&1 ;;
 	*) build/tests/limit/limit "${2:-900}" 900 "build/tests/$1" < /dev/null > /dev/null 2>&1 ;;
 	esac
 }
-# limit_of TEST: half a minute more than ten times what it took without a fault, which may make it go on for ever
+# limit_of TEST: thirty seconds more than ten times its time without a fault; a fault may make it run for ever
 limit_of() {
 	echo $((30 + 10 * $(awk -v t="$1" '$1 == t { print $2 }' sound.txt)))
 }
@@ -31,7 +31,7 @@ binaries() {
 	tr ' ' '\n' | sed 's|@.*||; s|^|build/tests/|' | sort -u
 }
 make -s ${CC:+CC="$CC"} programs build/tests/limit/limit $(awk -F'\t' '!/^#/ && NF { print $4 }' "$list" | binaries) > make.log 2>&1 || { cat make.log; exit 1; }
-# Without any fault all of them pass, or they would catch everything.
+# Without a fault all tests must pass; otherwise they would seem to catch everything.
 for t in $(awk -F'\t' '!/^#/ && NF { print $4 }' "$list" | tr ' ' '\n' | sort -u); do
 	begin=$(date +%s)
 	run "$t" || { echo "$t fails without a fault"; exit 1; }
@@ -40,7 +40,7 @@ done
 caught=0 survived=0 faulty=0
 result=results.txt
 : > $result
-# By cut: `read` takes two tabs, with nothing to put in place between them, for one.
+# Uses cut: `read` would take two adjacent tabs, with nothing to put in place between them, for one.
 field() {
 	printf '%s\n' "$line" | cut -f "$1"
 }

@@ -1,9 +1,9 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
-# The same bits by two builds: sh tests/numerics/compilers.sh BUILD OTHER
+# Checks that two builds render the same bits: sh tests/numerics/compilers.sh BUILD OTHER
 #
-# OTHER is by another compiler, or with other options. Arithmetic is strict IEEE, so that only an order of evaluation that C
-# leaves open, a value that was never set or a contracted operation can make a difference.
+# OTHER is built by another compiler, or with other options. Arithmetic is strict IEEE, so only an order of evaluation
+# that C leaves open, an uninitialised value or a contracted operation can make a difference.
 set -eu
 build=$1 other=$2
 dir=$(mktemp -d)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Rows of `make test-numerics`: topic, case, what was measured, what it must be, verdict; by tabs. Without
- * HSLT_TEST_ROWS=1 only those that fail are shown.
+ * Rows of `make test-numerics`, separated by tabs: topic, case, measured value, bound, verdict. Without
+ * HSLT_TEST_ROWS=1 only failed rows are printed.
  */
 #ifndef TESTS_NUMERICS_ROWS_H
 #define TESTS_NUMERICS_ROWS_H

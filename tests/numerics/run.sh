@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
-# One row a case, of everything that is hard on the numbers: topic, case, what was measured, what it must be, verdict.
-# tests/numerics/run.sh BUILD; FULL=1: the long forms. Exit code 0: no case failed.
+# Runs the numerically hard cases, one row each: topic, case, measured value, bound, verdict. tests/numerics/run.sh
+# BUILD; FULL=1: the long forms. Exit code 0: no case failed.
 set -u
 build=${1:?usage: tests/numerics/run.sh BUILD}
 cd "$(dirname "$0")/../.." || exit 1
@@ -13,7 +13,7 @@ trap 'rm -f "$log" "$rows"' EXIT
 passed=0 failed=0
 tab=$(printf '\t')
 
-# A program that fails without a row that does is a row itself.
+# A program that fails without a failed row gets a row itself.
 for t in "$build"/tests/worker/render/halfvec/test_* "$build"/tests/numerics/test_* \
 	"$build"/tests/worker/render/test_number_ranges "$build"/tests/worker/render/test_scene_numbers; do
 	[ -x "$t" ] && [ -f "$t" ] || continue
@@ -30,7 +30,7 @@ for t in "$build"/tests/worker/render/halfvec/test_* "$build"/tests/numerics/tes
 		verdict = $NF; bound = NF > 4 ? "; must be: " $4 : "";
 		if (NF > 4 && $3 ~ /^[0-9.e+-]+$/) { $3 = "error " $3; bound = ", at most " $4 }
 		printf "%-6s %-22s %-34s %s%s\n", verdict, $1, $2, $3, bound }' "$rows"
-	# What is said besides.
+	# Everything else that the program printed.
 	grep -v '^\[' "$log" | grep -v "${tab}ok\$\|${tab}FAILED\$" | grep . | sed 's/^/       /'
 	passed=$((passed + $(grep -c "${tab}ok\$" "$rows")))
 	failed=$((failed + $(grep -c "${tab}FAILED\$" "$rows")))

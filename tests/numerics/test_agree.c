@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Scenes that are hard on the numbers, by four integrators that reach the same light in different ways: what one of
- * them gets wrong the others seldom do. One row each: bdpt, pssmlt and hslt against path, 2 x 2 blocks and the mean, at
- * the level of tests/support/agree.h. The smallest bias that is found with 95 % probability stands in the row: at most
- * 2 % of the mean for the table (HSLT_TEST_ROWS=1) where the case does not say otherwise, a third of that with FULL=1,
- * which takes 16 times the samples; a plain run, with a sixty-fourth, is there for what breaks altogether.
+ * Numerically hard scenes by four integrators that reach the same light in different ways: an error in one of them is
+ * seldom shared by the others. One row each: bdpt, pssmlt and hslt against path, 2 x 2 blocks and the mean, at the
+ * level of tests/support/agree.h. The row states the smallest bias that is found with 95 % probability: at most 2 % of
+ * the mean for the table (HSLT_TEST_ROWS=1) unless the case says otherwise, and a third of that with FULL=1, which
+ * takes 16 times the samples. A plain run takes a sixty-fourth of the samples and finds only gross errors.
  */
 #include "worker/render/render.h"
 #include "tests/numerics/rows.h"
@@ -21,7 +21,7 @@
 
 static struct rows rows;
 
-/* Samples in units of what a case names, and the least bias that has to be found. */
+/* Scales a case's number of samples, and the least bias that must be found. */
 static uint64_t scaled_samples(uint64_t spp)
 {
 	uint64_t n = test_full() ? 64 * spp : getenv("HSLT_TEST_ROWS") ? 4 * spp : spp / 16;
@@ -33,8 +33,8 @@ static bool is_table(void)
 	return getenv("HSLT_TEST_ROWS") || test_full();
 }
 
-/* Tables have as many groups as there may be: t needs less with more degrees of freedom. And enough independent paths
- * that b, by which the whole image of chains is scaled, is known to a fifth of a percent or so. */
+/* Runs for the table have as many groups as possible, because t needs less with more degrees of freedom; and enough
+ * independent paths that b, which scales the whole image of chains, is known to about a fifth of a percent. */
 static void render(const struct agree_case *k, const char *name, const char *integrator, uint64_t spp, struct world *w,
 		   struct agree_image *out)
 {

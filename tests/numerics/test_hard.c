@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Scenes that are hard on the numbers (tests/support/hard_scenes.h), one row each. A strategy alone leaves bdpt's paths
- * distributed as they are (tests/support/stationary.h: level 1e-6; every 16th of its last paths passes path_check), and
- * chains of the whole mixture bring no NaN, infinity or negative value to their film. FULL=1: ten times the mutations.
+ * Numerically hard scenes (tests/support/hard_scenes.h), one row each. Each strategy alone must leave the distribution
+ * of bdpt's paths unchanged (tests/support/stationary.h: level 1e-6; every 16th of its last paths passes path_check),
+ * and chains of the whole mixture must bring no NaN, infinity or negative value to their film. FULL=1: ten times the
+ * mutations.
  */
 #include "worker/render/render.h"
 #include "tests/numerics/rows.h"

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Many mutations of the whole mixture over all hard scenes and those of the forced tests: not one NaN, infinity or
- * negative value reaches a film; how many were caught is printed, and where: in a contribution (by kind), or as a
- * proposal that failed by name. Invalid operations stop the program. 3 10^5 mutations; FULL=1: 10^8 by make
- * test-numerics, 10^7 in make test.
+ * Many mutations of the whole mixture over all hard scenes and those of the forced tests: no NaN, infinity or negative
+ * value may reach a film. Prints how many were caught, and where: in a contribution (by kind), or as a proposal that
+ * failed (by name). Invalid operations stop the program. 3 10^5 mutations; FULL=1: 10^8 by make test-numerics, 10^7 in
+ * make test.
  */
 #include "worker/render/render.h"
 #include "tests/numerics/rows.h"

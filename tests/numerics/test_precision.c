@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Acceptance ratios of walks from the camera to the light, from the positions of the vertices: the program's against an
- * implementation of its own in long double (weight.inc), and what the same formulas would make of it in double and in
- * float. Densities of the steps are left out (test_stepsize.c has them).
+ * Acceptance ratios of walks from the camera to the light, computed from the positions of the vertices: those of the
+ * program against an independent implementation in long double (weight.inc), and the results of the same formulas in
+ * double and in float. Densities of the steps are left out (test_stepsize.c has them).
  */
 #include "tests/numerics/rows.h"
 #include "tests/support/stats.h"
@@ -54,7 +54,7 @@ struct precision_case {
 	const char *name;
 	double index, alpha;
 	unsigned edges;
-	double allowed; /* of the program's error, in log acceptance */
+	double allowed; /* allowed error of the program, in the logarithm of the acceptance ratio */
 };
 
 static const struct precision_case cases[] = {
@@ -69,7 +69,7 @@ static const struct precision_case cases[] = {
 };
 
 struct errors {
-	unsigned count, wrong; /* wrong: float's acceptance is off by more than 1 % */
+	unsigned count, wrong; /* wrong: cases in which float's acceptance is off by more than 1 % */
 	double program, in_double, in_float, *of_float;
 };
 

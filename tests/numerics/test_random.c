@@ -2,14 +2,15 @@
 /*
  * Random scenes (tests/support/random_scene.h), each by integrators that reach the same light in different ways:
  * pssmlt, hslt, erpt or erpt4, bdpt8 and, unless there are beams whose caustics it cannot find, path, against bdpt; and
- * bdpt with all effects, whether or not the scene needs them. The other tests of agreement look where somebody thought
- * of looking.
+ * bdpt with all effects, whether or not the scene needs them. Unlike the other tests of agreement, this one is not
+ * limited to cases that somebody thought of.
  *
  * Level: that of tests/support/agree.h for each comparison. Where groups seldom find something bright, their means are
- * skewed and t is not to be trusted: what differs is compared again, with other seeds and 16 times the samples, and
- * must differ again. Power: the bias of the mean that is found with 95 % probability stands in the row. A plain run has
- * four scenes that need no second look, one of them with relief, one with fog, and is there for what breaks altogether;
- * HSLT_TEST_ROWS=1 has 24 with 4 times the samples, FULL=1 40 with 16 times. SCENES=7 or SCENES=100-200 chooses others.
+ * skewed and t is unreliable: a comparison that differs is repeated with other seeds and 16 times the samples, and
+ * fails only if it differs again. Power: the row states the bias of the mean that is found with 95 % probability. A
+ * plain run has four scenes that need no repetition, one of them with relief and one with fog, and finds only gross
+ * errors; HSLT_TEST_ROWS=1 has 24 scenes with 4 times the samples, FULL=1 has 40 with 16 times. SCENES=7 or
+ * SCENES=100-200 chooses others.
  */
 #include "worker/render/render.h"
 #include "tests/numerics/rows.h"
@@ -30,10 +31,10 @@ static uint64_t repetitions(void)
 struct trial {
 	char name[32];
 	struct random_scene scene;
-	struct agree_image reference, closer; /* with 16 times the samples; groups = 0: not rendered yet */
+	struct agree_image reference, closer; /* closer: with 16 times the samples; groups = 0: not rendered yet */
 };
 
-/* side: what is compared, by which the random numbers differ. */
+/* side: name of the image; each has random numbers of its own. */
 static void render(const struct trial *t, const char *side, const char *integrator, uint64_t spp, uint64_t more,
 		   struct world *w, struct agree_image *out)
 {
@@ -65,7 +66,7 @@ static void compare(struct trial *t, const char *side, const char *integrator, u
 		printf("%s: %s\n%s\n", t->name, t->scene.materials, t->scene.body);
 }
 
-/* In some scene a lamp is in a box, or shines away from everything. */
+/* In some scenes the only lamp is in a box, or shines away from everything. */
 static bool is_black(const struct agree_image *a)
 {
 	for (uint32_t g = 0; g < a->groups; g++)

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The same scene in other units and at other places, by hslt: the image stays. Powers of two and moves that are exact
- * give the same bits. Others differ by roundings of the coordinates, and a chain that once decides otherwise goes its
- * own way until the next independent proposal that is accepted: that changes less of a film than 1 %, where another
+ * The same scene in other units and at other places, by hslt: the image stays the same. Scaling by powers of two and
+ * exact translations give the same bits. Other changes round the coordinates, and a chain that once decides differently
+ * goes its own way until the next accepted independent proposal: that changes less than 1 % of a film, where another
  * seed changes 19 %.
  */
 #include "worker/render/render.h"
@@ -37,7 +37,7 @@ static void render(struct world *w, uint64_t seed, struct chains_result *out)
 	world_free(w);
 }
 
-/* Sum of the absolute differences over the sum; films in units of b. */
+/* Returns the sum of the absolute differences over the sum; films are in units of b. */
 static double difference(const struct chains_result *a, const struct chains_result *b)
 {
 	double off = 0, sum = 0;

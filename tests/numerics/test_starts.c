@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * How chains begin: nothing but darkness, light that the bootstrap did not find, and one bootstrap sample that
- * outweighs all others. The last: 16 films of chains that all start from that sample against 16 of resampled ones,
- * quarter by quarter; level 1e-6 each.
+ * How chains begin: in complete darkness, with light that the bootstrap did not find, and with one bootstrap sample
+ * that outweighs all others. For the last case 16 films of chains that all start from that sample are compared with 16
+ * films of resampled chains, quarter by quarter; level 1e-6 each.
  */
 #include "worker/render/render.h"
 #include "tests/numerics/rows.h"
@@ -62,7 +62,7 @@ static void check_unlit_start(const char *name, const char *scene)
 	world_free(w);
 }
 
-/* What the program says of a black scene, and that it ends well. */
+/* What the program reports for a black scene, and that it ends normally. */
 static void add_row(void)
 {
 	const char *build = getenv("BUILD");
@@ -93,7 +93,7 @@ static void add_row(void)
 	rmdir(folder);
 }
 
-/* Chains that had to look for the light themselves. */
+/* Chains that had to find the light themselves. */
 static void found_later(void)
 {
 	struct world *w = world_of_text(32, 32, "%s", ROOM(LAMP("0.3,0.6,-1", "0.1", "5")));
@@ -113,7 +113,7 @@ static void found_later(void)
 			free(r.xyz);
 	}
 	char measured[200];
-	/* Each mutation from the first light on brings 1 to the film. */
+	/* Each mutation after the first one that found light adds 1 to the film. */
 	snprintf(measured, sizeof measured, "%.2f %% of the mutations made after light was found, %.1f %% accepted",
 		 was_black ? 100 * r.mean : 0,
 		 was_black ? 100 * (double)r.counters[COUNT_ACCEPTED] / (double)r.counters[COUNT_SAMPLES] : 0);

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# usage: reports.sh BIN OUT: writes OUT/SCENE.html and OUT/SCENE.csv, what each accuracy setting buys in three scenes.
-# veach-door is one of the scenes in the folder that HSLT_SCENES names; without it the report is left out.
+# usage: reports.sh BIN OUT: writes OUT/SCENE.html and OUT/SCENE.csv, the cost and effect of each accuracy setting in
+# three scenes. veach-door is in the folder that HSLT_SCENES names; without that folder its report is left out.
 set -e
 cd "$(dirname "$0")/../../.."
 bin=$1 out=$2

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Draws what an estimate said beside what renders then cost.
+"""Draws the predictions of an estimate beside the real costs of renders.
 
     hslt-render --estimate SCENE ... --json > estimate.json
     hslt-render SCENE ... --target-error 5% --stats render.json
