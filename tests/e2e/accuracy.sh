@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# hslt-accuracy: exit codes, a report that is XML and a CSV that is complete, a bias that is there and is seen, interruption.
+# hslt-accuracy: exit codes, a report that is valid XML, a complete CSV, a real bias that is detected, interruption.
 . "$(dirname "$0")/lib.sh"
 need hslt-accuracy
 PYTHON=${PYTHON:-python3}
@@ -27,7 +27,8 @@ code 1 "$A" "$DIR/none.xml" -o "$DIR/a.html"
 code 1 "$A" "$BOX" -o "$DIR/none/a.html"
 [ ! -e "$DIR/a.html" ] || fail "a report of nothing"
 
-# What caches of files hold can be had. Where there is too little in all it says so before it renders.
+# Memory held by caches of files counts as available. Where the total is too little the program says so before
+# rendering.
 if unshare -rm true 2>/dev/null; then
 	printf 'MemTotal: 16000000 kB\nMemFree: 15000000 kB\nMemAvailable: 1000 kB\n' >"$DIR/meminfo"
 	code 1 unshare -rm sh -c 'mount --bind "$0" /proc/meminfo && exec "$@"' "$DIR/meminfo" "$A" "$BOX" -o "$DIR/a.html" --size 16x12
@@ -36,19 +37,20 @@ else
 	skip_part "too little memory: no name spaces for mounts here"
 fi
 
-# So counted every run has the same images: what is asserted of them is not left to chance.
+# With counts instead of seconds every run has the same images, so that the assertions do not depend on chance.
 COUNT="--chains 64 --epoch 512 --bootstrap 32768"
 
-# A room without its indirect light, against the whole: two edges are emitters and what they shine on.
+# A room without its indirect light, against the whole room: paths of two edges show only emitters and surfaces that
+# they light.
 code 0 "$A" "$BOX" -o "$DIR/a.html" --csv "$DIR/a.csv" --size 32x24 $COUNT --rounds 8 --threads 1 \
 	--parameters max-depth,tolerance,roughness --quiet
-# No picture of it needs gnuplot: without it the report says so and is as valid.
+# The report's pictures do not need gnuplot; without it the report says so and is equally valid.
 mkdir "$DIR/bin"
 code 0 env PATH="$DIR/bin" "$A" "$BOX" -o "$DIR/plain.html" --size 16x12 --chains 64 --seconds 0.02 --threads 1 \
 	--bootstrap 4096 --parameters preset --quiet
 grep -q gnuplot-nox "$DIR/plain.html" || fail "nothing is said of missing plots"
 
-# Against an image of another integrator.
+# Compares with an image of another integrator.
 "$BIN/hslt-render" "$BOX" -o "$DIR/path.exr" --integrator path --size 32x24 --spp 256 --threads 1 --quiet || fail "no reference"
 code 2 "$A" "$BOX" -o "$DIR/b.html" --size 16x12 --reference "$DIR/path.exr" --quiet
 grep -q 32x24 "$DIR/run.log" || fail "it does not say which size: $(cat "$DIR/run.log")"

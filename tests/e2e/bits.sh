@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# The same bits for 1, 2 and 4 workers as from hslt-render: samples, chains, both directions, other settings, smoke, a crop that ends by its error,
-# a scene whose files lie outside its folder.
+# 1, 2 and 4 workers give the same bits as hslt-render: samples, chains, both directions, other settings, smoke, a crop
+# that ends at its target error, a scene whose files lie outside its folder.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-render hslt-compare
 
@@ -53,7 +53,7 @@ for workers in 1 2 4; do
 	done
 done
 id=$(cat "$DIR/id")
-# A scene with names that lead out of its folder, to a folder that --path gives.
+# A scene whose file names lead out of its folder, to a folder given by --path.
 mkdir -p "$DIR/place/sub" "$DIR/library"
 cp "${BOX%/*}"/meshes/* "$DIR/library"
 sed 's:"meshes/:"../library/none/../:' "$BOX" >"$DIR/place/box.xml"
@@ -73,7 +73,7 @@ for scene in odd absolute; do
 	grep -q "^relMSE  *0 " "$DIR/out" || fail "the same file by another name is another image: $(cat "$DIR/out")"
 done
 
-# The header has all options that make the image again, and the hash of its scene; both alike on the farm.
+# The header has all options that render the image again, and the hash of its scene; the farm writes the same.
 GIVEN="-D light=3 --path $DIR/library --integrator path --spp 2 --size 16x12"
 mkdir "$DIR/with blank"
 "$BIN/hslt-render" "$DIR/place/box.xml" $GIVEN --path "$DIR/with blank" -o "$DIR/given.exr" --stats "$DIR/given.json" --quiet || fail "with options: $?"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Preloaded: building a scene takes $HSLT_BUILD seconds, and its begin is a line on stderr; with $HSLT_BUILD_TICKS it
- * says meanwhile that it gets on. */
+/* Preloaded: building a scene takes $HSLT_BUILD seconds, and its start is reported by a line on stderr; with
+ * $HSLT_BUILD_TICKS the build reports progress meanwhile. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <stdbool.h>

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Exit codes, what is refused, and what outlives the coordinator.
+# Exit codes, refused requests, and what survives the coordinator.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-ca
 
@@ -9,7 +9,7 @@ for p in coordinator worker submit status job ca; do
 	grep -qi example "$DIR/out" || fail "hslt-$p --help has no examples"
 	code 2 "$BIN/hslt-$p" --no-such-option
 done
-# untold WANTED COMMAND...: its exit code when stdout is on a full disk
+# untold WANTED COMMAND...: checks the exit code when stdout is on a full disk
 untold() {
 	wanted=$1
 	shift
@@ -32,7 +32,8 @@ code 75 "$BIN/hslt-status" --socket "$DIR/none"
 code 2 "$BIN/hslt-submit" --coordinator 127.0.0.1:1 --tls "$DIR/nofolder" "$BOX" -o "$DIR/a.exr" -i path
 code 2 "$BIN/hslt-job" --coordinator 127.0.0.1:1 --tls "$DIR/nofolder" list
 code 2 "$BIN/hslt-worker" --coordinator 127.0.0.1:1 --tls "$DIR/nofolder" --cache "$DIR/cache"
-# Films that cannot be held are refused before the bootstrap. A folder that the worker may not read is not a refusal by the coordinator, for which nobody restarts it.
+# Films that do not fit into memory are refused before the bootstrap. A folder that the worker may not read is no
+# refusal by the coordinator, after which nobody would restart the worker.
 if (ulimit -v 40000000 && "$BIN/hslt-render" --version) >/dev/null 2>&1; then
 	(ulimit -v 40000000 && code 1 "$BIN/hslt-render" "$BOX" -o "$DIR/a.exr" --size 4096x4096 --groups 64 --spp 64 -i path) || exit 1
 	grep -q 'no room for the films, [0-9.]* GB: .*--groups' "$DIR/err.log" && ! grep -q '^bootstrap' "$DIR/err.log" ||
@@ -114,7 +115,7 @@ code 2 "$BIN/hslt-status" banana
 code 2 "$BIN/hslt-status" j
 code 1 "$BIN/hslt-job" cancel j1
 code 2 "$BIN/hslt-job" cancel j18446744073709551616 # more than there can be
-# Options of another verb, which nobody would miss: the log is not in the file, the job is cancelled.
+# Options of another verb would otherwise be ignored unnoticed: the log not written to the file, the job cancelled.
 code 2 "$BIN/hslt-job" log j1 -o "$DIR/j1.txt"
 grep -q -- '--output is only for fetch: the log goes to stdout' "$DIR/err.log" || fail "hslt-job log -o says: $(cat "$DIR/err.log")"
 code 2 "$BIN/hslt-job" cancel j1 --preview
@@ -181,13 +182,13 @@ submit "$BOX" -o "$DIR/after.exr" --integrator path --spp 4 --wait >"$DIR/id" ||
 untold 1 "$BIN/hslt-submit" "$BOX" -o "$DIR/untold.exr" --integrator path --spp 4
 grep -q "the job's id is j8" "$DIR/err.log" || fail "it does not say which job it is: $(cat "$DIR/err.log")"
 until_true 20 is_state j8 done || fail "j8 is $(value j8 state)"
-# An image that cannot be written is not lost.
+# If the image cannot be written, it is still kept by the coordinator.
 code 1 "$BIN/hslt-submit" "$BOX" -o /dev/full --integrator path --spp 1 --wait
 id=$(cat "$DIR/out")
 grep -q "/dev/full: No space left on device. The image stays on the farm: hslt-job fetch $id -o FILE" "$DIR/err.log" ||
 	fail "a full disk: $(tail -n 1 "$DIR/err.log")"
 code 0 "$BIN/hslt-job" fetch "$id" -o "$DIR/later.exr"
-# A job for stdout has no name for its image.
+# A job whose output is stdout has no name for its image.
 code 0 "$BIN/hslt-submit" "$BOX" -o - --integrator path --spp 1 --wait
 id=$(grep -x 'j[0-9]*' "$DIR/err.log")
 until_true 20 is_state "$id" done || fail "$id is $(value "$id" state)"

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# deploy/container without a container engine: its Containerfile carried out line by line in two fresh Debians, and a small farm
-# as the image's user; then deploy/systemd there, booted by systemd-nspawn. Minutes and downloads: only with FULL=1, as by
-# deploy/test.sh --full; the tests of every day and CI name it among what they skip.
+# deploy/container without a container engine: carries out its Containerfile line by line in two fresh Debians, and runs
+# a small farm there as the image's user; then deploy/systemd, booted by systemd-nspawn. Takes minutes and downloads, so
+# it runs only with FULL=1, as by deploy/test.sh --full; the daily tests and CI list it as skipped.
 . "$(dirname "$0")/lib.sh"
 need_debians
 TREE=$(cd "$HERE/../.." && pwd)
@@ -59,7 +59,7 @@ inside "$ROOT" 'cd /tmp
 	hslt-compare --exact one.exr two.exr' "$user" || fail "the farm in the image"
 echo "image: $(du -sxm "$ROOT" | cut -f1) MB, $(wc -l <"$DIR/stage1/out/packages") packages of libraries"
 
-# ---- the units, under a systemd that runs ----
+# ---- the units, under a running systemd ----
 
 command -v systemd-nspawn >/dev/null || { echo "the units were not booted: no systemd-nspawn"; exit 0; }
 inside "$ROOT" 'apt-get update -qq; DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends systemd systemd-sysv dbus' ||
@@ -67,7 +67,7 @@ inside "$ROOT" 'apt-get update -qq; DEBIAN_FRONTEND=noninteractive apt-get insta
 cp "$TREE"/deploy/systemd/*.service "$TREE"/deploy/systemd/*.socket "$ROOT/etc/systemd/system/"
 printf '%s\n' '[Unit]' 'After=multi-user.target' '[Service]' 'ExecStart=sh /try' '[Install]' 'WantedBy=multi-user.target' \
 	>"$ROOT/etc/systemd/system/try.service"
-# Over TLS: each service reads the folder that its settings name, by a group of its unit's.
+# Over TLS: each service reads the folder that its settings name, with a group of its unit's.
 inside "$ROOT" 'export HSLT_CA=/root/ca
 	hslt-ca init
 	hslt-ca worker node
@@ -110,7 +110,7 @@ hslt-compare --exact one.exr two.exr
 journalctl --no-pager -u hslt-coordinator | grep -q 'event=listen .*tls=yes'
 journalctl --no-pager -u hslt-coordinator | grep -q 'event=peer_hello .*certificate=node'
 HSLT_TLS= hslt-job list && exit 1 # nobody without a certificate
-# A loop that stands still is noticed; what was finished is still there afterwards.
+# A blocked loop is detected by the watchdog; finished jobs are still there afterwards.
 mkdir -p /run/systemd/system/hslt-coordinator.service.d
 printf '[Service]\nWatchdogSec=3\n' >/run/systemd/system/hslt-coordinator.service.d/try.conf
 systemctl daemon-reload

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# What `make corpus` says of a folder of scenes: how many load, why the others do not, and which crash.
+# The output of `make corpus` for a folder of scenes: how many load, why the others do not, and which crash.
 . "$(dirname "$0")/lib.sh"
 need hslt-scene
 

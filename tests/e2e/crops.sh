@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# A film in crops on two coordinators, each with a worker of its own: put together it is the film that one render makes.
+# A film rendered in crops on two coordinators, each with a worker of its own: put together, it is the film of a single
+# render.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-assemble hslt-compare hslt-render
 CROPS=$HERE/../../deploy/crops.sh
@@ -18,7 +19,7 @@ for c in one two; do
 done
 FARMS=127.0.0.1:$(cat "$DIR/one/port"),127.0.0.1:$(cat "$DIR/two/port")
 
-# Samples do not depend on the crop: the same image but for roundings of the grids that sums lie on.
+# Samples do not depend on the crop: the image is the same except for roundings to the grids of the sums.
 "$BIN/hslt-render" "$BOX" -o "$DIR/whole.exr" -i path --size 81x45 --spp 16 --threads 1 --quiet
 code 0 sh "$CROPS" -p "$BIN" -g 3x2 -s 81x45 -c "$FARMS" -o "$DIR/path.exr" "$BOX" -i path --spp 16
 says "6 crops, 6 of them to render"
@@ -28,14 +29,14 @@ for c in one two; do
 	grep -q event=job_state "$DIR/$c-coordinator.log" || fail "coordinator $c had no job"
 done
 
-# It goes on with what is there, and not with what is of another call.
+# A repeated call continues from the crops that are there, but not from those of a different call.
 "$BIN/hslt-render" "$BOX" -o "$DIR/hslt.exr" -i hslt --size 80x40 --crop 0,0,40,40 --mutations 40000 --threads 1 --quiet
 mkdir "$DIR/chains.exr.crops"
 cp "$DIR/hslt.exr" "$DIR/chains.exr.crops/0-0.exr"
 printf '%s\n' 2x1 80x40 "$BOX" -i hslt --mutations 40000 >"$DIR/chains.exr.crops/call"
 code 2 sh "$CROPS" -p "$BIN" -g 2x1 -s 80x40 -c "$FARMS" -o "$DIR/chains.exr" "$BOX" -i hslt --mutations 40001
 says "another"
-# The crop that is there had not reached a target error: so the film has not.
+# A stored crop had not reached its target error: so the whole film has not.
 echo 4 >"$DIR/chains.exr.crops/0-0.code"
 code 4 sh "$CROPS" -p "$BIN" -g 2x1 -s 80x40 -c "$FARMS" -o "$DIR/chains.exr" "$BOX" -i hslt --mutations 40000
 [ ! -d "$DIR/chains.exr.crops" ] || fail "the crops are still there"
@@ -47,7 +48,7 @@ says "0-0 failed"
 code 4 sh "$CROPS" -p "$BIN" -g 2x1 -s 80x40 -c "$FARMS" -o "$DIR/far.exr" "$BOX" -i path --spp 1 --target-error 0.001%
 [ -s "$DIR/far.exr" ] || fail "no image"
 
-# They submit one after the other, and wait together; whoever ends it ends them all.
+# The submissions are made one after the other, and waited for together; a signal ends all of them.
 mkdir "$DIR/programs"
 cat >"$DIR/programs/hslt-submit" <<TEXT
 #!/bin/sh
@@ -73,7 +74,7 @@ for p in $(cat "$DIR/submitted"); do
 	! kill -0 "$p" 2>/dev/null || fail "process $p is left"
 done
 
-# What does not fit together
+# Crops that do not fit together are refused.
 "$BIN/hslt-render" "$BOX" -o "$DIR/right.exr" -i hslt --size 80x40 --crop 40,0,40,40 --mutations 40000 --threads 1 --quiet
 code 0 "$BIN/hslt-assemble" "$DIR/right.exr" "$DIR/hslt.exr" -o "$DIR/both.exr"
 code 0 "$BIN/hslt-compare" "$DIR/both.exr" "$DIR/chains.exr" --max-relmse 0

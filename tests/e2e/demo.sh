@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# The demo, small: it ends well, leaves its two pictures and nothing else; it stops what it started when it is interrupted.
+# The demo at a small size: it succeeds and leaves only its two pictures; when interrupted it stops all that it started.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-tonemap
 DEMO=$HERE/../../deploy/demo-run.sh
@@ -7,7 +7,8 @@ case $BUILD in /*) ;; *) BUILD=$PWD/$BUILD ;; esac
 mkdir "$DIR/tmp"
 export TMPDIR="$DIR/tmp"
 
-# Nobody of the demo runs: their command lines hold its folders (grep's own does not). Whoever was killed, being slow, takes a moment to go.
+# No process of the demo is left: their command lines contain its folders (grep's own does not). A slow process takes a
+# moment to end after it was killed.
 printf '%s\n' "$DIR/tmp/hslt-demo" "$DIR/out/demo.exr" >"$DIR/marks"
 nobody_left() {
 	! grep -alF -f "$DIR/marks" /proc/[0-9]*/cmdline 2>/dev/null | grep -q .
@@ -21,7 +22,7 @@ tail -n 1 "$DIR/demo.out" | grep -q 'out/demo.png' || fail "it does not say wher
 [ -z "$(ls "$TMPDIR")" ] || fail "it left $(ls "$TMPDIR")"
 until_true 5 nobody_left || fail "it left somebody running"
 
-# A log of its own: the first demo's says that it is running until the shell in the background has emptied it.
+# A log of its own: the first demo's log says that it is running until the shell in the background has emptied it.
 sh "$DEMO" "$BUILD" "$DIR/out" --size 96x54 -D spp=1000000 >"$DIR/long.out" 2>"$DIR/long.log" &
 demo=$!
 PIDS="$PIDS $demo"

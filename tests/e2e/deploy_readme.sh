@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-# The commands of deploy/README.md for a farm of several machines, as they stand there: each host is a home of its own here, ssh and
-# scp are shells and copies on this machine, and the coordinator listens on loopback only, at a port of its own. Its other commands
-# are run elsewhere, or need what is not here: demo.sh and crops.sh have tests of their own names, services install.sh and units.sh,
-# Slurm sbatch.sh and slurm.sh, the image container.sh, Kubernetes kubernetes.sh (against the API, without a cluster); a tunnel needs
-# a running sshd.
+# Runs the commands of deploy/README.md for a farm of several machines as they are written: each host is a home folder
+# here, ssh and scp are shells and copies on this machine, and the coordinator listens on loopback only, at its own
+# port. Its other commands have tests elsewhere, or need things that are missing here: demo.sh and crops.sh are tests by
+# these names; services: install.sh and units.sh; Slurm: sbatch.sh and slurm.sh; the image: container.sh; Kubernetes:
+# kubernetes.sh (against the API, without a cluster); a tunnel would need a running sshd.
 . "$(dirname "$0")/lib.sh"
 need hslt-ca hslt-coordinator hslt-worker hslt-submit hslt-status
 ROOT=$(cd "$HERE/../.." && pwd)
@@ -24,7 +24,7 @@ TEXT
 chmod +x "$DIR/bin/ssh" "$DIR/bin/scp"
 free_ports 1
 
-# commands AFTER: the indented lines behind the one that begins with AFTER
+# commands AFTER: prints the indented lines that follow the one that begins with AFTER
 commands() {
 	awk -v after="$1" 'index($0, after) == 1 { on = 1; next }
 		on && /^    / { begun = 1; print substr($0, 5); next }
@@ -35,7 +35,8 @@ answers() {
 	"$BIN/hslt-status" --socket "$1" >/dev/null 2>&1
 }
 
-# at HOST FOLDER LINE: as somebody there would type it. Daemons go on in the background, and the next line waits for them.
+# at HOST FOLDER LINE: runs the line as typed at that host. Daemons continue in the background, and the next line waits
+# until they are ready.
 at() {
 	line=$(echo "$3" | sed -e "s/0\.0\.0\.0:7700/127.0.0.1:$port/" -e "s/farm:7700/127.0.0.1:$port/")
 	count=$((count + 1))
@@ -54,7 +55,8 @@ at() {
 	esac
 }
 
-# farm_of AFTER HOST...: the commands of that block, each where its prompt says, those without one at the first host
+# farm_of AFTER HOST...: runs the commands of that block, each at the host of its prompt, those without a prompt at the
+# first host
 farm_of() {
 	after=$1
 	shift
@@ -72,7 +74,7 @@ farm_of() {
 		[ -n "$line" ] || continue
 		case $line in
 		*'$ '*)
-			# Whoever makes the certificates copies them to where they are used.
+			# The host that makes the certificates copies them to the other hosts.
 			for host in "$@"; do
 				[ ! -d "$DIR/$first/.hslt-ca" ] || cp -r "$DIR/$first/.hslt-ca/." "$DIR/$host/"
 			done

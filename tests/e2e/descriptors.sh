@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-# Programs started with their standard descriptors closed write no message into another file; a log that nobody reads stops nothing.
+# Programs started with closed standard descriptors never write messages into another file; an unread log blocks
+# nothing.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job
 
-# nothing PID: its standard descriptors lead nowhere
+# nothing PID: checks that the standard descriptors of that process lead nowhere
 nothing() {
 	for fd in 0 1 2; do
 		[ "$(readlink "/proc/$1/fd/$fd")" = /dev/null ] || fail "descriptor $fd of process $1 is $(readlink "/proc/$1/fd/$fd")"
@@ -12,7 +13,7 @@ nothing() {
 
 JOB="--integrator path --size 32x32 --epoch 1"
 
-# ---- closed
+# ---- closed descriptors
 "$BIN/hslt-coordinator" -v --listen 127.0.0.1:0 --port-file "$DIR/port" --spool "$DIR/spool" --status-socket "$DIR/status" \
 	0<&- 1>&- 2>&- &
 listens
@@ -32,7 +33,7 @@ stop $WORKER
 stop "$COORDINATOR_PID"
 [ "$CODE" -eq 0 ] || fail "the coordinator ended with $CODE"
 
-# ---- not read: 64 KB are in the pipe before the job is done
+# ---- a log that nobody reads: its pipe is full (64 KB) before the job is done
 rm "$DIR/port"
 mkfifo "$DIR/pipe"
 sleep 100000 <"$DIR/pipe" &

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# A scene of Mitsuba 0.6 and the same scene written for 3.x are one image, bit for bit, where both show backs: names, values, texture coordinates, defaults, the
-# materials of an OBJ file.
+# A scene of Mitsuba 0.6 and the same scene written for 3.x give one image, bit for bit, if back faces are visible in
+# both: names, values, texture coordinates, defaults, the materials of an OBJ file.
 . "$(dirname "$0")/lib.sh"
 need hslt-render hslt-compare
 

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-# Chains that disagree: a lamp in glass, seen in a mirror. Independent samples find such a path once in 100,000 times, chains that
-# began there never leave: images without noise that differ from seed to seed. Said by exit code 5, note, header, statistics,
-# status, list and the spool's record; not with a filament that samples find, nor by path; nor of chains too short to be judged.
-# Refracted connections, which find the lamp, are off.
+# Chains that disagree: a lamp in glass, seen in a mirror. Independent samples find such a path once in 100,000 times,
+# and chains that began there never leave: the images have no noise but differ from seed to seed. This is reported by
+# exit code 5, a note, the header, statistics, status, the list and the spool's record. It is not reported with a
+# filament that samples find, nor with path, nor for chains too short to be judged. Refracted connections, which would
+# find the lamp, are off.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-render hslt-compare
 SCENE=$HERE/../scenes/bulb/scene.xml
@@ -11,7 +12,7 @@ LARGE="-D radius=0.15 -D radiance=267"
 CHAINS="--size 160x120 --chains 64 --bootstrap 200000 --epoch 2000"
 WORDS='groups of them differ in paths (reflected caustic, 3-4 edges)'
 
-# ends WANTED FILE COMMAND...: its exit code; stderr into FILE
+# ends WANTED FILE COMMAND...: checks the exit code; stderr goes to FILE
 ends() {
 	wanted=$1 file=$2 got=0
 	shift 2
@@ -19,12 +20,12 @@ ends() {
 	[ $got -eq "$wanted" ] || fail "$* ended with $got, not $wanted: $(tail -n 3 "$file")"
 }
 
-# has FILE WORDS
+# has FILE WORDS: checks that the file contains the words
 has() {
 	grep -a -q -F -- "$2" "$1" || fail "$1 does not say '$2': $(tail -n 5 "$1" | cut -c 1-600)"
 }
 
-# A target that is missed is said by 4, but not where chains disagree.
+# A missed target gives exit code 4, unless the chains disagree.
 ALL="$SMALL $CHAINS --integrator hslt --mutations 1280000 --target-error 0.1%"
 ends 5 "$DIR/render.log" "$BIN/hslt-render" "$SCENE" -o "$DIR/a.exr" $ALL --stats "$DIR/a.json"
 has "$DIR/render.log" "note: chains disagree: "
@@ -69,12 +70,12 @@ look
 SHORT="$SMALL $CHAINS --integrator hslt --mutations 256000"
 ends 0 "$DIR/short.log" "$BIN/hslt-render" "$SCENE" -o "$DIR/b.exr" $SHORT --stats "$DIR/short.json"
 has "$DIR/short.log" 'note: chains are too short to be judged, 4000 mutations each: '
-# A warning is the last line, and all that --quiet leaves.
+# A warning is the last line, and the only one with --quiet.
 tail -n 1 "$DIR/short.log" | grep -q '^hslt-render: warning: relative error about .*, its interval is not known: ' ||
 	fail "the last line does not warn: $(tail -n 1 "$DIR/short.log")"
 ends 0 "$DIR/quiet.log" "$BIN/hslt-render" "$SCENE" -o "$DIR/b.exr" $SHORT --quiet
 [ "$(cat "$DIR/quiet.log")" = "$(tail -n 1 "$DIR/short.log")" ] || fail "--quiet says: $(cat "$DIR/quiet.log")"
-# The farm says so, too, and why it states no error.
+# The farm reports it as well, with the reason why it states no error.
 doubt=$(sed -n 's/.*"relMSEDoubt": "\(.*\)".*/\1/p' "$DIR/short.json")
 [ "$doubt" ] || fail "the statistics do not say why no error is stated"
 ends 0 "$DIR/submit.log" "$BIN/hslt-submit" "$SCENE" -o "$DIR/farm.exr" $SHORT --wait
@@ -96,7 +97,8 @@ ends 0 "$DIR/large.log" "$BIN/hslt-render" "$SCENE" -o "$DIR/b.exr" $LARGE $CHAI
 grep -q ': note:' "$DIR/large.log" && fail "nothing is wrong, but: $(grep ': note:' "$DIR/large.log")"
 grep -a -q hslt:disagreement "$DIR/b.exr" && fail "the header finds something wrong"
 ends 0 "$DIR/path.log" "$BIN/hslt-render" "$SCENE" -o "$DIR/b.exr" $SMALL --size 160x120 --integrator path --spp 1
-# Light that path hardly ever finds, as it is reflected in the glass first: said, and on the farm by the same header.
+# Light that path hardly ever finds, because it is reflected in the glass first: reported by hslt-render, and by the
+# farm in the same header.
 UNSEEN="--size 48x36 --spp 64"
 ends 0 "$DIR/unseen.log" "$BIN/hslt-render" "$SCENE" -o "$DIR/a.exr" $UNSEEN --integrator path --quiet --stats "$DIR/a.json"
 has "$DIR/unseen.log" 'arrives by paths that so few samples hardly ever find; with it the error is about'

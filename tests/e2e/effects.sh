@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# What a scene calls for: listed, overridden, in the bits of farm and hslt-render alike; and what it does not is not sent.
+# Effects that a scene calls for are listed, can be overridden, and give the same bits on the farm and in hslt-render;
+# files that the scene does not need are not sent.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-render hslt-compare
 HERE=$(cd "$(dirname "$0")/.." && pwd)
@@ -14,11 +15,11 @@ SCENE=$DIR/scene/box.xml
 "$BIN/hslt-render" --explain "$SCENE" >"$DIR/list" 2>"$DIR/log" || fail "--explain ended with $?: $(cat "$DIR/log")"
 grep -q '^textures  *off' "$DIR/list" || fail "textures of a material that nobody uses: $(cat "$DIR/list")"
 grep -q '^aperture  *off' "$DIR/list" || fail "no word on the aperture"
-# Of a scene that asks for no samples, and without a bound.
+# A scene that sets no number of samples, rendered without a bound.
 "$BIN/hslt-render" --explain "${BOX%/*}/../smoke/scene.xml" | grep -q '^scattering *on ' || fail "--explain needs a bound"
 "$BIN/hslt-render" --explain --effects=+aperture "$SCENE" 2>/dev/null | grep -q '^aperture  *on (forced)' || fail "not forced"
 
-# Which integrators were considered, what was chosen, and why: by --explain and by --stats.
+# Which integrators were considered, which was chosen, and why: in --explain and --stats.
 "$BIN/hslt-render" --explain --json "$SCENE" --spp 32 >"$DIR/explained.json" 2>"$DIR/log" || fail "--explain --json: $(cat "$DIR/log")"
 "$BIN/hslt-render" "$SCENE" -o "$DIR/b.exr" --stats "$DIR/stats.json" --spp 32 --size 64x36 --quiet || fail "hslt-render --stats"
 python3 - "$DIR/explained.json" "$DIR/stats.json" <<-'END' || fail "$(cat "$DIR/explained.json")"

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-# The length of an epoch: by a pilot where a job is long, longer where the coordinator bounds the bandwidth, as asked with --epoch;
-# and where a job is short, as hslt-render makes it. Parts: the farm's bits are hslt-render's.
+# The length of an epoch: determined by a pilot for long jobs, longer if the coordinator limits the bandwidth, as given
+# by --epoch, and for short jobs the same as in hslt-render. Parts: the farm's bits are those of hslt-render.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-submit hslt-job hslt-worker hslt-render hslt-compare
 
-# epoch FILE: of the plan that hslt-submit printed; rule FILE WORDS
+# epoch FILE: the epoch of the plan that hslt-submit printed; rule FILE WORDS: checks the rule that it names
 epoch() {
 	sed -n 's/.*epochs of \([0-9]*\) mutations.*/\1/p' "$1"
 }
@@ -13,7 +13,7 @@ rule() {
 	grep -q -e "$2" "$1" || fail "no \"$2\" in: $(cat "$1")"
 }
 
-# told NAME OPTION...: the job's id in JOB, what was said in NAME
+# told NAME OPTION...: submits; JOB is the job's id, and the output goes to NAME
 told() {
 	name=$DIR/$1
 	shift
@@ -36,7 +36,7 @@ told parts --spp 16 --parts 64
 rule "$DIR/parts" "1024 leases"
 "$BIN/hslt-submit" "$BOX" -o "$DIR/x.exr" --integrator pssmlt --parts 3 --chains 1024 --epoch 9 2>"$DIR/odd" && fail "3 parts of 64 chains"
 rule "$DIR/odd" "cannot be divided into 3 equal parts"
-# 16 chains of 8,388,608 mutations are a lease that is let in, of one more each are not.
+# A lease of 16 chains with 8,388,608 mutations each is accepted, one with one mutation more per chain is not.
 told longest --spp 100000 --epoch 8388608
 [ "$(epoch "$DIR/longest")" = 8388608 ] || fail "an epoch of $(epoch "$DIR/longest")"
 code 6 "$BIN/hslt-submit" "$BOX" -o "$DIR/x.exr" --integrator pssmlt --spp 100000 --epoch 8388609
@@ -58,7 +58,7 @@ slow=$(epoch "$DIR/slow")
 echo "epochs of $long mutations, $slow with 0.01 MB/s a thread"
 
 [ "${FULL:-0}" != 0 ] || exit 0
-# What was promised is what it takes: seconds of a thread, whatever else the machine does. With FULL=1: a minute.
+# Leases take the time that was promised, in seconds of a thread, whatever else the machine does. With FULL=1: a minute.
 stop "$COORDINATOR_PID"
 start_coordinator -v
 start_worker two

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# What errors will cost: the estimate of hslt-render and of the farm, against a render that goes there; what the status says.
+# The predicted cost of errors: estimates of hslt-render and of the farm, against a render that goes there; and the
+# status.
 . "$(dirname "$0")/lib.sh"
 need hslt-render hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job
 
@@ -13,7 +14,8 @@ code 1 "$BIN/hslt-render" --estimate "$BOX" --plot "$DIR/no/such/folder.svg"
 code 2 "$BIN/hslt-render" --estimate "$BOX" --groups 1 --size 16x16 --integrator path --pilot 0.2
 grep -q -- --groups "$DIR/err.log" || fail "one group: $(cat "$DIR/err.log")"
 
-# estimates SECONDS COMMAND...: with a pilot of so many, or of more where the machine is too busy for them and that is said
+# estimates SECONDS COMMAND...: runs an estimate with a pilot of so many seconds, or of more if the machine is too busy
+# and the program says so
 estimates() {
 	seconds=$1
 	shift
@@ -37,8 +39,8 @@ target() { # FILE TARGET KEY: low, expected, high
 	}' "$1"
 }
 
-# The path tracer at several times the pilot's work: its error is as regular as any. A factor 2 beyond the interval is a broken model,
-# not bad luck (the interval alone fails 1 time in 10).
+# The path tracer at several times the pilot's work: its error is as regular as any. A factor 2 beyond the interval
+# means a broken model, not bad luck (the interval alone fails 1 time in 10).
 how="$BOX --integrator path --size 40x40 --epoch 2 --threads 1 --target-error 3%"
 estimates 2 "$BIN/hslt-render" --estimate $how --seed 11 --quiet --json
 cp "$DIR/out" "$DIR/estimate.json"
@@ -54,7 +56,7 @@ awk -v n="$samples" -v low="$1" -v high="$3" 'BEGIN { exit !(low > 0 && high < 8
 echo "3 %: $samples samples, predicted $2 ($1 - $3)"
 grep -q '"end": *"target-error"' "$DIR/stats.json" || fail "the statistics do not say what ended it"
 
-# A pilot without time goes on until its error has been seen twice: a wide answer, no refusal.
+# A pilot of almost no time continues until its error has been estimated twice: the answer is wide, but no refusal.
 code 0 "$BIN/hslt-render" --estimate $how --pilot 0.001 --quiet --json
 if command -v jq >/dev/null; then
 	jq -e '.targets | length == 5' "$DIR/out" >/dev/null || fail "without time: not five targets: $(cat "$DIR/out")"
@@ -67,7 +69,7 @@ if command -v gnuplot >/dev/null; then
 	grep -q '</svg>' "$DIR/plot.svg" || fail "the plot is no SVG"
 fi
 
-# As docs/errors.md has it: neither a bound nor an integrator.
+# As in docs/errors.md: neither a bound nor an integrator is given.
 demo=$HERE/../scenes/demo/scene.xml
 plot=
 ! command -v gnuplot >/dev/null || plot="--plot $DIR/cost.svg"

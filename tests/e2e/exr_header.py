@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Prints the header of an OpenEXR file, one `name type value` per line, without the library that wrote it.
 
-After the file layout in "Technical Introduction to OpenEXR" (openexr.com): magic number, version and flags, then attributes, each a
-name and a type that end with a zero byte, the size as a 32-bit number and the value, up to an empty name; little endian."""
+The layout is that of "Technical Introduction to OpenEXR" (openexr.com): magic number, version and flags, then attributes up to an
+empty name. An attribute is a name and a type, each ending with a zero byte, a 32-bit size and the value; little endian."""
 import struct
 import sys
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# What docs/extending.md says that adding one thing costs: each is added to a copy of the tree, the lines are counted, and the copy's
-# programs know it.
+# Checks the costs of additions that docs/extending.md states: each kind of addition is made to a copy of the tree, its
+# lines are counted, and the copy's programs use it.
 . "$(dirname "$0")/lib.sh"
 need hslt-scene
 PYTHON=${PYTHON:-python3}
@@ -12,7 +12,7 @@ mkdir -p "$TREE/build" "$TREE/tests"
 cp -a "$BUILD/obj" "$BUILD/gen" "$TREE/build"
 cp -a "$TREE" "$DIR/before"
 
-# added FILE: behind its last line. inserted FILE PATTERN: behind the first line that matches.
+# added FILE: appends stdin to the file. inserted FILE PATTERN: inserts stdin after the first line that matches.
 added() {
 	cat >>"$TREE/$1"
 }
@@ -118,7 +118,7 @@ echo '	bool quiet;' | inserted coordinator/ctl/hslt_status.c '^struct arguments 
 echo '	{"quiet", 0, NULL, "Print nothing", OPTION_FLAG(struct arguments, quiet)},' |
 	inserted coordinator/ctl/hslt_status.c '^static const struct option_row rows'
 
-# A message, from a client: itself and its number; who answers it.
+# A message from a client: the message and its number, and the code that answers it.
 echo '    Echo echo = 60;' | inserted proto/farm.proto ' Control control = '
 echo 'message Echo { string text = 1; }' | added proto/farm.proto
 {
@@ -127,17 +127,17 @@ echo 'message Echo { string text = 1; }' | added proto/farm.proto
 	echo '		break;'
 } | inserted coordinator/peers/client.c 'switch (m->body_case) {'
 
-# A counter of a job: a line of the list, its number in stored messages, and where it counts.
+# A counter of a job: a line of the list, its number in stored messages, and the line that counts.
 printf '	COUNTER(unique, "unique", NOWHERE) \\\n' | inserted coordinator/core/job_fields.h '#define JOB_FIELDS('
 echo '  uint64 unique = 99;' | inserted proto/stored.proto '^message Counts'
 echo '		j->counts.unique += v == REPEAT;' | inserted coordinator/core/answer.c 'j->counts.repeats +='
 
-# A field of a job: a line of the list, where the core computes it, and its number in messages to clients.
+# A field of a job: a line of the list, the line that computes it in the core, and its number in messages to clients.
 printf '	NUMBER(u32, slots, IN_RECORD, BY_CORE, "slots", "slots", AT(slots)) \\\n' | inserted coordinator/core/job_fields.h '#define JOB_FIELDS('
 echo '		.slots = j->plan.groups * j->plan.parts,' | inserted coordinator/core/status.c '\.priority = j->priority'
 echo '  uint32 slots = 99;' | inserted proto/farm.proto '^message JobStatus'
 
-# lines KIND FILES LINES PATHS...: existing files that differ, and their new lines
+# lines KIND FILES LINES PATHS...: checks the number of changed existing files, and of new lines in them
 lines() {
 	kind=$1 files=$2 count=$3
 	shift 3
@@ -157,8 +157,8 @@ lines "a message, in the coordinator" 1 3 coordinator/peers
 lines "a message and a field, on the wire" 1 3 proto/farm.proto
 lines "a counter, in stored messages" 1 1 proto/stored.proto
 
-# Without optimisation: what is compiled anew has to run, not to be fast.
-# The tests have a build of their own in the environment, and may have been called by a make.
+# Built without optimisation: the new code must run, not be fast. The environment may contain variables of the tests'
+# own build, and of a make that runs this test.
 env -u MAKEFLAGS -u MAKELEVEL make -s -C "$TREE" -j2 BUILD=build OPT=-O0 programs >"$DIR/make.log" 2>&1 || fail "$(grep -m 3 error "$DIR/make.log")"
 BIN=$TREE/build/bin
 cat >"$DIR/new.xml" <<'TEXT'

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# What happens to machines, one fault after the other, while a job runs: nothing acknowledged is lost, nothing counts twice, the
-# image has the bits of an undisturbed one. Each fault is a row of the table in README.md; this is the short form, `make
-# test-faults` injects each as often as the table says and writes the table.
+# Injects one fault after the other while a job runs: no acknowledged result may be lost, none counted twice, and the
+# image must have the bits of an undisturbed run. Each fault is a row of the table in README.md. This is the short form;
+# `make test-faults` injects each fault as often as the table says, and writes the table.
 #   sh tests/e2e/faults.sh BUILD [--write | --all] [FAULT...]
 OWN_MOUNTS=wanted # for a disk that is full
 . "$(dirname "$0")/lib.sh"
@@ -22,9 +22,10 @@ for f in worker coordinator network versions resources people spool disk; do
 	. "$HERE/faults/$f.sh"
 done
 
-# The count itself, over two runs of the coordinator: one result is merged again, one twice, one was acknowledged and not stored, one waited in the journal,
-# one was taken back before it was on the disk, and merged again; twenty in the film. Of one chain two epochs are given out again after one
-# worker, of which one had been given to two at once, then another one after a restart.
+# A test of the counting itself, over two runs of the coordinator: one result is merged again, one twice, one was
+# acknowledged and not stored, one waited in the journal, one was taken back before it was on the disk and merged again;
+# twenty are in the film. Two epochs of one chain are handed out again after one worker was lost, one of which two
+# workers had held at once; then another one after a restart.
 counted=$(sed 's/^/x event=/' <<TEXT | awk -v job=j1 -f "$HERE/faults/count.awk"
 start program=hslt-coordinator
 batch_merged job=j1 kind=render group=0 part=0 epoch=1
@@ -60,7 +61,7 @@ TEXT
 )
 [ "$counted" = "2 1 20 2" ] || fail "count.awk counts $counted"
 
-# Every fault has its row, and every row its fault.
+# Every fault must have its row, and every row its fault.
 for f in $FAULTS; do
 	eval "echo \"\$text_$f\""
 done | sort >"$TOP/texts"

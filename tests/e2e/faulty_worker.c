@@ -71,7 +71,7 @@ static void read_fault(const char *text)
 	usage(text);
 }
 
-/* Before main, whose options are those of hslt-worker. */
+/* Runs before main, which reads the options of hslt-worker. */
 __attribute__((constructor)) static void read_faults(void)
 {
 	const char *list = getenv("HSLT_FAULTS");
@@ -115,7 +115,7 @@ static float *first_value(const struct batch *b)
 	return b->tile_count ? b->tiles[0].xyz : b->weight_count ? b->weights : NULL;
 }
 
-/* The last bit of one number: the smallest error there is. */
+/* Flips the last bit of one number: the smallest possible error. */
 static void flip_a_bit(const struct batch *b)
 {
 	float *x = first_value(b);
@@ -137,9 +137,9 @@ static uint64_t splitmix(uint64_t *state)
 
 enum damage { FLIP_BITS, WRITE_NUMBERS, WRITE_NOISE, CUT_OFF, ALL_NOISE };
 
-/* Damages a state behind its id, so that it still looks like that chain's. CUT_OFF and ALL_NOISE give no state of any
- * plan; the others may give a valid one that is not the chain's, since in primary sample space most bits of a random
- * number make another random number. */
+/* Damages a state after its id, so that it still looks like that chain's. CUT_OFF and ALL_NOISE give no valid state of
+ * any plan; the other kinds may give a valid state that is not the chain's, since in primary sample space a flipped bit
+ * of a random number mostly gives another random number. */
 static void damage_state(struct chain_state *s, enum damage how, uint64_t *random)
 {
 	enum { ID = 8, TIMES = 8 };
@@ -161,7 +161,7 @@ static void damage_state(struct chain_state *s, enum damage how, uint64_t *rando
 		s->size -= (uint32_t)(1 + splitmix(random) % (left - 1));
 }
 
-/* The first state becomes invalid for certain, so that whoever resumes it must notice. */
+/* The first state certainly becomes invalid, so that the worker which resumes it must notice. */
 static void damage_states(const struct batch *b, uint64_t random)
 {
 	for (uint32_t i = 0; i < b->state_count; i++) {
@@ -182,7 +182,7 @@ int __wrap_batch_pack(const struct batch *b, const struct plan *p, unsigned char
 	return __real_batch_pack(b, p, frame, size, e);
 }
 
-/* The worker sends its results, and nothing else, as frames. */
+/* The worker sends only its results through this function. */
 void __wrap_conn_send_frame(struct conn *c, unsigned char *frame, size_t size)
 {
 	unsigned char *copy = every[REPEAT] ? mem_alloc(size, 1) : NULL;

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# A limit of the size of files (ulimit -f, LimitFSIZE, the queue of a cluster) ends no program: the coordinator puts the job on hold
-# whose journal has reached it, others go on, and without the limit the job continues to the same bits.
+# A limit on the size of files (ulimit -f, LimitFSIZE, the queue of a cluster) ends no program: the coordinator puts a
+# job on hold when its journal has reached the limit, other jobs go on, and without the limit the job continues to the
+# same bits.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-job hslt-render hslt-compare
 
@@ -33,7 +34,7 @@ until_true 120 is_state "$id" done || fail "$id is $(value "$id" state)"
 "$BIN/hslt-render" "$BOX" -o "$DIR/alone.exr" $JOB 2>"$DIR/render.log"
 same "$DIR/box.exr" "$DIR/alone.exr"
 
-# A program that writes an image says what is wrong, and leaves nothing behind.
+# A program that cannot write its image gives the reason, and leaves no file behind.
 ulimit -S -f 8
 # shellcheck disable=SC2086
 code 1 "$BIN/hslt-render" "$BOX" -o "$DIR/large.exr" $JOB

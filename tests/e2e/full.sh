@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-# A spool without room: nothing is acknowledged that is not stored, the job is held and says why, no new one is taken, the
-# coordinator answers. With room again the job goes on by itself, to the same bits. Cancelling a job needs no room.
+# A spool without room: the coordinator acknowledges nothing that is not stored, holds the job with the reason, takes no
+# new one, and keeps answering. With room again the job continues by itself, to the same bits. Cancelling a job needs no
+# room.
 OWN_MOUNTS=needed
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-compare
 
-# is_merged JOB N: more than that
+# is_merged JOB N: more than N results are merged
 is_merged() {
 	[ "$(value "$1" merged)" -gt "$2" ]
 }
@@ -18,7 +19,7 @@ start_worker w1
 submit "$BOX" -o "$DIR/quiet.exr" $JOB --wait >/dev/null
 quiet=$(value j1 merged)
 
-# What could not be stored on the empty disk is refused, and holds nobody up.
+# A job that would not fit even on the empty disk is refused, and delays nobody.
 code 6 "$BIN/hslt-submit" "$BOX" -o "$DIR/large.exr" --integrator hslt --size 640x360 --spp 16
 grep -q "it may need .* MB for its files and films, and the disk of the coordinator's spool has 33.6 MB in all" "$DIR/err.log" ||
 	fail "the refusal does not say why: $(tail -n 1 "$DIR/err.log")"
@@ -63,7 +64,7 @@ wait $COORDINATOR_PID 2>/dev/null || :
 LISTEN=$COORDINATOR start_coordinator -v --keep-films 0
 is_state "$id" cancelled || fail "$id is $(value "$id" state) after it was cancelled"
 
-# What no job needs is given up for a new one: the films of the first job, which are kept for hslt-job extend.
+# Data that no job needs is deleted for a new job: the films of the first one, which are kept for hslt-job extend.
 stop $COORDINATOR_PID
 mount -o remount,size=64m "$DIR/spool"
 LISTEN=$COORDINATOR start_coordinator -v
@@ -80,7 +81,7 @@ id=$(submit "$DIR/long.xml" --path "$(dirname "$BOX")" -o "$DIR/long.exr" --inte
 until_true 30 is_state "$id" done || fail "$id is $(value "$id" state): $(value "$id" waiting)"
 rm "$DIR/spool/filler"
 
-# A job that waits for room gets that of a scene that no job needs any more.
+# A job that waits for room gets the room of a scene that no job needs any more.
 head -c 3000000 /dev/zero >>"$DIR/spool/ballast"
 holder=$(submit "$DIR/long.xml" --path "$(dirname "$BOX")" -o "$DIR/long.exr" $JOB)
 "$BIN/hslt-job" hold "$holder" 2>/dev/null

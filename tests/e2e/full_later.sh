@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# A disk that somebody else fills while jobs run that had room when they began: jobs that end at a time, at an error, at a number of
-# samples, and one that is extended. They wait, and say for what; nothing of them is lost; they go on when there is room, and their
-# images have the bits that they have without it.
+# Another program fills the disk while jobs run that had room when they began: jobs that end at a time, at an error, at
+# a number of samples, and an extended one. They wait, and say for what; none of their results is lost; they continue
+# when there is room, and their images have the bits of an undisturbed run.
 OWN_MOUNTS=needed
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-compare hslt-render
@@ -12,7 +12,7 @@ mount -t tmpfs -o size=48m none "$DIR/spool" || skip "no tmpfs"
 start_coordinator -v
 start_worker w
 
-# fill_but KB: so much is left
+# fill_but KB: fills the disk except for so many KB
 fill_but() {
 	left=$(df --output=avail -k "$DIR/spool" | tail -n 1)
 	if [ "$left" -gt "$1" ]; then
@@ -39,7 +39,7 @@ until_true 60 has_merged "$counted" 20 || fail "$counted does not begin"
 timed=$(submit "$BOX" -o "$DIR/timed.exr" $PATHS --time 15)
 until_true 60 has_merged "$timed" 20 || fail "$timed does not begin"
 
-# It waits, none has failed, and whoever asks the coordinator gets answers.
+# The job waits, none has failed, and the coordinator keeps answering.
 until_true 60 waits_for_room "$timed" || fail "$timed does not wait for room: $(value "$timed" state): $(value "$timed" waiting); $(df -k "$DIR/spool" | tail -n 1)"
 code 0 timeout 60 "$BIN/hslt-job" list
 got=0
@@ -52,7 +52,7 @@ timeout 60 "$BIN/hslt-job" extend "$counted" --spp +64 >"$DIR/extend2.log" 2>&1 
 [ $got -ne 124 ] || fail "hslt-job extend of a running job gets no answer on a full disk"
 total=$([ $got -eq 0 ] && echo 832 || echo 768)
 
-# A restart in that state refuses nothing and loses nothing.
+# A restart in that state neither refuses nor loses anything.
 kill -9 $COORDINATOR_PID
 wait $COORDINATOR_PID 2>/dev/null || :
 LISTEN=$COORDINATOR start_coordinator -v

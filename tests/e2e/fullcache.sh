@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# Workers whose cache's disk is full, three of them before any other comes: no job ends by it. It waits, its status names them, the
-# first worker that has room renders it.
+# Three workers connect whose caches are on a full disk, before any other worker: this fails no job. The job waits, its
+# status names these workers, and the first worker that has room renders it.
 OWN_MOUNTS=needed
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job

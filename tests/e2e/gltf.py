@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# Writes glTF scenes into a folder: one with its buffer and pictures in files beside it, embedded, and as .glb; its twin in
-# Mitsuba's XML with the same numbers; and two of a tilted surface, by a normal map and by normals.
+# Writes glTF scenes into a folder: one with its buffer and pictures in separate files, embedded, and as .glb; the same
+# scene with the same numbers in Mitsuba's XML; and two scenes of a tilted surface, by a normal map and by normals.
 import base64
 import json
 import math

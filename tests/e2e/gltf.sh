@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-# A glTF scene with files beside it, embedded and as .glb: one picture, which is that of its twin in XML, here and on a farm, and nearly
-# that of what gltfpack makes of it; a normal map is a tilted surface.
+# A glTF scene with separate files, embedded and as .glb gives one picture: that of the same scene in XML, in
+# hslt-render and on a farm, and nearly that of gltfpack's version of it; a normal map acts like a tilted surface.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-render hslt-compare hslt-scene
 
 python3 tests/e2e/gltf.py "$DIR"
 
-# picture NAME SCENE OPTION...
+# picture NAME SCENE OPTION...: renders NAME.exr
 picture() {
 	name=$1 scene=$2
 	shift 2
 	"$BIN/hslt-render" "$DIR/$scene" -o "$DIR/$name.exr" --size 72x48 --quiet "$@" 2>/dev/null
 }
 
-# near A B PERCENT: the relative error of one to the other
+# near A B PERCENT: checks the relative error between two images
 near() {
 	"$BIN/hslt-compare" --json "$DIR/$1.exr" "$DIR/$2.exr" >"$DIR/near"
 	awk -F'"relativeError":' -v most="$3" '{ split($2, x, /[,}]/); e = 100 * x[1]; found = NF > 1 }
@@ -32,7 +32,8 @@ picture map map.glb --integrator path --spp 16
 picture normals normals.glb --integrator path --spp 16
 near map normals 0.01
 
-# put on a grid of 2^16 points by another program, which moves edges by a little; compressed, without and with filters
+# written by another program on a grid of 2^16 points, which moves edges by a little; compressed, without and with
+# filters
 command -v gltfpack >/dev/null || lacks "gltfpack"
 for form in grid packed:-c filtered:-cc; do
 	name=${form%:*} how=${form#"$name"}
@@ -46,7 +47,7 @@ near grid one.glb 10
 near packed grid 0.01
 near filtered grid 2
 
-# on a farm, whose workers have nothing but what they were sent
+# on a farm, whose workers have only the files that they were sent
 start_coordinator -v
 start_worker one --threads 1
 for form in files.gltf one.glb packed.gltf; do
@@ -55,7 +56,7 @@ for form in files.gltf one.glb packed.gltf; do
 	same "$DIR/farm.exr" "$DIR/quiet.exr"
 done
 
-# what is wrong has its line; what is not supported is left out where that is asked for
+# errors have their line; unsupported features are left out if asked for
 prism='"KHR_materials_transmission": {"transmissionFactor": 0.5}, "KHR_materials_dispersion": {"dispersion": 1}'
 sed "s/\"alphaMode\": \"BLEND\"/\"alphaMode\": \"BLEND\", \"extensions\": {$prism}/" "$DIR/files.gltf" >"$DIR/prism.gltf"
 code 0 "$BIN/hslt-scene" check "$DIR/prism.gltf"

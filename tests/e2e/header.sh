@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-# What an image says of itself, read without the library that writes it: the primaries and the white of its colours, the program, the
-# camera. Of hslt-render, the farm, previews and assembled crops.
+# The headers of images, read without the library that writes them: the primaries and the white point of the colours,
+# the program, the camera. Images of hslt-render, of the farm, previews and assembled crops.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-job hslt-render hslt-assemble
 
-# says FILE: its header has all three
+# says FILE: checks that the header has all three
 says() {
 	python3 "$HERE/exr_header.py" "$1" >"$DIR/header" || fail "$1 cannot be read: $(cat "$DIR/header")"
 	# Rec. 709: red, green, blue and D65 (ITU-R BT.709-6, section 1)

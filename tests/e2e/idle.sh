@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# --idle-exit: a worker that nobody has work for leaves with 0, not before, also when there is no coordinator.
+# --idle-exit: a worker without work for that time exits with 0, and not earlier, also if there is no coordinator.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-render hslt-compare
 
@@ -8,7 +8,7 @@ JOB="--integrator pssmlt --bootstrap 20000 --mutations 100000 --epoch 200"
 seconds() {
 	date +%s%N | cut -b1-11 # tenths
 }
-# leaves NAME TENTHS: a worker that does so when it is idle for so long
+# leaves NAME TENTHS: starts a worker that must exit after so many tenths of a second without work
 leaves() {
 	begin=$(seconds)
 	start_worker "$1" --idle-exit "$(awk -v t="$2" 'BEGIN { print t / 10 }')"
@@ -18,7 +18,7 @@ leaves() {
 	[ $(($(seconds) - begin)) -ge $(($2 - 1)) ] || fail "it left too soon"
 }
 start_coordinator
-# A machine that is busy enough lets it leave before it has come: then it gets more time.
+# On a busy machine the time may be over before the worker has connected: then it gets more time.
 for tenths in 8 80 600; do
 	leaves nothing $tenths
 	! grep -q 'event=connect ' "$DIR/nothing.log" || break
@@ -26,7 +26,7 @@ done
 grep -q "event=stop text=\"no lease for $(awk -v t=$tenths 'BEGIN { print t / 10 }') s\"" "$DIR/nothing.log" || fail "it does not say why"
 until_true 5 grep -q 'name="nothing".*ended the connection' "$DIR/coordinator.log" || fail "it did not say goodbye"
 
-# A job keeps it; it leaves afterwards. One without the option, or with 0, stays.
+# A job keeps the worker; it exits afterwards. A worker without the option, or with 0, stays.
 submit "$BOX" -o "$DIR/farm.exr" $JOB >"$DIR/id"
 for tenths in 4 80 600; do
 	leaves works $tenths

@@ -4,7 +4,7 @@
 . "$(dirname "$0")/lib.sh"
 ROOT=$(cd "$HERE/../.." && pwd)
 TREE=$DIR/root/usr/local
-# What is built stays as it is, whatever it was built with: no program is made anew.
+# The build stays as it is, whatever options it was built with: no program is built again.
 built=
 for program in "$BIN"/hslt-*; do
 	built="$built -o $program"

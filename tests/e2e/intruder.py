@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A client with a good certificate and bad manners: intruder.py PORT FOLDER ANOTHER'S prints one line an attempt, "WHAT|ANSWER", and
-fails when one of them is not disconnected or refused within a minute. With a worker at the coordinator: also scenes that reach
-for what is not among their files, submitted by hand so that no program of ours looks at them before."""
+"""A client with a valid certificate that violates the protocol: intruder.py PORT FOLDER ANOTHER'S prints one line per attempt,
+"WHAT|ANSWER", and fails if an attempt is not refused or disconnected within a minute. If a worker is connected, there are also
+scenes that name files outside the job, submitted by hand so that no client program checks them before."""
 import hashlib, os, re, socket, ssl, struct, sys, time
 
 sys.dont_write_bytecode = True
@@ -25,7 +25,7 @@ def call(seconds, who=None):
 
 
 def say(s, words, until):
-    """All that comes back until it hangs up, or until that is in it."""
+    """Returns all bytes received until the other side hangs up, or until they contain the given ones."""
     heard = b""
     try:
         s.sendall(words)
@@ -53,14 +53,14 @@ plan = field(1, b"path") + field(2, 0) + field(3, 48) + field(4, 40) + field(9, 
 
 
 def announce(size):
-    """The submission of a file that nobody has."""
+    """Returns the submission of a file that nobody has."""
     return frame(field(40, field(2, b"a") + field(6, plan) + field(8, field(1, b"a") + field(2, os.urandom(32)) + field(3, size))))
 
 
-# A box, and in it what a scene may not have.
+# The box scene, with parts that a scene may not have.
 here_box = open(here + "/../scenes/box/box.xml", "rb").read()
 wedge = open(here + "/../scenes/box/meshes/wedge.obj", "rb").read()
-known = {hashlib.sha256(c).digest() for c in (here_box, wedge)}  # what the spool has, from the job before
+known = {hashlib.sha256(c).digest() for c in (here_box, wedge)}  # files that the spool has from the job before
 
 
 def box(inside, before=b""):
@@ -72,7 +72,7 @@ def mesh(name):
 
 
 def smuggle(scene, files=(), sentence=b""):
-    """Submits scene and files (name, content) by hand; all that is said until the job has failed."""
+    """Submits scene and files (name, content) by hand; returns all that is received until the job has failed."""
     sent = [(b"box.xml", scene), (b"meshes/wedge.obj", wedge), *files]
     hashed = {hashlib.sha256(c).digest(): c for _, c in sent}
     named = b"".join(field(8, field(1, n) + field(2, hashlib.sha256(c).digest()) + field(3, len(c))) for n, c in sent)
@@ -91,7 +91,7 @@ def smuggle(scene, files=(), sentence=b""):
             if not got:
                 break
             heard += got
-            # Envelope.submit_answer = 41 with its number of the job; the other answers of that kind have none.
+            # Envelope.submit_answer = 41 with the number of the job, which other answers of that kind lack.
             found = re.search(rb"\xca\x02.{1,2}?\x08([\x01-\x7f])\x22", heard, re.S)
             if found and not job:
                 job = found.group(1)[0]
@@ -128,7 +128,7 @@ attempts = [
     ("invalid scene files: 10,001 files", hello + submit(*[b"%d" % i for i in range(10001)]), b"files, not 10001"),
     ("invalid scene files: 10^6 files", hello + submit(*[b"%d" % i for i in range(10 ** 6)]), b""),
 ]
-# Files that a worker could open, if names led anywhere: by their whole name, and from where it was started.
+# Files that a worker could open if names were used as paths: absolute, and relative to where it was started.
 at = os.getcwd().encode()
 open("beside.obj", "w").write("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
 os.mkfifo("pipe.obj")
@@ -145,7 +145,7 @@ scenes = [
     unsent("a scene sent past the client: names /dev/zero", b"/dev/zero"),
     unsent("a scene sent past the client: names /proc/self/environ", b"/proc/self/environ"),
     ("a scene sent past the client: names ../../../../etc/passwd", mesh(b"../../../../etc/passwd"), (),
-     b"%2e%2e/%2e%2e/%2e%2e/%2e%2e/etc/passwd: the file was not sent with the job"),  # as a client names it in a job
+     b"%2e%2e/%2e%2e/%2e%2e/%2e%2e/etc/passwd: the file was not sent with the job"),  # as a client encodes the name in a job
     unsent("a scene sent past the client: names a file by its whole name", at + b"/beside.obj"),
     unsent("a scene sent past the client: names a file where the worker was started", b"LICENSE"),
     unsent("a scene sent past the client: names a pipe", at + b"/pipe.obj"),
@@ -162,7 +162,7 @@ for what, words, sentence in attempts:
     if sentence not in heard:
         sys.exit(f"{what}: it says {heard!r}")
     print(f"{what}|{sentence.decode() or 'hung up'}")
-# What one owner has on its way counts on all connections, what others have does not.
+# One owner's unfinished uploads count over all connections, those of others do not.
 what, goes_on = "files beyond the quota, on two connections", b"samples per pixel"
 with call(60) as first, call(60) as second, call(60, another) as other:
     for s, sentence in (first, goes_on), (second, b"quota: its files"), (other, goes_on):

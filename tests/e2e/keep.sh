@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-# Results of finished jobs go by age and by space, and who asks for one hears when it went; a living job keeps all.
+# Results of finished jobs are deleted by age and by space, and a client that asks for a deleted one gets the time of
+# deletion; a live job keeps everything.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job
 
 JOB="--integrator path --size 64x48 --spp 4"
 start_coordinator --keep-gb 0.00000001 --heartbeat 5
-# The client is slow: it hears of the end when the coordinator has looked twice at what it can clear.
+# The client is slow: it hears of the job's end after the coordinator has looked twice for results to delete.
 "$BIN/hslt-submit" "$BOX" -o "$DIR/first.exr" $JOB --wait >"$DIR/first" 2>>"$DIR/submit.log" &
 CLIENT=$!
 PIDS="$PIDS $CLIENT"
@@ -32,7 +33,7 @@ first_end=$(value j1 ended) second_end=$(value j2 ended)
 [ "$first_end" ] && [ "$second_end" ] || fail "the status does not say when they ended"
 stop $COORDINATOR_PID
 
-# For so long that j2 is old enough now, and j1 not yet ten times as old: then its record would go, too.
+# A limit such that j2 is old enough now, and j1 is not ten times as old, or its record would go as well.
 seconds=$(awk -v a="$first_end" -v b="$second_end" 'BEGIN { print (b - a > 2 ? b - a : 2) }')
 sleep "$(awk -v s="$seconds" -v b="$second_end" -v now="$(date +%s.%N)" 'BEGIN { print (now - b < s ? s - now + b : 0) }')"
 LISTEN=$COORDINATOR start_coordinator --keep-days "$(awk -v s="$seconds" 'BEGIN { printf "%.9f", s / 86400 }')"

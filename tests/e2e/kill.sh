@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# A worker killed with -9 half-way, and one that comes late, while things move in the scene: the same bits as from hslt-render.
+# One worker is killed (kill -9) halfway, and another comes late, in a scene with motion: the bits are those of
+# hslt-render.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-compare hslt-render
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# deploy/kubernetes field by field against the published API, and against the programs' options; certificates as a kubelet lays
-# Secrets out are taken, and taken up when they change; the workers' preStop hook lets a worker that is process 1 hand over its
-# epochs. No cluster runs here.
+# Checks deploy/kubernetes field by field against the published API and against the programs' options; certificates in
+# the layout in which a kubelet mounts Secrets are read, and read again when they change; the workers' preStop hook
+# makes a worker that is process 1 return its epochs. No cluster runs here.
 . "$(dirname "$0")/lib.sh"
 need hslt-ca hslt-coordinator hslt-worker hslt-submit hslt-status hslt-compare
 PYTHON=/usr/bin/python3
@@ -13,7 +13,7 @@ for s in $(sed -n 's/^ *secretName: //p' $FILES); do
 	grep -q "create secret generic $s --from-file" "$HERE/../../deploy/README.md" || fail "the README does not say how to make $s"
 done
 
-# secret NAME FOLDER: as a kubelet mounts it, links through one that is replaced
+# secret NAME FOLDER: lays the folder out as a kubelet mounts a Secret: links through one link that is replaced
 secret() {
 	mkdir -p "$DIR/$1"
 	new=$(mktemp -d "$DIR/$1/..start.XXXXXX")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# SIGTERM: a worker finishes or gives back its leases and leaves with 0; the job loses nothing and nobody is blamed. It does so
-# also while its thread builds a scene and does not come back; where nobody tells it to leave it notices that, and ends with 75,
-# but not where the building only takes long.
+# SIGTERM: a worker finishes or returns its leases and exits with 0; the job loses nothing and nobody is blamed. So does
+# a worker whose thread is stuck building a scene; without SIGTERM it detects the stuck thread and exits with 75, but
+# not if the building only takes long.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-compare
 
@@ -26,11 +26,11 @@ until_true 30 is_state "$id" done || fail "$id is $(value "$id" state)"
 same "$DIR/calm.exr" "$DIR/left.exr"
 echo "workers leave in peace"
 
-# ---- scenes that are being built ----
+# ---- scenes while they are built ----
 
 ${CC:-cc} -shared -fPIC -O1 -o "$DIR/build.so" "$HERE/build.c" -ldl 2>"$DIR/cc.log" || fail "no compiler: $(cat "$DIR/cc.log")"
 stop $STAYS
-# start_builder SECONDS NAME [OPTION...]
+# start_builder SECONDS NAME [OPTION...]: starts a worker that takes so long to build a scene
 start_builder() {
 	seconds=$1
 	shift

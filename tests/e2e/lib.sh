@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-# For end-to-end tests with real processes on loopback: sourced by tests/e2e/*.sh, which are called with the build folder.
-# Each test has a folder of its own and ends what it started; HSLT_KEEP=FOLDER copies it there. Exit codes: 0 passed, 77 skipped, else failed.
+# For end-to-end tests with real processes on loopback: sourced by tests/e2e/*.sh, which are called with the build
+# folder. Each test has a folder of its own and ends the processes that it started; HSLT_KEEP=FOLDER copies the folder
+# there. Exit codes: 0 passed, 77 skipped, else failed.
 set -eu
 
-# A test that mounts sets OWN_MOUNTS before it sources this, and begins again in a name space of its own, with HSLT_OWN_MOUNTS=1. Where
-# none can be had it is skipped if OWN_MOUNTS is "needed", and goes on without if it is "wanted".
+# A test that mounts sets OWN_MOUNTS before it sources this file, and is then restarted in a mount namespace of its own,
+# with HSLT_OWN_MOUNTS=1. If there can be none, the test is skipped if OWN_MOUNTS is "needed", and runs without it if
+# "wanted".
 if [ -n "${OWN_MOUNTS:-}" ] && [ -z "${HSLT_OWN_MOUNTS:-}" ]; then
 	if unshare -rm true 2>/dev/null; then
 		HSLT_OWN_MOUNTS=1 exec unshare -rm sh "$0" "$@"
@@ -41,7 +43,7 @@ finish() {
 			[ -s "$f" ] && echo "---- $(basename "$f")" && tail -n 15 "$f"
 		done
 	fi
-	# Lazily: the process that renders ends a moment after its supervisor, and has the cache open until then.
+	# Lazily: the render process ends a moment after its supervisor, and has the cache open until then.
 	[ -z "${HSLT_OWN_MOUNTS:-}" ] || umount -l "$DIR/spool" "$DIR/disk" 2>/dev/null || :
 	[ -z "${HSLT_KEEP:-}" ] || cp -r "$TOP" "$HSLT_KEEP"
 	rm -rf --one-file-system "$TOP"
@@ -60,26 +62,26 @@ skip() {
 	exit 77
 }
 
-# lacks WHAT: which deploy/setup.sh --full installs, or make builds. Where all is installed (HSLT_TEST_ALL=1: deploy/test.sh --full and
-# --ci) that is a failure.
+# lacks WHAT: skips the test, because something is missing that deploy/setup.sh --full installs or make builds. Where
+# all is installed (HSLT_TEST_ALL=1: deploy/test.sh --full and --ci) that is a failure.
 lacks() {
 	[ -z "${HSLT_TEST_ALL:-}" ] || fail "$*"
 	skip "$*"
 }
 
-# skip_part WHY: the rest is tested; tests/run.sh counts and names what is not
+# skip_part WHY: the remaining parts are tested; tests/run.sh counts and names skipped parts
 skip_part() {
 	echo "skipped in part: $*"
 }
 
-# need PROGRAM...: without them there is nothing to test
+# need PROGRAM...: without these programs the test is skipped
 need() {
 	for p in "$@"; do
 		[ -x "$BIN/$p" ] || lacks "$p is not built"
 	done
 }
 
-# For tests that run in Debians of their own.
+# For tests that run in Debian systems of their own.
 need_debians() {
 	[ "${FULL:-0}" != 0 ] || skip "downloads Debians: FULL=1, or deploy/test.sh --full"
 	command -v debootstrap >/dev/null || lacks "no debootstrap (deploy/setup.sh --full installs it)"
@@ -87,21 +89,22 @@ need_debians() {
 	unshare --mount --pid --fork true 2>/dev/null || skip "no namespaces for mounts and processes here"
 }
 
-# fresh_debian SUITE ROOT. What debootstrap mounts in it (/proc, now and then left behind) stays in a namespace of its own.
+# fresh_debian SUITE ROOT: what debootstrap mounts there (/proc, which it sometimes leaves behind) stays in a namespace
+# of its own.
 fresh_debian() {
 	unshare --mount debootstrap --variant=minbase "$1" "$2" "${HSLT_DEBIAN_MIRROR:-http://deb.debian.org/debian}" >"$DIR/debootstrap.log" 2>&1 ||
 		skip "debootstrap: $(tail -n 1 "$DIR/debootstrap.log")"
 	cp /etc/resolv.conf /etc/hosts "$2/etc/"
 }
 
-# inside ROOT COMMAND [USER]: with /proc, with the network's names, with nothing of it left afterwards
+# inside ROOT COMMAND [USER]: runs the command with /proc and with the network's names; ends all processes afterwards
 inside() {
 	unshare --mount --pid --fork --kill-child sh -c 'mount -t proc proc "$1/proc" && mount --rbind /dev "$1/dev" && exec chroot \
 		${3:+--userspec="$3"} "$1" /usr/bin/env -i PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin sh -ec "$2"' \
 		sh "$1" "$2" "${3:-}" >>"$DIR/inside.log" 2>&1
 }
 
-# code WANTED COMMAND...: its exit code; what it says is in out and err.log
+# code WANTED COMMAND...: checks the exit code; the output is in out and err.log
 code() {
 	wanted=$1
 	shift
@@ -110,7 +113,8 @@ code() {
 	[ $got -eq "$wanted" ] || fail "$* ended with $got, not $wanted: $(cat "$DIR/out" "$DIR/err.log")"
 }
 
-# until_true SECONDS COMMAND...: as long as it may take on a machine that has nothing else to do; a busy one has fifty times that
+# until_true SECONDS COMMAND...: waits for the command to succeed. SECONDS is the limit on an idle machine; a busy one
+# has fifty times that.
 until_true() {
 	tries=$(($1 * 1000))
 	shift
@@ -121,8 +125,9 @@ until_true() {
 	done
 }
 
-# free_ports COUNT: so many in a row that nobody uses, below those that the kernel gives out (from 32768); the first one is in port.
-# Tests that run at the same time look in different places: tests/run.sh runs three scripts at once, with HSLT_TEST_SLOT from 0 to 2.
+# free_ports COUNT: finds so many consecutive unused ports below those that the kernel assigns (from 32768); the first
+# one is in port. Tests that run at the same time look in different ranges: tests/run.sh runs three scripts at once,
+# with HSLT_TEST_SLOT from 0 to 2.
 free_ports() {
 	first_port=$((10000 + ${HSLT_TEST_SLOT:-0} % 3 * 7000))
 	port=$((first_port + $$ * 4 % 6000))
@@ -138,12 +143,12 @@ free_ports() {
 	fail "no $1 free ports in a row from $first_port to $((first_port + 6990))"
 }
 
-# the coordinator has read the jobs from before its restart, or is gone
+# has_read: the coordinator has read the jobs from before its restart, or has ended
 has_read() {
 	! "$BIN/hslt-status" --json 2>/dev/null | grep -q '"reading": *[0-9]'
 }
 
-# listens: the coordinator was started as $!
+# listens: waits until the coordinator, which was started as $!, listens
 listens() {
 	COORDINATOR_PID=$!
 	PIDS="$PIDS $COORDINATOR_PID"
@@ -152,7 +157,7 @@ listens() {
 	export HSLT_COORDINATOR="$COORDINATOR"
 }
 
-# listen [OPTION...]: the coordinator, at $LISTEN, or at any free port
+# listen [OPTION...]: starts the coordinator at $LISTEN, or at any free port
 listen() {
 	rm -f "$DIR/port"
 	"$BIN/hslt-coordinator" --listen "${LISTEN:-127.0.0.1:0}" --port-file "$DIR/port" --spool "$DIR/spool" \
@@ -160,7 +165,7 @@ listen() {
 	listens
 }
 
-# start_coordinator [OPTION...]: until it has read its jobs
+# start_coordinator [OPTION...]: returns once it has read its jobs
 start_coordinator() {
 	listen "$@"
 	until_true 60 has_read || fail "the coordinator does not read its jobs"
@@ -179,8 +184,9 @@ build_id() {
 	LC_ALL=C readelf -n "$1" | sed -n 's/.*Build ID: //p'
 }
 
-# start_faulty_worker NAME FAULTS [OPTION...]: a worker with the faults that FAULTS lists (faulty_worker.c). If its build id differs
-# from hslt-worker's, so does its numeric fingerprint, and it would never get a lease of a job that hslt-worker has begun.
+# start_faulty_worker NAME FAULTS [OPTION...]: starts a worker with these faults (faulty_worker.c). If its build id
+# differed from hslt-worker's, so would its numeric fingerprint, and it would never get a lease of a job that
+# hslt-worker has begun.
 start_faulty_worker() {
 	name=$1 faults=$2
 	shift 2
@@ -192,13 +198,13 @@ start_faulty_worker() {
 	PIDS="$PIDS $WORKER"
 }
 
-# renders PID: the process of that worker that renders, once there is one; the worker itself only sees to it
+# renders PID: prints the process that renders for this worker, once there is one; the worker itself only supervises it
 renders() {
 	until_true 30 grep -q . "/proc/$1/task/$1/children" || fail "worker $1 starts no process that renders" >&2
 	tr -d ' ' <"/proc/$1/task/$1/children"
 }
 
-# stop PID...: by SIGTERM, and waits; its exit code is in CODE
+# stop PID...: sends SIGTERM, and waits; the exit code is in CODE
 stop() {
 	for p in "$@"; do
 		kill "$p"
@@ -212,13 +218,13 @@ submit() {
 	"$BIN/hslt-submit" "$@" 2>>"$DIR/submit.log"
 }
 
-# value JOB KEY: a number or a word of the job's JSON; the first of that name that is one
+# value JOB KEY: prints a number or a word of the job's JSON; the first one of that name
 value() {
 	"$BIN/hslt-status" --json "$1" 2>/dev/null | grep -o '"'"$2"'":"\{0,1\}[^",{}]*' | sed -n 's/^[^:]*:"\{0,1\}\(..*\)/\1/p' |
 		head -n 1
 }
 
-# is_beyond JOB PROGRESS
+# is_beyond JOB PROGRESS: the job's progress exceeds PROGRESS
 is_beyond() {
 	awk -v a="$(value "$1" progress)" -v b="$2" 'BEGIN { exit !(a + 0 >= b + 0) }'
 }
@@ -227,7 +233,7 @@ is_state() {
 	[ "$(value "$1" state)" = "$2" ]
 }
 
-# write_table NAME FILE: its rows into README.md, between the marks of that name
+# write_table NAME FILE: writes the rows into README.md, between the marks of that name
 write_table() {
 	{
 		sed "/<!-- $1 -->/q" "$HERE/README.md"
@@ -237,7 +243,7 @@ write_table() {
 	cat "$TOP/readme.new" >"$HERE/README.md"
 }
 
-# same A B: every bit of every pixel, and the header but for what may differ
+# same A B: compares every bit of every pixel, and the header except for fields that may differ
 same() {
 	"$BIN/hslt-compare" --exact "$1" "$2" || fail "$1 and $2 differ"
 }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Where numbers have commas the build makes the same tables of its data.
+# In a locale with decimal commas the build makes the same tables from its data.
 . "$(dirname "$0")/lib.sh"
 ROOT=$HERE/../..
 TABLES="cie_observer cie_d65 wavelength_cells wavelength_guide conductors"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# A worker's cache is removed while it runs, as whoever empties ~/.cache does: it is made again, and jobs go on.
+# A worker's cache is removed while it runs, as by a user who empties ~/.cache: it is created again, and jobs go on.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-compare
 
@@ -16,7 +16,7 @@ for kind in slot all; do
 done
 [ "$(grep -c 'the cache was removed: it is made anew' "$DIR/w.log")" -eq 2 ] || fail "the worker does not say what happened"
 
-# Its place is still its own: another worker takes the next one.
+# The worker still owns its place in the cache: another worker takes the next one.
 start_worker second
 until_true 10 test -d "$DIR/cache/slot-1" || fail "two workers use one slot"
 stop $WORKER

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# A coordinator whose spool is gone gives numbers out again. A worker that still has something of the old j1 must not take the new
-# j1 for it: neither its world nor its results count, and it is not blamed for them.
+# A coordinator whose spool was lost assigns the same job numbers again. A worker that still has data of the old j1 must
+# not mistake the new j1 for it: neither its world nor its results are used, and it is not blamed for them.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-render hslt-compare
 JOB="--integrator hslt --bootstrap 8000 --mutations 400000 --chains 64"

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Manifests against the models that Kubernetes' Python client has from the published API, field by field, and against
-each other and the programs' options. manifests.py PROGRAMS FILE...; prints what is wrong; exit code 1 if anything is.
-manifests.py --hook FILE prints the workers' preStop command, a word a line."""
+"""Checks manifests, field by field, against the models of the published API in Kubernetes' Python client, against each
+other, and against the programs' options. manifests.py PROGRAMS FILE...; prints the errors; exit code 1 if there are any.
+manifests.py --hook FILE prints the workers' preStop command, one word per line."""
 import copy
 import re
 import subprocess
@@ -12,12 +12,12 @@ import yaml
 from kubernetes import client
 
 NAME = re.compile(r"[a-z0-9]([a-z0-9-]{0,61}[a-z0-9])?")
-SECRETS = set()  # that the commands in the files' comments make
+SECRETS = set()  # those created by the commands in the files' comments
 QUANTITY = re.compile(r"[0-9]+(\.[0-9]+)?(m|k|M|G|T|Ki|Mi|Gi|Ti)?")
 
 
 class Loader(yaml.SafeLoader):
-    """YAML without keys that are given twice."""
+    """Reads YAML, and refuses duplicate keys."""
 
     def construct_mapping(self, node, deep=False):
         keys = [self.construct_object(k, deep=True) for k, _ in node.value]
@@ -54,7 +54,7 @@ def check_value(value, kind, where, wrong):
     elif kind in SIMPLE:
         if not isinstance(value, SIMPLE[kind]) or (isinstance(value, bool) and kind != "bool"):
             wrong.append("%s: %r is no %s" % (where, value, kind))
-    elif kind == "object":  # an integer or a text
+    elif kind == "object":  # an integer or a string
         if isinstance(value, bool) or not isinstance(value, (int, str)):
             wrong.append("%s: %r is neither a number nor a text" % (where, value))
     else:
@@ -74,7 +74,7 @@ def check_model(value, model, where, wrong):
         given[names[key]] = v
         check_value(v, model.openapi_types[names[key]], where + "." + key, wrong)
     try:
-        model(**given)  # refuses what lacks required fields, or has values that are not in a list
+        model(**given)  # refuses missing required fields, and values that are not in a list
     except ValueError as e:
         wrong.append("%s: %s" % (where, e))
 
@@ -89,7 +89,7 @@ def check_fields(docs, wrong):
             check_model(d, model, kind, wrong)
 
 
-# ---- one against the other ----
+# ---- one document against another ----
 
 def dig(value, *keys, default=None):
     for k in keys:
@@ -102,7 +102,7 @@ def matches(selector, labels):
 
 
 def check_tls(where, pod, c, docs, wrong):
-    """What HSLT_TLS names is a Secret that must be there, for the pod's group and nobody else."""
+    """HSLT_TLS must name a Secret that is required and readable by the pod's group only."""
     if "--insecure" in c["args"]:
         wrong.append("%s: is insecure" % where)
     settings = {}
@@ -206,7 +206,7 @@ def check_sense(docs, options, wrong):
 
 
 def check_port(docs, chosen, wrong):
-    """The one port: where the coordinator listens, its container's, the service's, the policy's, and whom workers call."""
+    """One port must be named everywhere: by the coordinator, its container, the service, the policy, and the workers."""
     service = [d for d in docs if d["kind"] == "Service"][0]
     behind = chosen(service["spec"]["selector"])
     if len(behind) != 1:
@@ -235,7 +235,7 @@ def verdict(docs, options):
 # ---- faults that must be found ----
 
 def faults(docs):
-    """Each changes a copy of the documents in one place."""
+    """Returns functions that each change a copy of the documents in one place."""
     def one(kind, name):
         return lambda ds: find(ds, kind, name)[0]
 

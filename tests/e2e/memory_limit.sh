@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-# Too little memory (ulimit -v, RLIMIT_AS) ends a worker with a message, or keeps it from a job: no signal ends its process, and no
-# job fails for it.
+# Too little memory (ulimit -v, RLIMIT_AS) makes a worker exit with a message, or return the leases of a job: no signal
+# ends its process, and no job fails because of it.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit
 nm "$BIN/hslt-worker" 2>/dev/null | grep -q '__asan_init\|__tsan_init' && skip "sanitizers need terabytes of addresses"
 
-# limited KILOBYTES NAME: a worker that gives up where there is no work
+# limited KILOBYTES NAME: a worker with that limit, which exits when there is no work
 limited() {
 	(
 		ulimit -v "$1"
@@ -16,7 +16,7 @@ limited() {
 start_coordinator
 id=$(submit "$BOX" -o "$DIR/box.exr" --integrator path --spp 1 --size 16x12)
 refused=0 kept=0
-# From too little for the program's libraries to enough for it to connect; only what lies between is of interest.
+# From too little for the program's libraries to enough for connecting; only the range in between is of interest.
 for kb in 84000 92000 100000 108000 112000 116000 120000 124000 130000 140000; do
 	code=0
 	limited $kb "w$kb" || code=$?

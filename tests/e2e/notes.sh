@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# What an image's counters give reason to say: black scenes and chains that do not move, alone and on a farm.
+# Notes that follow from an image's counters: black scenes and chains that do not move, in hslt-render and on a farm.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-render hslt-compare
 
@@ -7,12 +7,13 @@ BLACK="-D light=0 --integrator pssmlt --spp 16 --target-error 2%"
 NO_LIGHT="-D light=0 --integrator path --size 16x16 --target-error 2%"
 STUCK="--integrator pssmlt --bootstrap 16384 --epoch 2 --mutations 640"
 
-# noted FILE WORDS
+# noted FILE WORDS: checks that the note is in the file
 noted() {
 	grep -q "note: .*$2" "$1" || fail "it does not say '$2': $(cat "$1")"
 }
 
-# Ended in the pilot, which takes seconds for a render of an hour: at once, by the signal, and it says so.
+# Interrupted in the pilot, which takes seconds for a render of an hour: the program ends at once, by the signal, and
+# says so.
 "$BIN/hslt-render" "$HERE/../scenes/demo/scene.xml" -o "$DIR/pilot.exr" --time 1h 2>"$DIR/pilot.log" &
 pilot=$!
 PIDS="$PIDS $pilot"
@@ -21,7 +22,7 @@ stop $pilot
 [ $CODE = 143 ] && grep -q 'interrupted before rendering began' "$DIR/pilot.log" && ! grep -q 'chosen by a pilot' "$DIR/pilot.log" ||
 	fail "ended in its pilot: $CODE, $(cat "$DIR/pilot.log")"
 
-# Ended in its first round: no image is written, and nothing is said of one; the bootstrap is there for the same command.
+# Interrupted in its first round: no image is written or mentioned; the bootstrap is kept for the same command.
 EARLY="--integrator path --size 64x64 --epoch 512 --spp 65536 --threads 1" # of many threads all leases of a round end at once
 "$BIN/hslt-render" "$BOX" -o "$DIR/early.exr" $EARLY 2>"$DIR/early.log" &
 early=$!
@@ -40,7 +41,7 @@ until_true 60 grep -q 'continues from \([0-9]*\) of \1 leases of the bootstrap' 
 stop $early
 [ $CODE = 1 ] || fail "the second time it ended with $CODE"
 
-# The end of a terminal, which may tell twice, is an end as by SIGTERM; not where SIGHUP is ignored.
+# SIGHUP when a terminal closes, which may come twice, acts like SIGTERM, but not if SIGHUP is ignored.
 ticks() { # of processor time that $hup has used
 	sed 's/.*) //' "/proc/$hup/stat" | awk '{ print $12 + $13 }'
 }
@@ -68,7 +69,7 @@ kill -0 $hup 2>/dev/null || fail "ignored, SIGHUP ends it: $(cat "$DIR/hup.log")
 stop $hup
 [ $CODE = 1 ] && [ -s "$DIR/hup.exr" ] || fail "SIGTERM after SIGHUP: $CODE, $(cat "$DIR/hup.log")"
 
-# What stops it is named as the command line has it.
+# The bound that stops a render is named as on the command line.
 "$BIN/hslt-render" "$BOX" -o "$DIR/ends.exr" --size 8x8 -i path --spp 4 2>"$DIR/ends.log" && grep -q 'stopped by: --spp$' "$DIR/ends.log" ||
 	fail "--spp: $(cat "$DIR/ends.log")"
 "$BIN/hslt-render" "$BOX" -o "$DIR/ends.exr" --size 8x8 -i path 2>"$DIR/ends.log" && grep -q "stopped by: the scene's samples per pixel" "$DIR/ends.log" ||
@@ -80,7 +81,7 @@ sed 's/"independent"/"stratified"/; s|filename" value="|&scenes/box/|' "$BOX" >"
 code 2 "$BIN/hslt-render" "$BOX" -o "$DIR/ends.exr" --json
 grep -q -- '--json requires --estimate or --explain' "$DIR/err.log" || fail "--json: $(cat "$DIR/err.log")"
 
-# One group has no error: that is said, and nothing prints a number that is none.
+# One group gives no error: that is said, and no number is printed that is none.
 for one in "--integrator path --spp 1" "--integrator pssmlt --spp 16 --groups 1"; do
 	"$BIN/hslt-render" "$BOX" -o "$DIR/one.exr" --size 16x16 $one --stats "$DIR/one.json" 2>"$DIR/one.log" || fail "$one: ended with $?"
 	grep -q 'warning: relative error not known: a single group of samples gives no error; use --spp 2' "$DIR/one.log" || fail "$one: $(cat "$DIR/one.log")"
@@ -95,7 +96,7 @@ noted "$DIR/deep.log" 'chains of pssmlt hold paths of up to 32 edges'
 "$BIN/hslt-render" "$BOX" -o "$DIR/deep.exr" --size 8x8 -i pssmlt --max-depth 32 --spp 16 2>"$DIR/deep.log" || fail "deep: ended with $?"
 ! grep -q 'hold paths' "$DIR/deep.log" || fail "32 edges are too many: $(cat "$DIR/deep.log")"
 
-# A sphere whose wall shines and reflects 99 %: 0.99^128 of its light takes more edges than are simulated.
+# The wall of this sphere emits and reflects 99 %: 0.99^128 of its light takes more edges than are simulated.
 cat >"$DIR/bright.xml" <<-'XML'
 	<scene version="3.0.0"><integrator type="path"/>
 	<sensor type="perspective"><transform name="to_world"><lookat origin="0,0,0" target="0,0,1" up="0,1,0"/></transform></sensor>
@@ -107,7 +108,7 @@ XML
 	fail "the bright sphere: ended with $?"
 noted "$DIR/bright.log" '2[789] % of the light is missing: it comes by paths of more edges than are simulated'
 
-# If its inside, which is all that the camera sees, is a back, what checks and what submits says so.
+# If the inside, which is all that the camera sees, is a back face, hslt-scene check and hslt-submit say so.
 sed 's/<boolean name="flip_normals" value="true"\/>//' "$DIR/bright.xml" >"$DIR/back.xml"
 words='100 % of the surfaces that the camera sees are black backs'
 "$BIN/hslt-scene" check "$DIR/back.xml" >"$DIR/back.log" 2>&1 || fail "hslt-scene: the back: ended with $?"
@@ -118,7 +119,8 @@ start_worker w1
 "$BIN/hslt-submit" "$DIR/back.xml" -o "$DIR/back.exr" --integrator path --size 16x16 --spp 1 >/dev/null 2>"$DIR/back.log" ||
 	fail "hslt-submit: the back: ended with $?"
 noted "$DIR/back.log" "$words"
-# What the reader ignores or replaces is in the log, the status and the header, and both programs write the same.
+# Parts of a scene that the reader ignores or replaces are in the log, the status and the header, and both programs
+# write the same.
 cat >"$DIR/fork.xml" <<-'XML'
 	<scene version="3.0.0"><sensor type="perspective"/><emitter type="constant"/><integrator type="path"/>
 	<shape type="sphere"><bsdf type="irawan"/></shape>
@@ -160,7 +162,7 @@ for kind in black no_light stuck; do # no_light: it would never have the error t
 done
 [ "$(value "$(cat "$DIR/id")" stuck)" -gt 0 ] || fail "no count of them"
 "$BIN/hslt-status" --json "$(cat "$DIR/id")" | grep -q '"strategies":\[\]' || fail "pssmlt has no strategies"
-# The counts outlive the coordinator.
+# The counts survive the coordinator.
 stop $COORDINATOR_PID
 LISTEN=$COORDINATOR
 start_coordinator

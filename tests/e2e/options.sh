@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-# What programs print of their options: --help, the manual page and the completion of bash name the same ones, each once; a mistyped
-# option gets the nearest name; the commands in the documents have no other options.
+# Options as programs print them: --help, the manual page and bash's completion have the same options, each once; a
+# mistyped option gets the nearest name; commands in the documents use only existing options.
 . "$(dirname "$0")/lib.sh"
 PROGRAMS="accuracy assemble ca compare coordinator job render scene status submit tonemap worker"
 need $(for p in $PROGRAMS; do echo "hslt-$p"; done)
 
-# Asks the completion for each option of a list, and for its beginnings up to three letters.
+# Asks the completion for each option of a list, and for its prefixes up to three letters.
 cat >"$DIR/complete.bash" <<'END'
 . "$1" || exit 1
 complete -p "$2" >/dev/null || exit 1
@@ -23,7 +23,7 @@ ask "$2" --no-such-option
 [[ ${#COMPREPLY[@]} = 0 ]] || { echo "--no-such-option: ${COMPREPLY[*]}"; exit 1; }
 END
 
-# Program and option of each command in a document: in a block of code, or between backticks.
+# Prints program and option of each command in a document, in a block of code or between backticks.
 cat >"$DIR/commands.awk" <<'END'
 /^ *```/ { fence = !fence; next }
 {
@@ -117,7 +117,7 @@ for days in 0.4s 0.00001; do
 done
 HSLT_CA=$DIR/units.ca code 0 "$BIN/hslt-ca" client brief --days 30m
 grep -q "valid for 30 min only" "$DIR/err.log" || fail "--days 30m: $(cat "$DIR/err.log")"
-# These end before they do anything, at the last option.
+# These commands fail at their last option, before they do anything.
 code 2 "$BIN/hslt-coordinator" --spool "$DIR/none" --blobs 20G --journal 64MB --film-memory 2g --keep-films 500M --keep-days 36h \
 	--keep-gb 1.5T --worker-bandwidth 500k --quota-jobs 1k --quota-assets 10G --quota-film 2G --quota-mutations 1.5G --heartbeat 1m \
 	--tls-check 5m --connections 2k --max-faults .1k --stop
@@ -131,7 +131,7 @@ grep -q "unknown option '--stop'" "$DIR/err.log" || fail "units of hslt-job: $(c
 code 2 "$BIN/hslt-submit" --patience 5m --pilot 1m --chains 1k --groups .016k --parts .004k --epoch 1k --bootstrap 1M --min-depth .002k --stop
 grep -q "unknown option '--stop'" "$DIR/err.log" || fail "units of hslt-submit: $(cat "$DIR/err.log")"
 
-# answered NAME COMMAND...: an error whose answer is that name
+# answered NAME COMMAND...: the error message suggests that name
 answered() {
 	meant=$1
 	shift

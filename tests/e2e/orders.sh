@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# What is ordered of jobs that are there: hold, release, priority; and all of it after kill -9 of the coordinator.
+# Orders to existing jobs: hold, release, priority, extend; and all of them again after kill -9 of the coordinator.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-compare
 
@@ -7,7 +7,7 @@ job() {
 	"$BIN/hslt-job" "$@"
 }
 
-# refused CODE TEXT COMMAND...
+# refused CODE TEXT COMMAND...: checks exit code and message
 refused() {
 	want=$1
 	text=$2
@@ -137,7 +137,7 @@ done_in 60 "$f"
 job fetch "$f" -o "$DIR/tighter.exr"
 same "$DIR/tighter.exr" "$DIR/target.exr"
 
-# what went wrong is counted over restarts and ends
+# faults are counted across restarts and the job's ends
 start_faulty_worker twice repeat
 until_true 10 grep -q 'event=peer_hello.*name="twice"' "$DIR/coordinator.log" || fail "the second worker does not come"
 h=$(submit "$BOX" -o "$DIR/h.exr" --integrator path --spp 500)
@@ -158,7 +158,7 @@ job extend "$h" --spp +100
 repeated "$h" "$count" || fail "$h had $count repeats, and when it goes on $(value "$h" repeats)"
 done_in 60 "$h"
 
-# an extension that is cancelled leaves the finished job, also where the coordinator is killed at once
+# an extension that is cancelled leaves the finished job, also if the coordinator is killed at once
 i=$(submit "$BOX" -o "$DIR/i.exr" $CHAINS --spp 100)
 done_in 60 "$i"
 first=$(value "$i" rounds)
@@ -175,7 +175,7 @@ job extend "$i" --spp +100
 done_in 60 "$i"
 until_true 60 more_rounds "$i" "$first" || fail "$i does not go on after a cancelled extension"
 
-# what cannot be said yes to
+# orders that must be refused
 g=$(submit "$BOX" -o "$DIR/g.exr" --integrator path --spp 20000)
 job cancel "$g"
 refused 1 'has been cancelled, and nothing of it was kept: submit it again' job extend "$g" --spp +8

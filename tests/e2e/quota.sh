@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# A quota of live jobs while the coordinator is killed among submissions and cancellations: never more jobs than it allows, and what has
-# ended gives its place back, also where nobody was told.
+# A quota of live jobs while the coordinator is killed among submissions and cancellations: there are never more jobs
+# than it allows, and an ended job frees its place, even if nobody was told of the end.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-submit hslt-job
 
@@ -11,7 +11,7 @@ live() {
 one() {
 	"$BIN/hslt-submit" "$BOX" -o "$DIR/no.exr" --integrator path --spp 4 >>"$DIR/ids" 2>>"$DIR/submit.log"
 }
-# kill_within SECONDS: and starts it again, on the same spool
+# kill_within SECONDS: kills the coordinator and starts it again on the same spool
 kill_within() {
 	sleep "$1"
 	kill -9 $COORDINATOR_PID
@@ -32,7 +32,7 @@ for pause in 0.03 0.08 0.15; do
 		wait "$p" || :
 	done
 	[ "$(live)" -le $MOST ] || fail "$(live) jobs live, where $MOST may: $("$BIN/hslt-job" list)"
-	# What is left of the quota can be had, and no more.
+	# The remaining quota can be used, and no more.
 	left=$((MOST - $(live)))
 	while [ $left -gt 0 ]; do
 		one || fail "refused with $(live) live jobs: $(tail -n 1 "$DIR/submit.log")"
@@ -41,7 +41,7 @@ for pause in 0.03 0.08 0.15; do
 	[ "$(live)" = $MOST ] || fail "$(live) jobs live, not $MOST: $("$BIN/hslt-job" list)"
 	code 6 "$BIN/hslt-submit" "$BOX" -o "$DIR/no.exr" --integrator path --spp 4
 	grep -q "quota: at most $MOST live jobs" "$DIR/err.log" || fail "not refused by the quota: $(cat "$DIR/err.log")"
-	# Who was told that a job was taken finds it.
+	# A client that was told that its job was accepted finds the job.
 	while read -r id; do
 		"$BIN/hslt-job" list | grep -q "^$id " || fail "$id is gone"
 	done <"$DIR/ids"

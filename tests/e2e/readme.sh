@@ -1,7 +1,8 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
-# Every command of the ```sh blocks of the README and of docs/, in order, as a reader would type them; in a folder of its own and at a port of
-# its own. The two commands above them are tests of their own: demo.sh here, and the run that this is part of.
+# Runs every command of the ```sh blocks of the README and of docs/ in order, as a reader would type them, in a folder
+# and at a port of its own. The two commands above these blocks have tests of their own: demo.sh, and the run that this
+# test belongs to.
 . "$(dirname "$0")/lib.sh"
 need hslt-ca hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-render hslt-compare hslt-tonemap
 ROOT=$(cd "$HERE/../.." && pwd)
@@ -9,13 +10,13 @@ for command in deploy/demo.sh deploy/test.sh deploy/workers.sh; do
 	cat "$ROOT/README.md" "$ROOT/docs/farm.md" | grep -q "sh $command" && [ -f "$ROOT/$command" ] || fail "$command is not both in the README or docs/farm.md and there"
 done
 head -n 9 "$ROOT/README.md" | grep -q '](docs/compatibility.md)' || fail "the README does not begin with what is supported"
-# Links of the first pages lead somewhere.
+# Links of the first pages lead to existing targets.
 for page in "$ROOT/README.md" "$ROOT"/docs/*.md; do
 	for link in $(grep -o '](\([^)#]*\)' "$page" | sed 's/^](//' | grep -v '^http' | sort -u); do
 		[ -e "$(dirname "$page")/$link" ] || fail "$page: there is no $link"
 	done
 done
-# What deploy/README.md names is there.
+# Files that deploy/README.md names exist.
 for f in $(grep -o '`[a-z]*/`\|tests/e2e/[a-z]*\.sh\|deploy/[a-z]*/*[A-Za-z]*\.[a-z]*' "$ROOT/deploy/README.md" | tr -d '`' | sort -u); do
 	[ -e "$ROOT/$f" ] || [ -e "$ROOT/deploy/$f" ] || fail "deploy/README.md: there is no $f"
 done
@@ -30,7 +31,7 @@ ln -s "$(cd "$BIN" && pwd)" "$DIR/home/build/bin"
 	echo 'RUNNING='
 	echo "trap 'code=\$?; kill \$RUNNING; wait; exit \$code' EXIT"
 	echo 'answers() { for k in $(seq 600); do ! hslt-job "$@" list >/dev/null 2>&1 || return 0; sleep 0.1; done; false; }'
-	# make has nothing left to do here, but it must agree. By hand there is time between two lines; here it is waited for.
+	# make has nothing to build here, but must not fail. A reader pauses between two lines; here the test waits.
 	awk '/^```sh$/ { on = 1; next } /^```$/ { on = 0 } on' "$ROOT/README.md" "$ROOT"/docs/*.md |
 		sed -e "s/7700/$port/g" -e "s|^make -s\$|make -s -C '$ROOT' programs|" -e 's/ &$/ \& RUNNING="$RUNNING $!"/' \
 			-e "/name two /a answers --coordinator 127.0.0.1:$port" \

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-# The releases of Debian that the README names, each fresh, with its updates: setup, build, unit tests of what reads files through
-# other libraries, the README's own scene and its first farm. Their compilers and libraries are others than those the project is
-# written with (expat 2.9 of Debian 13 once ended the build). Minutes and downloads: only with FULL=1, as by deploy/test.sh --full.
+# The Debian releases that the README names, each freshly installed and updated: setup, build, unit tests of the code
+# that reads files through other libraries, the README's scene and its first farm. Their compilers and libraries differ
+# from those of the daily tests (expat 2.9 of Debian 13 once broke the build). Takes minutes and downloads: runs only
+# with FULL=1, as by deploy/test.sh --full.
 . "$(dirname "$0")/lib.sh"
 need_debians
 TREE=$(cd "$HERE/../.." && pwd)
@@ -9,7 +10,7 @@ for suite in bookworm trixie; do
 	ROOT=$DIR/$suite
 	: >"$DIR/inside.log"
 	fresh_debian $suite "$ROOT"
-	# debootstrap knows no updates; security is where libraries get new versions.
+	# debootstrap installs no updates; libraries get new versions from the security archive.
 	echo "deb http://deb.debian.org/debian-security $suite-security main" >>"$ROOT/etc/apt/sources.list"
 	mkdir "$ROOT/tree"
 	(cd "$TREE" && git ls-files -z | xargs -0 cp --parents -t "$ROOT/tree")

@@ -17,7 +17,7 @@ same "$DIR/once.exr" "$DIR/twice.exr"
 [ "$(value "$id" repeats)" -gt 0 ] || [ "$(value "$id" refused)" -gt 0 ] || fail "nothing was repeated"
 grep -q 'event=batch_repeated' "$DIR/coordinator.log" || fail "no repeat in the log"
 [ "$(ls "$DIR/partials" | wc -l)" -eq $((2 * tiles)) ] || fail "a repeated tile was written down, too"
-# The image on stdout, and the id not.
+# The image goes to stdout, and the id does not.
 "$BIN/hslt-submit" "$BOX" -o - $JOB --wait >"$DIR/stdout.exr" 2>"$DIR/err.log" || fail "-o - ended with $?: $(cat "$DIR/err.log")"
 same "$DIR/once.exr" "$DIR/stdout.exr"
 grep -q '^j[0-9]*$' "$DIR/err.log" || fail "-o - does not say the id: $(cat "$DIR/err.log")"

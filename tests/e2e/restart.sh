@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# The coordinator killed with -9 again and again, in the bootstrap, between rounds and just after an acknowledgement, with a job
-# of chains, one of samples and one with a target error under way: all go on where they were, nothing counts twice, the bits
-# are those of quiet runs.
-# SEED=N repeats the moments of a run, KILLS=N changes how many there are.
+# The coordinator is killed with -9 again and again, in the bootstrap, between rounds and just after an acknowledgement,
+# while a job of chains, one of samples and one with a target error run: all continue where they were, no result counts
+# twice, and the bits are those of undisturbed runs. SEED=N repeats the moments of a run, KILLS=N sets their number.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-compare
 
@@ -26,7 +25,7 @@ again() {
 	killed=$((killed + 1))
 }
 
-# until a checkpoint is being written, or no more than a moment
+# waits until a checkpoint is being written, or for a moment at most
 writing() {
 	tries=400000
 	while [ $tries -gt 0 ] && ! [ -e "$DIR/spool/jobs/$a/checkpoint.tmp" ] && ! [ -e "$DIR/spool/jobs/$b/checkpoint.tmp" ]; do
@@ -39,7 +38,7 @@ is_merging() {
 	[ "$(tail -n +"$seen" "$DIR/coordinator.log" | grep -c event=batch_merged)" -ge "$1" ] || is_state "$a" done
 }
 
-# leases that are merged, and those that were acknowledged in all runs
+# leases that are merged, and leases that were acknowledged in all runs
 merged() {
 	value "$1" merged
 }
@@ -98,7 +97,7 @@ same "$DIR/target-quiet.exr" "$DIR/target.exr"
 new=$(submit "$BOX" -o "$DIR/new.exr" --integrator path --spp 1)
 [ "$new" = j7 ] || fail "the next job is $new, not j7"
 
-# What is stored is damaged: the job says so, begins anew, and the bits are the same.
+# Stored data is damaged: the job says so, begins anew, and the bits are the same.
 d=$(submit "$BOX" -o "$DIR/damaged.exr" $SAMPLES)
 until_true 20 test -e "$DIR/spool/jobs/$d/checkpoint" || fail "no checkpoint of $d"
 kill -9 $COORDINATOR_PID

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# tests/run.sh counts and names what was skipped, as a whole and in part, and what failed; where everything is installed a test that
-# lacks something fails. A run that is ended leaves nothing. A test ends by the processor time that it uses, or when it has long been
-# idle; not because a machine is busy.
+# tests/run.sh counts and names skipped tests, skipped parts of tests, and failed tests; where everything is installed a
+# test that lacks something fails. An interrupted run leaves no process behind. The time limit of a test is its
+# processor time, or a long time without any: a test does not fail because the machine is busy.
 . "$(dirname "$0")/lib.sh"
 LIMIT=$BUILD/tests/limit/limit
 [ -x "$LIMIT" ] || lacks "$LIMIT is not built"
@@ -82,7 +82,7 @@ skipped: one/test_one: wet: no rain
 TEXT
 [ $CODE -eq 1 ] || fail "two tests of a program failed: $CODE"
 
-# A run that is ended ends its tests, whose processes hold the other end of a pipe, and begins no others.
+# An interrupted run ends its tests, whose processes hold the other end of a pipe, and starts no others.
 mkdir -p "$DIR/slow/tests/one" "$DIR/tmp"
 cp -r "$DIR/build/tests/limit" "$DIR/slow/tests/"
 for i in 1 2 3; do
@@ -100,7 +100,8 @@ chmod +x "$DIR"/slow/tests/one/*
 [ -z "$(ls "$DIR/tmp")" ] || fail "a run that was ended leaves $(ls "$DIR/tmp")"
 rm "$DIR/code"
 
-# limited CPU IDLE CODE SAID SCRIPT [ARGUMENT...]: how it ends, and that nothing of it is left: its processes hold the other end of a pipe
+# limited CPU IDLE CODE SAID SCRIPT [ARGUMENT...]: checks how the script ends, and that none of its processes is left:
+# they hold the other end of a pipe
 limited() {
 	wanted=$3 said=$4 CODE=0
 	cpu=$1 idle=$2
@@ -113,14 +114,14 @@ limited() {
 limited 60 60 3 yes 'echo yes; exit 3'
 limited 60 60 137 yes 'echo yes; kill -9 $$'
 limited 1 60 124 'has used the processor' 'while :; do :; done'
-# Also what it started and no longer waits for, and the sum of many that are short.
+# Counts also processes that the test no longer waits for, and the sum of many short ones.
 limited 1 60 124 'has used the processor' 'setsid sh -c "(while :; do :; done) & exec sleep 1000" & wait'
 limited 1 60 124 'has used the processor' 'while :; do dd if=/dev/zero of=/dev/null bs=1M count=2000 2>/dev/null; done'
 limited 60 2 124 'has been idle' 'sleep 1000'
 limited 60 2 124 'has been idle' 'trap "" TERM; while :; do sleep 0.2; done & wait'
 limited 60 2 124 'has been idle' 'kill -STOP $$'
 limited 60 2 0 last 'for i in 1 2 3 4 5 6; do echo $i; sleep 0.7; done; echo last'
-# On a processor that another one takes, for three times as long as it may be idle: 30 ms of work a second, if that much.
+# On a processor that another process occupies, for three times the idle limit: about 30 ms of work per second, or less.
 one=$(taskset -cp $$ | sed 's/.*: //; s/[-,].*//')
 taskset -c "$one" timeout 6 sh -c 'while :; do :; done' &
 limited 60 2 0 done 'exec taskset -c "$0" chrt --idle 0 sh -c "i=0; while [ \$i -lt 300000 ]; do i=\$((i + 1)); done; echo done"' "$one"

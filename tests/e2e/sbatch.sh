@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# deploy/slurm/farm.sbatch without Slurm and without a farm: programs that end as they are told. What its exit code is, and when the
-# spool goes: with the image, with a job that failed, or when there is none in it. tests/e2e/slurm.sh has the real ones.
+# deploy/slurm/farm.sbatch without Slurm and without a farm: stub programs end as they are told. Checks the exit code of
+# the script, and when it deletes the spool: with the image, with a job that failed, or if there is no job in it.
+# tests/e2e/slurm.sh uses the real programs.
 . "$(dirname "$0")/lib.sh"
 command -v bash >/dev/null || skip "no bash"
 SBATCH=$(cd "$HERE/../../deploy/slurm" && pwd)/farm.sbatch
@@ -8,7 +9,7 @@ PROGRAMS=$DIR/programs
 mkdir "$PROGRAMS" "$DIR/shared" "$DIR/tmp"
 export DIR
 
-# program NAME: a script, on stdin
+# program NAME: installs the script on stdin under that name
 program() {
 	{
 		echo '#!/bin/sh'
@@ -24,17 +25,17 @@ program srun <<'TEXT'
 while [ "$1" != sh ]; do shift; done
 exec "$@"
 TEXT
-# Ends the workers; with AGAIN the script hears another signal meanwhile.
+# Ends the workers; with AGAIN the script gets another signal meanwhile.
 program scancel <<'TEXT'
 [ -z "$AGAIN" ] || kill -TERM $PPID
 kill -TERM "$(cat "$DIR/worker.pid")"
 TEXT
-# What is somebody else's cannot be removed.
+# Files of another owner cannot be removed.
 program rm <<'TEXT'
 case "$*" in *"$DIR/tmp/hslt-farm-7.0") [ -z "$FOREIGN" ] || exit 1 ;; esac
 exec /bin/rm "$@"
 TEXT
-# While the coordinator is slow a second is short.
+# While the coordinator is slow to start, a second of sleep is short.
 program sleep <<'TEXT'
 echo "$1" >>"$DIR/naps"
 [ "$(wc -l <"$DIR/naps")" -ge "${NAPS:-0}" ] && exec /bin/sleep "$1"
@@ -59,7 +60,7 @@ p=$!
 echo $$ >"$DIR/worker.pid"
 wait
 TEXT
-# list_of STATE CODE RESULT: hslt-job's answer
+# list_of STATE CODE RESULT: prints hslt-job's answer
 cat >"$DIR/list_of" <<'TEXT'
 printf '[\n  {\n    "id": "j1",\n    "state": "%s",\n    "exitCode": %s,\n    "result": %s\n  }\n]\n' "$@" >"$DIR/list"
 TEXT
@@ -93,7 +94,7 @@ export PATH="$PROGRAMS:$PATH" TMPDIR="$DIR/tmp" HSLT_SPOOL="$DIR/shared" HSLT_GR
 export SUBMIT=0 FETCH=0 JOB= NAPS= LIST_DIES= THEN= AGAIN= FOREIGN=
 unset HSLT_BIN HSLT_CA HSLT_INSECURE SLURM_CPUS_PER_TASK
 
-# run_batch CODE SPOOL [NAME=VALUE...]: what it ends with, and whether the spool is "kept" or "gone"
+# run_batch CODE SPOOL [NAME=VALUE...]: checks the exit code, and whether the spool is "kept" or "gone"
 run_batch() {
 	wanted=$1 spool=$2
 	shift 2
@@ -118,7 +119,7 @@ says() {
 	grep -q -- "$1" "$DIR/sbatch.log" || fail "it does not say '$1'"
 }
 
-# first: no job in the spool yet; next STATE CODE RESULT: an earlier start left one
+# first: there is no job in the spool yet; next STATE CODE RESULT: an earlier start left one
 first() {
 	echo '[]' >"$DIR/list"
 	run_batch "$@"
@@ -136,7 +137,8 @@ for code in 0 4 5; do
 done
 first 3 gone SUBMIT=3 JOB="failed 3 false"
 first 2 gone SUBMIT=2
-# Rendered, but it cannot be written; refused, or not there, with a job in the spool.
+# The image is rendered but cannot be written; or hslt-submit is refused, or finds no coordinator, with a job in the
+# spool.
 for code in 1 6 75; do
 	first $code kept SUBMIT=$code JOB="done 0 true"
 done
@@ -163,13 +165,13 @@ done
 
 # ---- folders in /tmp ----
 
-# Somebody else's of that name
+# Folders of that name that belong to another user
 mkdir "$DIR/tmp/hslt-farm-7.0"
 echo '[]' >"$DIR/list"
 env FOREIGN=1 bash "$SBATCH" box.xml -o image.exr >"$DIR/sbatch.log" 2>&1 || fail "a foreign folder ends it"
 [ -z "$(ls -A "$DIR/tmp/hslt-farm-7.0")" ] || fail "it uses a foreign folder"
 /bin/rm -r "$DIR/tmp"/*
-# Without a file system that all nodes see an image that could not be written stays where it is.
+# Without a file system that all nodes share, an image that could not be written stays where it is.
 echo '[]' >"$DIR/list"
 env HSLT_SPOOL= SUBMIT=1 bash "$SBATCH" box.xml -o image.exr >"$DIR/sbatch.log" 2>&1 && fail "an image that cannot be written ends with 0"
 [ -d "$DIR/tmp"/hslt-farm-7.0.*/spool ] || fail "the image is gone: $(ls -R "$DIR/tmp")"

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# hslt-scene: everything that is wrong with a file in one run; what was read of a good one; what leniency makes of what is not supported.
+# hslt-scene: reports all errors of a file in one run, describes a good file, and with --lenient replaces unsupported
+# parts.
 . "$(dirname "$0")/lib.sh"
 PROGRAMS=$(cd "$BIN" && pwd)
 need hslt-scene hslt-render hslt-compare hslt-submit hslt-accuracy
@@ -34,7 +35,8 @@ grep -q "^$DIR/bad.xml: 6 problems" "$DIR/out" || fail "it does not sum up: $(ta
 code 1 "$BIN/hslt-render" "$DIR/bad.xml" -o "$DIR/bad.exr"
 grep -q "bad.xml:3.*and at least 5 more: hslt-scene check lists all" "$DIR/err.log" || fail "a render says: $(cat "$DIR/err.log")"
 
-# What only building finds is listed in the same run, in the order of lines, but nothing that only follows from what the reader has found.
+# Errors that only building finds are listed in the same run, in the order of lines, but not those that merely follow
+# from errors of the reader.
 cat >"$DIR/deep.xml" <<'XML'
 <scene version="3.0.0"><sensor type="perspective"/><emitter type="constant"/>
 <shape type="instance"/>
@@ -65,7 +67,8 @@ sed 's|<integer name="rr_depth" value="5"/>|<boolean name="hide_emitters" value=
 code 1 "$BIN/hslt-scene" check "$DIR/ture.xml"
 grep -q '`ture` is neither true nor false; did you mean `true`?' "$DIR/out" || fail "of ture it says: $(cat "$DIR/out")"
 
-# Instances are those of the file, also where copies of their meshes are faster; an instance of two shapes is one.
+# Instances are counted as in the file, even where copies of their meshes are faster; an instance of two shapes counts
+# once.
 cat >"$DIR/small.xml" <<'XML'
 <scene version="3.0.0"><sensor type="perspective"/><emitter type="constant"/>
 <shape type="shapegroup" id="g"><shape type="cube"/><shape type="rectangle"/></shape>
@@ -83,7 +86,7 @@ sed 's|<shape type="cube"/>|<shape type="obj"><string name="filename" value="man
 code 0 "$BIN/hslt-scene" show "$DIR/large.xml"
 grep -q '^6 shapes (3 instances; 3 share 1 mesh), 126 triangles (46 in memory), ' "$DIR/out" || fail "instances that share: $(cat "$DIR/out")"
 
-# In the order of lines, files that are not there among them.
+# Errors are in the order of lines, missing files among them.
 cat >"$DIR/order.xml" <<'XML'
 <scene version="3.0.0"><integrator type="path"/>
 <shape type="obj"><string name="filename" value="none.obj"/></shape>
@@ -102,7 +105,7 @@ for program in "hslt-render" "hslt-submit --coordinator 127.0.0.1:9"; do
 	grep -q "missing.xml:2.*none.obj.*and at least 1 more: hslt-scene check lists all" "$DIR/err.log" || fail "$program says: $(cat "$DIR/err.log")"
 done
 
-# A message begins with a file that can be opened from here; the notes in images do not.
+# A message begins with a file name that can be opened from here; notes in images do not.
 mkdir "$DIR/parts"
 echo '<scene version="3.0.0"><shape type="spher"/></scene>' >"$DIR/parts/odd.xml"
 echo '<scene version="3.0.0"><sensor type="perspective"/><emitter type="constant"/><include filename="parts/odd.xml"/></scene>' >"$DIR/whole.xml"
@@ -127,7 +130,7 @@ sed 's/4097/4096/' "$DIR/wall.xml" >"$DIR/less.xml"
 code 0 "$BIN/hslt-scene" check "$DIR/less.xml"
 ! grep -q 'a render has at most' "$DIR/out" || fail "of a film that is just small enough it says: $(cat "$DIR/out")"
 
-# What the reader cannot see by itself.
+# Errors that the reader alone cannot see.
 sed 's/filename" value="[^"]*"/filename" value="gone.obj"/' "$BOX" >"$DIR/gone.xml"
 if grep -q gone.obj "$DIR/gone.xml"; then
 	code 1 "$BIN/hslt-scene" check "$DIR/gone.xml"
@@ -143,7 +146,7 @@ code 1 "$BIN/hslt-scene" check "$DIR/gone2.xml"
 grep -q "^$DIR/gone2.xml: 3 problems" "$DIR/out" && grep -q 'gone2.xml:2: <shape type="obj">: a.obj: no such file' "$DIR/out" ||
 	fail "not all missing files are said: $(cat "$DIR/out")"
 
-# A file to include that is not there, and a name without a value, do not hide what else is wrong.
+# A missing file to include, and a name without a value, do not hide other errors.
 cat >"$DIR/hole.xml" <<'XML'
 <scene version="3.0.0"><sensor type="perspective"/><emitter type="constant"/>
 <include filename="hole.part.xml"/>
@@ -157,7 +160,7 @@ code 1 "$BIN/hslt-scene" check "$DIR/hole.xml"
 code 1 "$BIN/hslt-scene" check -D r=1 "$DIR/hole.xml"
 grep -q "^$DIR/hole.xml: 3 problems" "$DIR/out" || fail "a hole with a value: $(cat "$DIR/out")"
 
-# A scene that is not there: not one of its files, which --path could find.
+# A missing scene: it is not one of the scene's files, which --path could find.
 for program in "$BIN/hslt-scene check" "$BIN/hslt-render -o $DIR/a.exr" "$BIN/hslt-render --explain" "$BIN/hslt-submit -c 127.0.0.1:1 -o $DIR/a.exr" \
 	"$BIN/hslt-accuracy -o $DIR/a.html"; do
 	code 1 $program "$DIR/hle.xml"
@@ -170,7 +173,7 @@ code 1 "$BIN/hslt-render" -o "$DIR/a.exr" "$DIR/dangling.xml"
 grep -q "/dangling.xml: a link to a file that is not there$" "$DIR/err.log" || fail "a dangling link: $(cat "$DIR/err.log")"
 rm "$DIR/dangling.xml"
 
-# Names of Windows differ in capitals.
+# File names from Windows differ in capitals.
 : >"$DIR/stone.png"
 cat >"$DIR/capitals.xml" <<'XML'
 <scene version="3.0.0"><sensor type="perspective"/><emitter type="constant"/><shape type="sphere"><bsdf type="diffuse">
@@ -180,7 +183,7 @@ code 1 "$BIN/hslt-scene" check "$DIR/capitals.xml"
 grep -q '/capitals.xml:2: .*Stone.PNG: no such file in the scene.s folder; did you mean `stone.png`? --lenient leaves the texture out$' \
 	"$DIR/out" || fail "a name with other capitals: $(cat "$DIR/out")"
 
-# Textures that are not there, or nowhere that may be read, are left out by --lenient.
+# Textures that are missing, or not in a folder that may be read, are left out by --lenient.
 cat >"$DIR/lost.xml" <<'XML'
 <scene version="3.0.0"><sensor type="perspective"/><emitter type="constant"/><shape type="sphere"><bsdf type="mask">
 <texture type="bitmap" name="opacity"><string name="filename" value="lost.png"/></texture>
@@ -197,7 +200,7 @@ grep -q "lost.xml:2: .*lost.png is not among the scene's files; left out" "$DIR/
 	fail "of lost textures --lenient says: $(cat "$DIR/out")"
 code 0 "$BIN/hslt-render" --lenient --size 16 --spp 1 "$DIR/lost.xml" -o "$DIR/lost.exr"
 
-# Files in another folder: found where --path says, with the same picture.
+# Files in another folder are found through --path, with the same picture.
 mkdir "$DIR/apart" "$DIR/library"
 sed 's:<sensor:<path value="../library"/><sensor:' "$BOX" >"$DIR/apart/box.xml"
 cp -r "${BOX%/*}/meshes" "$DIR/library"
@@ -228,7 +231,7 @@ grep -q "no sensor with the id 'asied'; did you mean .aside.?" "$DIR/err.log" ||
 code 1 "$BIN/hslt-submit" --coordinator 127.0.0.1:1 --sensor overhead "$DIR/two/two.xml" -o "$DIR/none.exr"
 grep -q "no sensor with the id 'overhead' (it has 2, numbered from 1; ids: aside)" "$DIR/err.log" || fail "another id: $(cat "$DIR/err.log")"
 
-# A batch is its sensors, each with its share of the film.
+# A batch sensor is split into its sensors, each with its share of the film.
 camera() { # camera NAME X
 	echo "<sensor type='perspective' id='$1'><transform name='to_world'><lookat origin='$2,0,5' target='0,0,0' up='0,1,0'/></transform>${3-}</sensor>"
 }
@@ -260,7 +263,7 @@ sum=$(sha256sum "$BOX" | cut -c1-16)
 grep -q "^$sum .* box.xml$" "$DIR/out" || fail "show has no file box.xml with its hash: $(cat "$DIR/out")"
 code 0 "$BIN/hslt-scene" show --json "$BOX"
 grep -q "\"schema\":1.*\"sha256\":\"$(sha256sum "$BOX" | cut -d' ' -f1)\"" "$DIR/out" || fail "--json says: $(cat "$DIR/out")"
-# What is not supported, and the scene that is rendered instead.
+# Unsupported parts, and the scene that is rendered instead.
 scene() { # scene FILE FILTER LIGHT BSDF INSIDE MORE
 	cat >"$DIR/$1" <<XML
 <scene version="3.0.0">
@@ -292,7 +295,7 @@ grep -aq "lenient=yes" "$DIR/strange.exr" || fail "the image does not say that i
 code 0 "$BIN/hslt-render" -i path --spp 4 "$DIR/plain.xml" -o "$DIR/plain.exr"
 code 0 "$BIN/hslt-compare" "$DIR/strange.exr" "$DIR/plain.exr"
 grep -q "^relMSE  *0 " "$DIR/out" || fail "the lenient image is not that of the scene it stands for: $(cat "$DIR/out")"
-# What covers opaque materials only, over one that lets light through.
+# A material that can cover only opaque ones, over one that transmits light.
 hole='<bsdf type="mask"><float name="opacity" value="0.5"/><bsdf type="diffuse"/></bsdf>'
 scene covered.xml box '' "<bsdf type='coating' id='stuff'><bsdf type='twosided'>$hole</bsdf></bsdf>" '' ''
 echo "$hole" | sed 's/type="mask"/type="mask" id="stuff"/' >"$DIR/hole"
@@ -305,20 +308,20 @@ for file in covered plain; do
 done
 code 0 "$BIN/hslt-compare" "$DIR/covered.exr" "$DIR/plain.exr"
 grep -q "^relMSE  *0 " "$DIR/out" || fail "an uncovered mask is another: $(cat "$DIR/out")"
-# What only building a scene shows: all of that, too.
+# Errors that only building a scene shows: all of these are listed, too.
 scene deep.xml box '' '<bsdf type="conductor" id="stuff"><string name="material" value="Xy"/></bsdf>' '' \
 	'<shape type="sphere"><bsdf type="coating"><bsdf type="dielectric"/></bsdf></shape>'
 code 1 "$BIN/hslt-scene" check "$DIR/deep.xml"
 for word in 'unknown conductor "Xy"' 'a coating over "dielectric"' '2 problems'; do
 	grep -q "$word" "$DIR/out" || fail "$word: $(cat "$DIR/out")"
 done
-# Leniency is not for what is supported and wrong, nor for what has no stand-in.
+# Leniency does not apply to wrong values of supported parts, nor to parts without a replacement.
 sed 's/value="24"/value="wide"/' "$DIR/strange.xml" >"$DIR/wrong.xml"
 code 1 "$BIN/hslt-scene" check --lenient "$DIR/wrong.xml"
 sed 's/"perspective"/"fisheye"/' "$DIR/strange.xml" >"$DIR/wrong.xml"
 code 1 "$BIN/hslt-scene" check --lenient "$DIR/wrong.xml"
 grep -q fisheye "$DIR/out" || fail "of a sensor without a stand-in it says: $(cat "$DIR/out")"
-# Emitters alone, and these hidden: no options of the author's are blamed.
+# A scene of emitters alone, which are hidden: no options of the author are blamed.
 echo "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='1'/><boolean name='hide_emitters' value='true'/></integrator>$(
 	camera one 0)$rest" >"$DIR/hidden.xml"
 code 2 "$BIN/hslt-render" "$DIR/hidden.xml" -o "$DIR/hidden.exr" --size 16 --spp 16

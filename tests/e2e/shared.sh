@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Two jobs with a file of some MB in common, and workers that have never seen it: each fetches it once, both jobs are done.
+# Two jobs share a file of some MB, and the workers have never seen it: each fetches it once, and both jobs are done.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status
 SCENE=$DIR/box

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-# deploy/slurm on a cluster of three nodes with a slurmctld, slurmds and a munged of its own, on loopback, in a folder that goes:
-# workers come, are told to leave, are preempted, are requeued off a node whose daemon is dead, leave when there is nothing to do;
-# a whole farm is requeued, one is cut short. All over TLS. The images have the bits of hslt-render's, and each loss repeats at most
-# one epoch of a chain.
+# deploy/slurm on a cluster of three nodes with its own slurmctld, slurmds and munged, on loopback, in a temporary
+# folder: workers start, are told to leave, are preempted, are requeued from a node whose daemon is dead, and exit when
+# there is no work; a whole farm is requeued, and one is cut short. All over TLS. The images have the bits of
+# hslt-render's, and each loss repeats at most one epoch of a chain.
 . "$(dirname "$0")/lib.sh"
 need hslt-ca hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-render hslt-compare
 PATH=$PATH:/usr/sbin:/sbin
@@ -19,7 +19,7 @@ BOX=$(cd "$HERE/../scenes/box" && pwd)/box.xml
 LONG="--integrator hslt --bootstrap 20000 --epoch 200 --mutations 6000000"
 SHORT="--integrator hslt --bootstrap 20000 --epoch 50 --mutations 1000000"
 
-# Whoever was started here, by us or by Slurm, knows the folder from the environment.
+# Processes that were started here, by the test or by Slurm, have the folder in their environment.
 ours() {
 	grep -lzF "SLURM_CONF=$DIR/" /proc/[0-9]*/environ 2>/dev/null | sed -n 's/^\/proc\/\([0-9]*\)\/.*/\1/p' | grep -vx $$ || :
 }
@@ -104,7 +104,7 @@ idle() {
 	[ "$(sinfo -h -o %D -t idle 2>/dev/null)" = "$1" ]
 }
 
-# batch OPTION...: the Slurm job's id in JOB
+# batch OPTION...: submits a Slurm job; its id is in JOB
 batch() {
 	JOB=$(sbatch --parsable --output="$DIR/%j.log" "$@") || fail "sbatch $*"
 	JOB=${JOB%%;*}
@@ -139,7 +139,7 @@ pause() {
 	"$BIN/hslt-job" "$1" "$id" 2>>"$DIR/submit.log" || fail "hslt-job $1 $id"
 }
 
-# requeued JOB: is pending for its next start, which begins now instead of two minutes later
+# requeued JOB: the job waits for its next start, which is moved from two minutes later to now
 requeued() {
 	until_true 60 is_job "$1" PENDING || return 1
 	sleep 2 # a slurmd kills a job that begins anew in the second in which it was told to end it
@@ -161,7 +161,7 @@ export HSLT_CA="$DIR/ca"
 export HSLT_TLS="$HSLT_CA/client"
 start_coordinator --verbose --tls "$HSLT_CA/coordinator"
 id=$(submit "$BOX" -o "$DIR/elastic.exr" $LONG)
-# Whoever waits has this to do meanwhile, and does not leave.
+# A waiting worker gets leases of this job meanwhile, and does not exit.
 filler=$(submit "$BOX" -o "$DIR/filler.exr" --integrator path --spp 1000000 --epoch 4 --priority -100)
 batch --array=1 --export="ALL,HSLT_TLS=$HSLT_CA/worker,HSLT_GRACE=0" "$DEPLOY/slurm/workers.sbatch"
 first=$JOB
@@ -177,7 +177,8 @@ scancel --batch --signal=TERM "${second}_2"
 until_true 20 is_job "${second}_2" COMPLETED || fail "the worker that was told to leave is $(job_state "${second}_2")"
 until_true 5 has_workers 2 || fail "it stays at the coordinator"
 
-# Somebody more important wants the first worker's node; it leaves in a hurry and comes back when the node is free.
+# A job of higher priority needs the first worker's node; the worker leaves in a hurry and comes back when the node is
+# free.
 batch --partition=urgent --nodelist="$(job_field "${first}_1" BatchHost)" --wrap "sleep 1"
 urgent=$JOB
 until_true 10 is_job "$urgent" RUNNING || fail "the urgent job is $(job_state "$urgent"): $(squeue)"
@@ -186,7 +187,7 @@ requeued "${first}_1" || fail "the worker that was preempted is $(job_state "${f
 until_true 10 has_worker "^${first}_1\.1@" || fail "the preempted worker does not come back: $(workers)"
 pause release
 
-# The daemon of a node dies, its worker does not; Slurm gives the node up and starts the worker elsewhere.
+# The daemon of a node dies while its worker runs on; Slurm gives the node up and starts the worker elsewhere.
 node=$(job_field "${second}_3" BatchHost)
 kill -9 "$(cat "$DIR/slurmd-$node.pid")"
 scontrol update NodeName="$node" State=DOWN Reason=test
@@ -201,8 +202,9 @@ until_true 60 is_state "$id" done || fail "$id is $(value "$id" state)"
 "$BIN/hslt-job" fetch "$id" -o "$DIR/elastic.exr" || fail "no image of $id"
 same "$DIR/long.exr" "$DIR/elastic.exr"
 
-# Three were lost: told to leave, preempted, and the worker that Slurm gave up but that went on. For each of them one epoch of a chain is
-# computed again at most; how many are given to two at once, while one of them takes long, depends on how busy the machine is.
+# Three workers were lost: one was told to leave, one was preempted, and one was given up by Slurm but went on. For each
+# of them at most one epoch of a chain is computed again; how many epochs are given to two workers at once, because one
+# takes long, depends on the machine's load.
 grep 'event=lease_granted job=j1 ' "$DIR/coordinator.log" | sed 's/.*peer=[0-9]* //' |
 	awk '{ if (seen[$1, $2, $3, $4]++) sum++ } END { print NR, sum + 0 }' >"$DIR/repeats"
 read -r leases repeats <"$DIR/repeats"
@@ -218,7 +220,7 @@ grep -q 'event=peer_hello.*certificate=worker' "$DIR/coordinator.log" || fail "i
 
 slurmd -N "$node"
 scontrol update NodeName="$node" State=RESUME 2>/dev/null || :
-# Nobody ends the workers: there is no work for them.
+# No signal is sent to the workers: they exit because there is no work.
 until_true 20 idle 3 || fail "the cluster does not come to rest: $(sinfo; squeue)"
 until_true 10 has_workers 0 || fail "workers are left: $(workers)"
 for id in "${first}_1" "${second}_3"; do
@@ -227,7 +229,7 @@ done
 
 # ---- a whole farm in a job ----
 
-# farm_port JOB.RESTART: of its coordinator, in a folder of no other start
+# farm_port JOB.RESTART: prints the port of that start's coordinator
 farm_port() {
 	cat "$DIR/hslt-farm-$1".*/port 2>/dev/null
 }
@@ -237,7 +239,7 @@ running() {
 		"$BIN/hslt-job" --coordinator "127.0.0.1:$(farm_port "$1")" list 2>/dev/null | grep -q running
 }
 
-# The batch job's state, and what it said.
+# Prints the batch job's state, and its output.
 told() {
 	echo "$(job_state "$JOB")"
 	cat "$DIR/$JOB.log"
@@ -246,7 +248,7 @@ told() {
 mkdir "$DIR/shared"
 batch --nodes=3 --export="ALL,HSLT_SPOOL=$DIR/shared" "$DEPLOY/slurm/farm.sbatch" "$BOX" -o "$DIR/farm.exr" $SHORT
 until_true 20 running "$JOB.0" || fail "the farm does not run: $(squeue; told)"
-# Between the two starts somebody has the spool, until the next has been there for a second.
+# Between the two starts another process holds the spool, until the second start has run for a second.
 flock "$DIR/shared/hslt-farm-$JOB/lock" sh -c "while [ ! -e '$DIR/spool-free' ]; do sleep 0.1; done" &
 PIDS="$PIDS $!"
 scontrol requeue "$JOB"
@@ -274,7 +276,8 @@ until_true 30 is_job "$JOB" FAILED || fail "the farm that was cut short is $(tol
 until_true 10 idle 3 || fail "it left somebody: $(squeue)"
 ls -d "$DIR"/hslt-farm-* 2>/dev/null && fail "it left its folder"
 
-# Whoever is preempted is told to leave program by program; that hslt-submit hears it before the script is not the image's end.
+# A preempted job's programs are told to leave one by one; if hslt-submit gets the signal before the script does, the
+# image is not lost.
 batch --nodes=1 --export="ALL,HSLT_SPOOL=$DIR/shared" "$DEPLOY/slurm/farm.sbatch" "$BOX" -o "$DIR/cut.exr" $LONG
 until_true 20 running "$JOB.0" || fail "the farm does not run: $(squeue; told)"
 for p in $(ours); do

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# A disk that is smaller than the limits of journals and scene files: checkpoints replace journals early, files of no job are deleted, and jobs
-# that do not fit together wait for each other.
+# A disk smaller than the limits on journals and scene files: checkpoints replace journals early, files that no job
+# needs are deleted, and jobs that do not fit together wait for each other.
 OWN_MOUNTS=needed
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-compare hslt-render
@@ -11,7 +11,7 @@ mount -t tmpfs -o size=16m none "$DIR/spool" || skip "no tmpfs"
 start_coordinator -v
 start_worker w
 
-# scene NAME: 5 MB of it are a comment
+# scene NAME: writes a scene that contains a comment of 5 MB
 scene() {
 	{
 		cat "$BOX"
@@ -19,7 +19,7 @@ scene() {
 	} >"$DIR/$1.xml"
 }
 
-# Files of jobs that are over: the spool has room for three at most, --blobs allows 100 GB.
+# Files of ended jobs: the spool has room for three at most, though --blobs allows 100 GB.
 for k in one two three four five six; do
 	scene $k
 	id=$(submit "$DIR/$k.xml" --path "$(dirname "$BOX")" -o "$DIR/none.exr" --integrator path --spp 1) ||
@@ -27,7 +27,7 @@ for k in one two three four five six; do
 	"$BIN/hslt-job" cancel "$id" >/dev/null 2>&1 || :
 done
 
-# Its results, 20 MB, fit neither beside those files nor into one journal.
+# This job's results, 20 MB, fit neither beside those files nor into one journal.
 id=$(submit "$BOX" -o "$DIR/farm.exr" $JOB)
 until_true 60 is_state "$id" done || fail "$id is $(value "$id" state): $(value "$id" waiting); $(df -k "$DIR/spool" | tail -n 1)"
 grep -q "event=checkpoint job=$id " "$DIR/coordinator.log" || fail "there was no checkpoint: the disk is too large for this test"
@@ -36,7 +36,7 @@ grep -q "event=checkpoint job=$id " "$DIR/coordinator.log" || fail "there was no
 same "$DIR/farm.exr" "$DIR/render.exr"
 echo "$(grep -c 'event=batch_merged' "$DIR/coordinator.log") results through 16 MB"
 
-# Several jobs that each fit, and not together: some wait, until those before them have ended.
+# Several jobs that each fit alone, but not together: some wait until earlier ones have ended.
 mount -o remount,size=$(($(df --output=used -k "$DIR/spool" | tail -n 1) + 14000))k "$DIR/spool"
 ids=
 for k in 1 2 3 4; do

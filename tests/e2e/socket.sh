@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-# The status socket's file: who may connect, and that what lies at its path is never followed, taken over or removed when it is
-# somebody else's.
+# The status socket's file: who may connect to it; and that a file of another owner at its path is never followed, taken
+# over or removed.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-status
 AT=$DIR/at
 
-# refused SENTENCE OPTION...: a second coordinator does not start with a status socket at $AT
+# refused SENTENCE OPTION...: a second coordinator with a status socket at $AT does not start
 refused() {
 	sentence=$1
 	shift
@@ -15,7 +15,7 @@ refused() {
 	grep -q -e "$sentence" "$DIR/err.log" || fail "it says: $(cat "$DIR/err.log")"
 }
 
-# begin OPTION...: one that starts
+# begin OPTION...: starts a coordinator that must succeed
 begin() {
 	rm -f "$DIR/port"
 	"$BIN/hslt-coordinator" --listen 127.0.0.1:0 --port-file "$DIR/port" --spool "$DIR/spool" --status-socket "$AT" "$@" \
@@ -29,7 +29,7 @@ answers() {
 	"$BIN/hslt-status" --socket "$AT" --json >/dev/null
 }
 
-# What is not a socket stays what it is, and what a link leads to as well.
+# A file that is not a socket stays as it is, and so does the target of a link.
 echo precious >"$AT"
 refused "not a socket"
 [ "$(cat "$AT")" = precious ] || fail "a file was changed"
@@ -55,7 +55,8 @@ refused "no group 'nobody-of-that-name'" --status-group nobody-of-that-name
 [ ! -e "$AT" ] || fail "a socket was left"
 timeout 100 env -u HSLT_STATUS_SOCKET "$BIN/hslt-coordinator" --spool "$DIR/other" --status-group daemon 2>"$DIR/err.log" && fail "a group for no socket"
 
-# Another's live socket, by a link too; one that answers so slowly that nobody more can wait there; one of another kind.
+# A live socket of another process, also through a link; one that answers so slowly that its queue is full; one of
+# another type.
 begin
 [ "$(stat -c %a "$AT")" = 600 ] || fail "the mode is $(stat -c %a "$AT")"
 answers || fail "no answer"
@@ -67,7 +68,7 @@ rm "$AT"
 mv "$DIR/moved" "$AT"
 answers || fail "it was disturbed"
 if "${PYTHON:-python3}" -c '' 2>/dev/null; then
-	# As many as may read it do: who comes then is told so, and gets in when one has gone.
+	# The number of readers is limited: a further one is told so, and gets in when another one has gone.
 	"${PYTHON:-python3}" -c '
 import socket, sys, time
 readers = [socket.socket(socket.AF_UNIX) for _ in range(64)]
@@ -84,7 +85,8 @@ time.sleep(600)' "$AT" &
 	grep -q "64 others are connected" "$DIR/err.log" || fail "it says: $(cat "$DIR/err.log")"
 	kill $crowd
 	wait $crowd 2>/dev/null || :
-	# One that is told so and disconnected before it has asked for changes: it was ended by a signal, and said nothing.
+	# A reader that was told so and disconnected before it asked for changes once died of a signal, without a
+	# message.
 	"${PYTHON:-python3}" -c '
 import socket, sys
 s = socket.socket(socket.AF_UNIX)
@@ -128,7 +130,7 @@ time.sleep(600)' "$DIR" &
 	AT=$DIR/at
 fi
 
-# One that was left by a coordinator that was killed is removed; one that another has put there since is not.
+# A socket left by a killed coordinator is removed; one that another process has put there since is not.
 kill -9 $COORDINATOR_PID
 wait $COORDINATOR_PID 2>/dev/null || :
 [ -S "$AT" ] || fail "it should be there still"
@@ -149,8 +151,8 @@ answers || fail "the first removed the second's socket"
 stop $second
 [ ! -e "$AT" ] || fail "the socket stays"
 
-# One that is removed while the coordinator runs is made anew, with its mode, whoever watches stays connected, and the log says so once
-# each time; so does one whose folder is not there for a while.
+# A socket file that is removed while the coordinator runs is created again, with its mode; connected readers stay
+# connected, and the log says so once each time. The same holds if its folder is missing for a while.
 mkdir "$DIR/run"
 AT=$DIR/run/at
 begin
@@ -175,7 +177,7 @@ stop $COORDINATOR_PID
 [ ! -e "$AT" ] || fail "the new socket stays"
 AT=$DIR/at
 
-# A group.
+# A group that may connect.
 if [ "$(id -u)" = 0 ] && command -v setpriv >/dev/null && id daemon >/dev/null 2>&1; then
 	begin --status-group daemon
 	[ "$(stat -c '%a %G' "$AT")" = "660 daemon" ] || fail "it is $(stat -c '%a %G' "$AT")"

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Starts of workers by hand: starts.py PORT fails when a later start does not take the place of the earlier one's open connection, when
-an earlier one is let in, or when strangers replace each other."""
+"""Starts of workers by hand: starts.py PORT fails if a later start of a worker does not replace the open connection of the
+earlier start, if an earlier start is accepted after a later one, or if different workers replace each other."""
 import os, socket, sys
 
 sys.dont_write_bytecode = True
@@ -10,7 +10,7 @@ from wire import field
 
 
 def hello(name, home, start):
-    """The connection, and what it heard first."""
+    """Returns the connection, and the first message received."""
     s = socket.create_connection(("127.0.0.1", int(sys.argv[1])))
     s.settimeout(60)
     s.sendall(wire.hello(1, name, field(4, b"by hand") + field(5, 1) + field(6, start) + field(7, home)))

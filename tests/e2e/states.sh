@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# A worker that spoils the chain states of each result (flipped bits, numbers that are none, noise, ends cut off), among honest ones
-# that go on from them: no honest worker ends or is quarantined, the liar is, what it made is computed again, and each job has the bits of
-# hslt-render. SEEDS="1 2 ..." (1): two jobs each; make test-states has 50.
+# A worker spoils the chain states of each result (flipped bits, numbers that are none, noise, truncated states), among
+# honest workers that resume from them: no honest worker exits or is quarantined, the faulty one is, its results are
+# computed again, and each job has the bits of hslt-render. SEEDS="1 2 ..." (1): two jobs each; make test-states has 50.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-render hslt-job hslt-compare
 

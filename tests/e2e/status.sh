@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# The status socket during a job: valid JSON, progress that grows, lines for subscribers, nobody else may read it.
+# The status socket during a job: valid JSON, growing progress, lines for subscribers, and no access for other users.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job
 
@@ -38,7 +38,7 @@ watcher=$!
 PIDS="$PIDS $watcher"
 start_worker w1
 wait $watcher || fail "watching ended with $?"
-# hslt-status parses each line before it prints it; here the order of what it says is looked at
+# hslt-status parses each line before it prints it; here the order of its lines is checked
 sed -n 's/.*"progress":\([0-9.e-]*\).*/\1/p' "$DIR/lines" >"$DIR/progress"
 awk 'NR > 1 && $1 < last { exit 1 } { last = $1; if ($1 > 0 && $1 < 1) between++ } END { if (last != 1 || between < 3) exit 1 }' \
 	"$DIR/progress" || fail "progress: $(tr '\n' ' ' <"$DIR/progress")"
@@ -57,7 +57,7 @@ grep -q 'did you mean `done`' "$DIR/err.log" || fail "a state that there is not:
 code 2 "$BIN/hslt-job" cancel "$id" --state done
 "$BIN/hslt-status" j99 2>/dev/null && fail "j99 cannot be known"
 grep -q "event=lease_granted .* kind=render " "$DIR/coordinator.log" || fail "the log does not name the kinds of leases"
-# Of what has ended a snapshot says less than of the one job that is asked for.
+# A snapshot has fewer details about an ended job than the answer about one requested job.
 "$BIN/hslt-status" "$id" | grep -q "^ *on .*direct" || fail "the job is shown without its effects"
 "$BIN/hslt-status" --json | grep -q '"effects"' && fail "a snapshot has the effects of a job that ended"
 "$BIN/hslt-status" --json --all | grep -q "\"id\":\"$id\"" || fail "--all lacks the job"
@@ -75,7 +75,7 @@ c.close()' "$DIR/half" &
 	until_true 10 test -S "$DIR/half" || fail "no socket"
 	code 75 "$BIN/hslt-status" --socket "$DIR/half"
 	grep -q "the coordinator closed the connection" "$DIR/err.log" || fail "half a line: $(cat "$DIR/err.log")"
-	# It ends between what it says and what it is asked.
+	# The client disconnects between a snapshot and its request.
 	"${PYTHON:-python3}" -c '
 import socket, sys
 s = socket.socket(socket.AF_UNIX)
@@ -97,7 +97,7 @@ if command -v socat >/dev/null; then
 		echo '{"subscribe":["jobs"]}'
 		head -n 1 >"$HEARD"
 	TEXT
-	# Its exit code says nothing: it is 1 where the next update comes before socat notices that its reader has left.
+	# socat's exit code is ignored: it is 1 if the next update comes before socat notices that its reader has left.
 	HEARD=$DIR/heard socat "UNIX-CONNECT:$DIR/status" "EXEC:sh $DIR/ask" 2>"$DIR/socat.log" || :
 	grep -q '"type":"snapshot"' "$DIR/heard" || fail "socat reads no snapshot: $(cat "$DIR/heard" "$DIR/socat.log")"
 fi

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# Mixtures of strategies: what is one, the options that give the same bits again, and counters that a farm and hslt-render share.
+# Mixtures of strategies: which texts are valid, the options that give the same bits again, and counters that a farm and
+# hslt-render share.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-render hslt-compare
 INTEGRATOR=${INTEGRATOR:-hslt}
@@ -7,7 +8,7 @@ INTEGRATOR=${INTEGRATOR:-hslt}
 LIST="--mutations hslt=0.75,independent=0.25"
 COUNT="--bootstrap 16384 --mutations 40000"
 
-# counters FILE: whole numbers of all strategies, in order, one per line
+# counters FILE: prints the whole numbers of all strategies, in order, one per line
 counters() {
 	"${PYTHON:-python3}" - "$1" <<-'END'
 		import json, sys
@@ -57,7 +58,8 @@ counters "$DIR/status.json" >"$DIR/by-farm"
 cmp -s "$DIR/by-render" "$DIR/by-farm" || fail "other counters: $(diff "$DIR/by-render" "$DIR/by-farm")"
 "$BIN/hslt-status" "$id" | grep -q '^hslt  *[0-9]' || fail "hslt-status shows no table"
 
-# Samples that leave some of their light to chains: each part's share of light, variance and rays; a farm has them from batches.
+# Samples that leave part of their light to chains: each part's share of light, variance and rays; the farm collects
+# them from batches.
 GLASS="$(dirname "$0")/../scenes/displaced/water.xml --integrator erpt --size 64x36 --spp 32"
 "$BIN/hslt-render" $GLASS -o "$DIR/parts.exr" --stats "$DIR/parts.json" 2>"$DIR/parts.log" || fail "erpt ended with $?"
 grep -q '^chains that spread .* % of the light, .* % of the variance of the mean, .* % of the rays' "$DIR/parts.log" || fail "no parts"

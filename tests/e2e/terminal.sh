@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-# What a terminal gets: a bar that redraws itself only where the cursor can be moved, colours only where they are wanted; and what
-# Ctrl-C says to somebody who waits for a job.
+# Output on a terminal: a bar that is redrawn only if the cursor can be moved, colours only where they are wanted; and
+# the messages on Ctrl-C while waiting for a job.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-submit hslt-status hslt-job hslt-render hslt-ca
 ESCAPE=$(printf '\033')
 
-# on_terminal FILE COMMAND...: all that the command writes to a terminal of its own
+# on_terminal FILE COMMAND...: writes to FILE all output of the command on a terminal of its own
 on_terminal() {
 	file=$1
 	shift
@@ -21,7 +21,8 @@ with open(sys.argv[1], "wb") as out:
     sys.exit(os.waitstatus_to_exitcode(pty.spawn(sys.argv[2:], read)))' "$file" "$@" </dev/null
 }
 
-# interrupted FILE WORDS COMMAND...: its exit code after Ctrl-C is pressed on its terminal, once the terminal has shown WORDS, a regular expression
+# interrupted FILE WORDS COMMAND...: prints the exit code after Ctrl-C is pressed on the command's terminal, once the
+# terminal has shown WORDS, a regular expression
 interrupted() {
 	file=$1
 	shift
@@ -54,7 +55,7 @@ grep -q "$ESCAPE\[K" "$DIR/xterm" || fail "no bar on a terminal: $(cat -v "$DIR/
 TERM=dumb on_terminal "$DIR/dumb" $RENDER || fail "hslt-render on a dumb terminal: $(cat "$DIR/dumb")"
 ! grep -q "$ESCAPE" "$DIR/dumb" || fail "a dumb terminal gets escape sequences: $(cat -v "$DIR/dumb")"
 
-# Ctrl-C in hslt-render, while it makes rounds and while it makes the bootstrap: what is kept is said, and is there.
+# Ctrl-C in hslt-render, during rounds and during the bootstrap: the message says what is kept, and it is there.
 code=0
 interrupted "$DIR/rounds" 'running .* 0[.][1-9] %' "$BIN/hslt-render" "$BOX" --size 32x24 --integrator path --spp 100000 --epoch 1 --groups 4 --threads 1 \
 	-o "$DIR/rounds.exr" || code=$?
@@ -87,7 +88,8 @@ start_coordinator
 WAITS=$!
 PIDS="$PIDS $WAITS"
 until_true 60 test -s "$DIR/id" || fail "no job: $(cat "$DIR/wait.log")"
-# Without a worker nothing else can end the wait. What a shell starts in the background ignores SIGINT; SIGTERM is handled alike.
+# Without a worker nothing else can end the wait. A shell makes background commands ignore SIGINT; SIGTERM is handled
+# alike.
 kill -TERM $WAITS
 code=0
 wait $WAITS || code=$?

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# Thousands of connections need a bounded amount of the coordinator's memory: chunks of files shrink, and not every submission may wait for
-# its files at once.
+# Thousands of connections use a bounded amount of the coordinator's memory: chunks of files become smaller, and only
+# some submissions may wait for their files at once.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-submit hslt-status hslt-job
 [ "$(ulimit -Hn)" = unlimited ] || [ "$(ulimit -Hn)" -ge 4096 ] || skip "2,000 connections need as many descriptors"

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# A farm over TLS: equal bits, and everybody who must not get in does not. README.md has the table of the attempts, and must have it
-# as it is today.
+# A farm over TLS: the bits are the same, and everyone who must not get in is refused. The table of attempts in
+# README.md must be up to date.
 #   sh tests/e2e/tls.sh BUILD [--write]     --write: writes the table
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-ca hslt-render hslt-compare
@@ -19,12 +19,12 @@ row() {
 	printf '%s|%s\n' "$2" "$1" >>"$DIR/attempts"
 }
 
-# tries WHAT: about to
+# tries WHAT: announces an attempt
 tries() {
 	printf 'tried|%s\n' "$1" >>"$DIR/attempts"
 }
 
-# refused WHAT CODE SENTENCE COMMAND...: it ends with the code, and says so
+# refused WHAT CODE SENTENCE COMMAND...: the command must end with that code and message
 refused() {
 	what=$1 wanted=$2 sentence=$3
 	shift 3
@@ -36,7 +36,7 @@ refused() {
 	row "$what" refused "$sentence"
 }
 
-# turned_away WHAT SENTENCE WORKER-LOG: a worker that is running is told so, and the status does not show it
+# turned_away WHAT SENTENCE WORKER-LOG: a running worker must be told so, and the status must not show it
 turned_away() {
 	tries "$1"
 	until_true 20 grep -qs "$2" "$DIR/$3.log" || fail "$1: $(cat "$DIR/$3.log")"
@@ -44,7 +44,7 @@ turned_away() {
 	row "$1" refused "$2"
 }
 
-# Three commands for a farm; the rest is for those who must not get in.
+# Three commands set up a farm; the others make certificates of parties that must not get in.
 ca init
 ca worker node
 ca client ann
@@ -114,7 +114,7 @@ start_worker plain --tls ""
 turned_away "a worker without TLS" "speaks TLS" plain
 kill -9 "$WORKER"
 
-# What is not TLS at all: an answer or a hang-up, never a wait.
+# Peers that do not speak TLS get an answer or are disconnected, and are never left waiting.
 tries "HTTP to the TLS port"
 timeout 100 "${PYTHON:-python3}" -c '
 import socket, sys
@@ -124,7 +124,7 @@ s.sendall(b"GET / HTTP/1.0\r\n\r\n")
 sys.exit(0 if s.recv(64)[:1] == b"\x15" and s.recv(64) == b"" else 1)' "${COORDINATOR#*:}" || fail "a client that speaks HTTP is not disconnected"
 row "HTTP to the TLS port" refused "an alert, and hung up"
 
-# A good certificate and bad manners.
+# A valid certificate with invalid messages.
 tricks=$(cd "$HERE" && pwd)/intruder.py
 (cd "$DIR" && exec "${PYTHON:-python3}" -B "$tricks" "${COORDINATOR#*:}" "$CA/ann" "$CA/bob") >"$DIR/tricks" 2>"$DIR/err.log" || fail "$(cat "$DIR/err.log")"
 while IFS='|' read -r what answer; do
@@ -132,7 +132,7 @@ while IFS='|' read -r what answer; do
 	row "$what" refused "$answer"
 done <"$DIR/tricks"
 
-# Scenes that reach outside their folder.
+# Scenes that name files outside their folder.
 mkdir "$DIR/scene"
 echo "v 0 0 0" >"$DIR/secret.obj"
 ln -s ../secret.obj "$DIR/scene/link.obj"
@@ -148,7 +148,7 @@ asks_for link.obj "a link that leads out" "must lie below\|outside\|link"
 asks_for device.obj "a device" "."
 asks_for pipe.obj "a named pipe" "."
 
-# Names of images: who fetches a job of somebody else's keeps the own files.
+# Output names of images: fetching another owner's job does not overwrite one's own files.
 programs=$(cd "$BIN" && pwd)
 mkdir "$DIR/home"
 echo precious >"$DIR/home/room.exr"
@@ -164,7 +164,7 @@ calls_it "$DIR/home/.profile" "/home/ann/.profile" "the name of the job's image 
 calls_it ../home/room.exr "like one that is there" "exists: -o FILE"
 [ "$(ls -A "$DIR/home")" = room.exr ] && [ "$(cat "$DIR/home/room.exr")" = precious ] || fail "it was written over: $(ls -lA "$DIR/home")"
 
-# Live connections: revoked, expired.
+# Live connections whose certificate is revoked or expires.
 tries "a worker that is revoked while it is connected"
 tries "a worker whose certificate expires meanwhile"
 ca revoke lost
@@ -173,14 +173,15 @@ row "a worker that is revoked while it is connected" "cut off" "certificate revo
 until_true 10 grep -q 'peer_refused.*name=.\{0,1\}brief.*expired' "$DIR/coordinator.log" || fail "the expired worker stays"
 row "a worker whose certificate expires meanwhile" "cut off" "certificate has expired"
 
-# Whose certificate ends soon is told so, in the log, in the status, and at the terminal; nobody else is.
+# Warnings about a certificate that expires soon appear in the log, in the status and at the terminal, and only for the
+# party that owns it.
 grep -q 'event=tls_expiry' "$DIR/coordinator.log" "$DIR/node1.log" && fail "a warning without a reason"
 grep -q 'level=warn event=tls_expiry text="the certificate of brief expires in' "$DIR/brief.log" || fail "no warning in the worker's log"
 ca client soon --days 5
 $list --tls "$CA/soon" 2>&1 >/dev/null | grep -q 'warning: the certificate of soon expires in 5 days' || fail "no warning for a client"
 $list 2>&1 >/dev/null | grep -q warning && fail "a warning for ann without a reason"
 
-# A renewed certificate is taken up without a restart, and the farm goes on with the same bits.
+# A renewed certificate is loaded without a restart, and the farm continues with the same bits.
 ca coordinator coordinator --renew
 until_true 5 grep -q event=tls_read "$DIR/coordinator.log" || fail "new files are not noticed"
 chains="--integrator pssmlt --bootstrap 20000 --mutations 200000 --epoch 50"
@@ -190,8 +191,9 @@ submit "$BOX" -o "$DIR/farm2.exr" $chains --wait >"$DIR/id" || fail "the second 
 took=$(($(date +%s) - begun))
 same "$DIR/alone2.exr" "$DIR/farm2.exr"
 
-# Rotation: the authority's certificate lasts a week, the coordinator's a day, the worker's longer than that job took. New ones are there before the
-# old ones end, and a job that was begun over the old ones is finished over the new.
+# Rotation: the authority's certificate lasts a week, the coordinator's a day, the worker's longer than that job took.
+# New certificates are there before the old ones expire, and a job that began over the old ones finishes over the new
+# ones.
 export HSLT_CA="$DIR/week"
 ca init --days 7
 ca coordinator coordinator --renew --days 1
@@ -232,7 +234,8 @@ until_true 60 "$BIN/hslt-job" $week fetch j1 -o "$DIR/rotated.exr" 2>>"$DIR/subm
 same "$DIR/alone2.exr" "$DIR/rotated.exr"
 row "a certificate that was renewed in time" "let in" "no restart, equal bits"
 
-# Who waits for an image while the own certificate expires is refused until there is a new one, and then gets it.
+# A client whose certificate expires while it waits for an image is refused until it has a new one, and then gets the
+# image.
 week_says() {
 	grep -q "$1" "$DIR/week.log"
 }
@@ -256,7 +259,8 @@ same "$DIR/alone2.exr" "$DIR/waited.exr"
 row "a client whose certificate expires while it waits" "let in" "after it was renewed, equal bits"
 kill -9 "$WORKER"
 
-# All clients may see which workers there are; what went wrong there, only operators. This one crashes with its first lease.
+# All clients may see which workers there are; only operators see what went wrong there. This worker crashes with its
+# first lease.
 ca operator chief
 start_faulty_worker clumsy crash=1 --tls "$HSLT_CA/swift" --coordinator "127.0.0.1:$(cat "$DIR/port3")"
 "$BIN/hslt-submit" $week "$BOX" -o "$DIR/third.exr" $chains >>"$DIR/id" 2>>"$DIR/submit.log" || fail "the third job: $?"
@@ -274,14 +278,15 @@ kill -9 "$WORKER"
 export HSLT_CA="$CA"
 ROWS=$((ROWS - 2))
 
-# The other way round: TLS to a port without; and only a coordinator can be one.
+# The other way round: TLS to a port without TLS; and only a coordinator's certificate can serve as one.
 "$BIN/hslt-coordinator" --listen 127.0.0.1:0 --port-file "$DIR/port2" --spool "$DIR/spool2" --status-socket "$DIR/status2" --tls "" \
 	--quota-jobs 2 --quota-film 5 --quota-mutations 100000 --quota-assets 0.02 \
 	2>>"$DIR/plain-coordinator.log" &
 PIDS="$PIDS $!"
 until_true 10 test -s "$DIR/port2" || fail "the plain coordinator does not listen"
 refused "TLS to a port without" 6 "does not speak TLS" $list --coordinator "127.0.0.1:$(cat "$DIR/port2")"
-# Its quotas; the box has 1,920 pixels, which are one tile of 4.7 MB in 16 groups, and 2 KB. There is no worker, so that jobs stay.
+# Quotas of a client; the box has 1,920 pixels, which are one tile of 4.7 MB in 16 groups, and 2 KB of files. There is
+# no worker, so that jobs stay.
 plain="$BIN/hslt-submit --coordinator 127.0.0.1:$(cat "$DIR/port2") --tls"
 refused "a film beyond the quota" 6 "quota: the films need" $plain "" "$BOX" -o "$DIR/no.exr" --integrator path --spp 16 --size 100x80
 refused "groups beyond the quota" 6 "quota: the films need" $plain "" "$BOX" -o "$DIR/no.exr" --integrator path --spp 64 --groups 64

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# hslt-compare and hslt-tonemap as programs: exit codes, what they print, the files they leave.
+# hslt-compare and hslt-tonemap as programs: exit codes, output, files.
 . "$(dirname "$0")/lib.sh"
 need hslt-render hslt-compare hslt-tonemap hslt-assemble hslt-accuracy hslt-submit
 
@@ -52,7 +52,7 @@ code 2 "$BIN/hslt-tonemap" a.exr a.png --exposure bright
 code 2 "$BIN/hslt-tonemap" a.exr a.JPG && [ ! -e a.JPG ] || fail "a PNG has the name of another format"
 code 2 "$BIN/hslt-tonemap" a.exr a.svg && [ ! -e a.svg ] || fail "a PNG has the name of an SVG"
 grep -q 'writes PNG only' err.log || fail "a.JPG: $(cat err.log)"
-# - is stdin or stdout, everywhere
+# - means stdin or stdout, everywhere
 code 0 "$BIN/hslt-tonemap" a.exr dash.png
 "$BIN/hslt-tonemap" - - <a.exr 2>err.log | cmp - dash.png || fail "tonemap - -: $(cat err.log)"
 "$BIN/hslt-render" box.xml -o - --integrator path --spp 4 --seed 1 --size 32x32 --threads 1 --quiet 2>err.log | "$BIN/hslt-tonemap" - piped.png ||
@@ -65,7 +65,7 @@ printf x | code 1 "$BIN/hslt-tonemap" - piped.png
 "$BIN/hslt-assemble" a.exr -o - 2>err.log >whole.exr && code 0 "$BIN/hslt-tonemap" whole.exr piped.png && cmp piped.png dash.png ||
 	fail "assemble -o -: $(cat err.log)"
 rm dash.png piped.png
-# and is called so
+# and is named so in messages
 for c in "hslt-render box.xml -o - -i path --spp 1 --size 8x8 --quiet" "hslt-tonemap a.exr -" "hslt-assemble a.exr -o -"; do
 	! "$BIN/"$c >/dev/full 2>err.log || fail "$c: a full disk holds it"
 	grep -q ': stdout: .*No space left' err.log && ! grep -q /dev/stdout err.log || fail "$c on a full disk: $(cat err.log)"
@@ -85,7 +85,7 @@ code 0 "$BIN/hslt-accuracy" box.xml -o - --parameters tolerance --rounds 2 --siz
 code 2 "$BIN/hslt-compare" a.exr again.exr --heatmap -
 code 2 "$BIN/hslt-compare" a.exr again.exr --heatmap /dev/stdout
 rm dash.exr
-# What is no regular file is written to and stays; of a link the file that it leads to is replaced.
+# A target that is no regular file is written to and stays; of a link the file that it leads to is replaced.
 code 0 "$BIN/hslt-tonemap" a.exr b.png --exposure -1
 "$BIN/hslt-tonemap" a.exr /dev/stdout --exposure -1 2>err.log | cmp - b.png || fail "/dev/stdout: $(cat err.log)"
 { printf before && "$BIN/hslt-tonemap" a.exr /dev/stdout --exposure -1 2>err.log; } >after.png
@@ -101,7 +101,7 @@ code 1 "$BIN/hslt-tonemap" a.exr none/a.png
 [ "$(od -An -tx1 -j0 -N8 a.png | tr -d ' ')" = 89504e470d0a1a0a ] || fail "a.png is no PNG"
 [ "$(od -An -tx1 -j16 -N8 heat.png | tr -d ' ')" = 0000001000000010 ] || fail "heat.png is not 16x16"
 
-# kept FILE SENTENCE COMMAND...: it fails, says why, and leaves the file as it was
+# kept FILE SENTENCE COMMAND...: the command fails, gives the reason, and leaves the file as it was
 kept() {
 	file=$1 sentence=$2
 	shift 2
@@ -126,7 +126,7 @@ kept scene.xml 'not a PNG file' "$BIN/hslt-tonemap" a.exr scene.xml
 kept scene.xml 'not an HTML file' "$BIN/hslt-accuracy" box.xml -o scene.xml
 kept scene.xml 'are the same file' "$BIN/hslt-accuracy" scene.xml -o r.html --csv r.html
 kept scene.xml 'which is an input' "$BIN/hslt-submit" -c 127.0.0.1:1 scene.xml -o scene.xml --wait
-# a file that the scene names is an input, too
+# a file that the scene names counts as an input, too
 cp other.exr sky.exr
 cp other.exr lamp.exr
 sed 's|</scene>|<emitter type="envmap"><string name="filename" value="sky.exr"/></emitter></scene>|' box.xml >sky.xml

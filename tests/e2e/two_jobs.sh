@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# Two jobs at once: the one of higher priority ends first, and both have the bits that they have alone. Only files that the
-# spool misses travel.
+# Two jobs at once: the one of higher priority ends first, and both have the bits that they have alone. Only files
+# missing in the spool are sent.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-compare
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# A scene that no worker can build (a file larger than their caches) fails its job once, with one, two and four workers, and whoever
-# submitted it is told what a worker said: by --wait, the status, the log. Where one of three can build it, it is rendered. The farms
-# run at the same time: most of it is pauses.
+# A scene that no worker can build (one of its files is larger than their caches) fails its job once, with one, two and
+# four workers, and the submitter gets a worker's reason: from --wait, the status, the log. If one of three workers can
+# build it, it is rendered. The farms run at the same time, because most of the test is pauses.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job
 SCENE=$DIR/box
@@ -10,7 +10,7 @@ awk 'BEGIN { for (i = 0; i < 30000; i++) print "# a mesh that is too large for a
 WHY='a file of [0-9]* bytes exceeds its limit'
 JOB="--integrator path --spp 4"
 
-# farm NAME WORKERS: those are too small; what runs is in PIDS
+# farm NAME WORKERS: starts workers whose caches are too small; the processes are in PIDS
 farm() {
 	DIR=$DIR/$1
 	PIDS=

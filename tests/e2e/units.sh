@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# deploy/systemd: systemd finds nothing wrong with the units and little exposed; the system calls that the daemons make are
-# those that the units let through; with a socket, a watchdog and a notification socket as from systemd, the coordinator does
-# its part.
+# deploy/systemd: systemd finds no error in the units and little exposure; the daemons make only system calls that the
+# units allow; with a socket, a watchdog and a notification socket as from systemd, the coordinator does its part.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status
 for p in systemd-analyze systemd-socket-activate socat; do
@@ -29,7 +28,7 @@ for u in *.service; do
 done
 sed -i '/^ExecStart/s|=.*|=/none/such|' hslt-worker@.service
 systemd-analyze verify ./hslt-worker@.service >/dev/null 2>&1 && fail "verify does not look"
-# How long it reads its jobs depends on them alone: who stopped it meanwhile would do so for ever.
+# The time for reading jobs depends only on their size: a timeout would stop each start again.
 grep -qx 'TimeoutStartSec=infinity' hslt-coordinator.service || fail "the coordinator's start has a limit"
 cd "$HOME_FOLDER"
 
@@ -43,7 +42,7 @@ done
 
 # ---- system calls ----
 
-# The names in the sets that begin with @, down to the last.
+# Expands the sets of system calls that begin with @ to their names.
 syscalls() {
 	for s in "$@"; do
 		case $s in
@@ -55,7 +54,7 @@ syscalls() {
 
 command -v strace >/dev/null || lacks "no strace (deploy/setup.sh --full installs it)"
 TRACE=
-# Sanitizers make calls of their own, and look for leaks only where nobody traces.
+# Sanitizers make system calls of their own, and their leak check fails under a tracer.
 if grep -q __asan_init "$BIN/hslt-worker"; then
 	skip_part "system calls: those of programs with sanitizers are others"
 elif strace -f -c -U name -o "$DIR/try" true 2>/dev/null && grep -q "^total" "$DIR/try"; then
@@ -64,7 +63,7 @@ else
 	skip_part "system calls: strace may not trace here"
 fi
 
-# within UNIT TRACE-FILE
+# within UNIT TRACE-FILE: all traced system calls are allowed by the unit
 within() {
 	until_true 10 grep -q '^total' "$2" || fail "no list of system calls of $1: $(cat "$2")"
 	sed -n 's/^\([a-z0-9_]*\) *$/\1/p' "$2" | grep -vx 'syscall\|total' | sort -u >"$DIR/called"
@@ -74,13 +73,13 @@ within() {
 	sed -n 's/^SystemCallFilter=~\(.*\)/\1/p' "$UNITS/$1" >"$DIR/filter"
 	syscalls $(cat "$DIR/filter") | sort -u >"$DIR/without"
 	comm -23 "$DIR/with" "$DIR/without" >"$DIR/allowed"
-	# SQLite calls fchown when it runs as root, as a test may and the service does not, and lives with a refusal.
+	# SQLite calls fchown when it runs as root, as a test may and the service does not; it tolerates a refusal.
 	refused=$(comm -23 "$DIR/called" "$DIR/allowed" | grep -vx fchown | tr '\n' ' ')
 	[ -z "$refused" ] || fail "$1 refuses what the program calls: $refused"
 	echo "$1: $(wc -l <"$DIR/called") system calls, all let through"
 }
 
-# ---- as under systemd ----
+# ---- started as by systemd ----
 
 socat -u "UNIX-RECV:$DIR/notify" "OPEN:$DIR/heard,creat,append" 2>>"$DIR/socat.log" &
 PIDS="$PIDS $!"
@@ -90,7 +89,7 @@ systemd-socket-activate -l "$DIR/status" -E NOTIFY_SOCKET="$DIR/notify" -E WATCH
 	--spool "$DIR/spool" 2>>"$DIR/coordinator.log" &
 COORDINATOR_PID=$!
 PIDS="$PIDS $COORDINATOR_PID"
-# There is a moment between the socket's name and that it listens.
+# The socket's file exists a moment before the socket listens.
 connects() {
 	"$BIN/hslt-status" >"$DIR/shown" 2>"$DIR/connect.log" || ! grep -q 'No such file\|refused' "$DIR/connect.log"
 }

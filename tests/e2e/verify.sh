@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-# A worker whose results have one wrong bit, among honest ones: with --verify 1 the image is that of hslt-render, the liar is quarantined
-# permanently, and nothing of it counts as the job's failures. A share finds one that lies now and then. What was merged
-# unverified is said. Before: what becomes of connections when a worker starts again.
+# A worker whose results have one wrong bit, among honest ones: with --verify 1 the image is that of hslt-render, the
+# faulty worker is quarantined permanently, and none of its results count as failures of the job. A share of verified
+# leases finds a worker that is wrong now and then. A note says how much was merged unverified. First: which connections
+# are replaced when a worker starts again.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-render hslt-job hslt-compare
 
-# says FILE WORDS
+# says FILE WORDS: checks that the file contains the words
 says() {
 	grep -q -F -- "$2" "$1" || fail "$1 does not say '$2': $(tail -n 5 "$1" | cut -c 1-600)"
 }
@@ -52,7 +53,7 @@ says "$DIR/workers" '"state": "quarantined"'
 "$BIN/hslt-job" log "$id" >"$DIR/log"
 says "$DIR/log" "worker=\"liar\""
 
-# It is recognised after a restart of its own, under another name, and after a restart of the coordinator.
+# The worker is recognised after its own restart, under another name, and after a restart of the coordinator.
 stop $liar
 start_worker saint
 saint=$WORKER
@@ -68,7 +69,8 @@ id=$(submit "$BOX" -o "$DIR/half.exr" $JOB --wait)
 same "$DIR/alone.exr" "$DIR/half.exr"
 [ "$(value "$id" verify)" = 0.5 ] || fail "the least share is $(value "$id" verify)"
 
-# Its unverified results cannot be taken out: the note says how many there are. Some are merged unverified before it is found out.
+# Its unverified results cannot be removed: the note says how many there are. Some are merged before the worker is found
+# out.
 stop $saint $a $b
 kill -9 $COORDINATOR_PID
 wait $COORDINATOR_PID 2>/dev/null || :
@@ -80,7 +82,7 @@ until_true 20 waits || fail "it waits for '$(value "$id" waiting)'"
 start_worker honest3
 start_worker honest4
 until_true 60 is_state "$id" done || fail "$id is $(value "$id" state): $(value "$id" why)"
-# The last leases of the job may be verified, and the liar found out, as it ends.
+# The last leases of the job may be the verified ones, so that the worker is found out as the job ends.
 tells() {
 	"$BIN/hslt-status" "$id" >"$DIR/shown"
 	grep -q "worker liar is quarantined (wrong result: j" "$DIR/shown"

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-# deploy/workers.sh starts workers over ssh; here ssh is a shell on this machine.
+# deploy/workers.sh starts workers over ssh; in this test ssh is a shell on this machine.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-status
 
 cat >"$DIR/ssh" <<'TEXT'
 #!/bin/sh
-# ssh HOST COMMAND, without the network
+# ssh HOST COMMAND, without a network
 shift
 exec sh -c "$1"
 TEXT
@@ -20,7 +20,8 @@ start() {
 stop_there() {
 	sh "$HERE/../../deploy/workers.sh" --stop node1
 }
-# Another host's, with the same home, and one of before the host was started again: its number is somebody else's now.
+# Files of another host with the same home, and of this host before a reboot: the recorded process id now belongs to
+# another process.
 sleep 600 &
 SLEEPER=$!
 PIDS="$PIDS $SLEEPER"

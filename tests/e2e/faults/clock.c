@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A wall clock that jumps, for LD_PRELOAD: so many seconds as the file HSLT_CLOCK says are added to it. The monotonic
+/* A wall clock that jumps, for LD_PRELOAD: it is ahead by the number of seconds in the file HSLT_CLOCK. The monotonic
  * clock is the kernel's. */
 #define _GNU_SOURCE
 #include <fcntl.h>

@@ -19,7 +19,7 @@ coordinator_dies() {
 times_restored() {
 	times_said coordinator "event=job_state job=$ID state=restored"
 }
-# since `restores` was counted: otherwise it had ended
+# restored since `restores` was counted; otherwise the job had ended
 is_restored() {
 	[ "$(times_restored)" -gt "$restores" ]
 }
@@ -34,7 +34,7 @@ checkpoint_coordinator() {
 	finish_job
 	grep -q 'state=restored .*checkpoint=[1-9]' "$DIR/coordinator.log" || fail "$NAME: never from a checkpoint"
 }
-# Not before there is one: the disk may be slow.
+# Not before there is a checkpoint: the disk may be slow.
 coordinator_dies_early() {
 	until_true 30 has_checkpoint_or_ended || fail "$NAME: no checkpoint is made"
 	coordinator_dies --journal 0.05
@@ -76,7 +76,8 @@ patient_client() {
 	wait $waiting || fail "$NAME: hslt-submit --wait ended with $?"
 	[ -s "$DIR/image.exr" ] || fail "$NAME: no image"
 	finish_job
-	# nobody comes back: it says how to get the image, and the status says that nobody is there. Without workers the job cannot end before.
+	# The coordinator does not come back: hslt-submit says how to get the image, and the status that there is no
+	# coordinator. Without workers the job cannot end before.
 	stop "$first" "$WORKER"
 	# shellcheck disable=SC2086
 	"$BIN/hslt-submit" "$BOX" -o "$DIR/late.exr" $JOB --wait --patience 0.5 >"$DIR/id2" 2>>"$DIR/give-up.log" &
@@ -91,7 +92,7 @@ patient_client() {
 	"$BIN/hslt-status" >"$DIR/status.log" 2>&1 && fail "$NAME: somebody is there"
 	grep -q 'no coordinator\|not there\|refused' "$DIR/status.log" || fail "$NAME: hslt-status says: $(cat "$DIR/status.log")"
 }
-# Also when the image has been fetched: hslt-submit waits for this job alone.
+# The job must also be fetched: hslt-submit waits for this job alone.
 patient_coordinator_dies() {
 	coordinator_dies
 	LATE=
@@ -112,7 +113,8 @@ long_journal() {
 		fail "$NAME: no worker called meanwhile"
 	blameless
 }
-# two shares that are not the same, a list, and an order that is carried out when the journal has been read; held, lest it end before
+# Two jobs with different files, a list, and an order that is carried out once the journal has been read; the jobs are
+# on hold, so that they do not end before.
 journal_is_read_slowly() {
 	hold_job
 	kill -9 "$COORDINATOR_PID"

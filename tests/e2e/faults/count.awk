@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-# What came of a job's results. Reads the coordinator's log of all its runs (-v), then the workers' logs (-v), and prints
-# "LOST DOUBLED RESULTS AGAIN".
+# Counts what happened to a job's results. Reads the coordinator's log of all its runs (-v), then the workers' logs (-v),
+# and prints "LOST DOUBLED RESULTS AGAIN".
 #   awk -v job=j1 -f count.awk coordinator.log w1.log ...
-# The film of a run is what the coordinator found on the disk when it started, and what it merged from then on. LOST are
-# results that were acknowledged and that it had to merge again in a later run, or that the last film does not hold; and
-# those of which a worker was told that they count and that never were on the disk. What a run merged and lost before it was
-# acknowledged is computed again and is no loss, nor is what the coordinator took back, before or after it was on the disk. DOUBLED: how often a film held a result beyond the first time. RESULTS: how
-# many the last film holds. AGAIN: the most epochs of one chain that were given out again because one worker was gone that had them, or
-# one run of the coordinator; one that is given to two at once, as at the end of a round, is no loss.
+# The film of a run contains the results that the coordinator found on the disk when it started, and those that it merged
+# from then on.
+# LOST: acknowledged results that the coordinator had to merge again in a later run, or that the last film does not
+# contain; and results that a worker was told were merged but that never were on the disk. A result that a run merged and
+# lost before it was acknowledged is computed again and is no loss, nor is one that the coordinator took back, before or
+# after it was on the disk.
+# DOUBLED: how often a film contained a result beyond the first time. RESULTS: the number of results in the last film.
+# AGAIN: for one chain, the largest number of epochs that were given out again because one worker, or one run of the
+# coordinator, was lost. An epoch that is given to two workers at once, as at the end of a round, does not count.
 
 function get(name) {
 	return match($0, " " name "=[^ ]*") ? substr($0, RSTART + length(name) + 2, RLENGTH - length(name) - 2) : ""

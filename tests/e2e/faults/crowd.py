@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""crowd.py PORT: 2,000 connections that say nothing, until they are disconnected; meanwhile 2,000 more: 500 hellos of another version, 500 with
-a wrong bit, rubbish, half a header. Prints "idle", then "gone", then "done"."""
+"""crowd.py PORT: opens 2,000 connections that send nothing until they are disconnected; meanwhile 2,000 more send, 500 each, a
+hello of another version, a hello with a wrong bit, garbage, or half a header. Prints "idle", then "gone", then "done"."""
 import socket, sys
 from wire import VERSION, hello
 

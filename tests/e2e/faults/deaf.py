@@ -6,7 +6,7 @@ from wire import field, frame, hello
 
 
 def is_cut_off(s, words, most):
-    """Says words until the other side hangs up; most: bytes that we may be allowed to say before."""
+    """Sends words until the other side hangs up; most: bytes that it may accept before."""
     s.settimeout(0.2)
     said, end = 0, time.monotonic() + 120
     while time.monotonic() < end:

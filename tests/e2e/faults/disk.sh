@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# Faults of the disk: those of tests/coordinator/power_loss, where the coordinator's calls go through a disk that loses what was not
-# synchronised. The test counts for itself: what was acknowledged and is not there, what a film holds too often, images of other bits.
+# Faults of the disk: the tests in tests/coordinator/power_loss, where the coordinator's calls go through a disk that
+# loses what was not synchronised. These tests count acknowledged results that are missing, results that a film contains
+# twice, and images with other bits.
 
 fault power 101 0 "power is lost at any of the coordinator's disk operations"
 power() {
@@ -17,7 +18,7 @@ failing_starts() {
 	disk_test "failing starts" 1 20
 }
 
-# disk_test WHAT SEEDS STEP: TIMES is how often it says that it did that
+# disk_test WHAT SEEDS STEP: sets TIMES to the number of such events that the test reports
 disk_test() {
 	[ -x "$BUILD/tests/coordinator/power_loss/test_durability" ] || fail "$NAME: tests/coordinator/power_loss/test_durability is not built"
 	HSLT_POWER_SEEDS=$2 HSLT_FAULT_STEP=$3 "$BUILD/tests/coordinator/power_loss/test_durability" >"$DIR/power.log" 2>&1 && CODE=0 || CODE=$?

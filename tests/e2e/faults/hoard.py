@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""hoard.py PORT FINGERPRINT: a worker of that fingerprint that claims 4,096 threads, takes all leases that it gets, says its heartbeats,
-and answers nothing; it comes back when it is disconnected, as it is on a machine that stands still. Prints a line for each lease."""
+"""hoard.py PORT FINGERPRINT: a worker of that fingerprint that claims 4,096 threads, takes all leases that it gets, sends heartbeats,
+and returns no result; if it is disconnected, because the machine stood still, it reconnects. Prints a line for each lease."""
 import socket, sys, time
 from wire import field, frame, hello
 
 
 def hoard(s):
-    """Until it is disconnected."""
+    """Runs until the worker is disconnected."""
     s.sendall(hello(1, b"hoarder", field(4, sys.argv[2].encode()) + field(5, 4096)))
     s.sendall(frame(field(20, field(1, 4097))))
     s.settimeout(0.1)
     heard = b""
-    first = 8  # of the first frame the lengths alone
+    first = 8  # bytes before the header: the first frame has only its lengths
     said = 0
     while True:
         if time.monotonic() > said + 0.1:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# The attempts that tls.sh writes ("tried|WHAT" before, "refused|WHAT" or "cut off|WHAT" after), by kind: a row "KIND|HOW|TRIED|REFUSED"
-# each, in this order. Ends with 1 when an attempt belongs to no kind, or was not refused.
+# Sorts the attempts that tls.sh writes ("tried|WHAT" before, "refused|WHAT" or "cut off|WHAT" after) by kind, and
+# prints a row "KIND|HOW|TRIED|REFUSED" for each kind, in this order. The exit code is 1 if an attempt belongs to no
+# kind, or was not refused.
 function kind_of(what) {
 	if (what ~ /without TLS|no certificate|HTTP|port without/) return "no certificate, or no TLS"
 	if (what ~ /another authority|trusts this farm/) return "a certificate of another authority"

@@ -17,7 +17,8 @@ through_proxy() {
 	blameless
 }
 
-# happens ACTION FIELD: to the next message of that kind, of another job where this one was done without one
+# happens ACTION FIELD: does this to the next message of that kind, or to one of another job if this job ended without
+# one
 happens() {
 	echo "$1 $2" >"$DIR/order.tmp"
 	mv "$DIR/order.tmp" "$DIR/order"
@@ -32,7 +33,7 @@ is_taken_or_late() {
 	[ ! -e "$DIR/order" ] || is_state "$ID" done
 }
 
-# and the worker comes back
+# and the worker reconnects
 is_cut() {
 	calls=$(times_said w1 event=connect\ )
 	happens "$@"
@@ -53,7 +54,7 @@ fault stall_result 3 1 "half a result arrives, and then nothing"
 stall_result() {
 	through_proxy is_stalled
 }
-# The other worker stands still meanwhile, lest it does the job alone.
+# The other worker is stopped meanwhile, so that it does not do the job alone.
 is_stalled() {
 	stand_still "$OTHER"
 	is_cut stall 22
@@ -64,7 +65,7 @@ fault slow_result 3 1 "results take longer to arrive than a worker may be silent
 slow_result() {
 	through_proxy is_slow
 }
-# The other worker stands still until the result is there, lest the job is done by it alone meanwhile.
+# The other worker is stopped until the result has arrived, so that it does not do the job alone meanwhile.
 is_slow() {
 	stand_still "$OTHER"
 	for try in 1 2 3 4 5; do # a machine that stands still for a second cuts it off, too
@@ -89,7 +90,8 @@ fault late_result 3 1 "results arrive after their worker was given up"
 late_result() {
 	through_proxy is_late
 }
-# The other worker stands still until the last is late and was missed, lest it does the job alone.
+# The other worker is stopped until the last message is late and its sender was given up, so that it does not do the job
+# alone.
 is_late() {
 	stand_still "$OTHER"
 	happens late 22
@@ -109,7 +111,7 @@ fault twice_result 10 1 "the network delivers results twice"
 twice_result() {
 	through_proxy is_twice
 }
-# The other worker stands still meanwhile. Of the last result of a job the second copy is refused, since the job is over.
+# The other worker is stopped meanwhile. The second copy of a job's last result is refused, since the job is over.
 is_twice() {
 	stand_still "$OTHER"
 	repeats=$(times_said coordinator event=batch_repeated)
@@ -132,7 +134,8 @@ flip_bits() {
 	[ "$("$BIN/hslt-status" --json | grep -o '"garbledConnections":[0-9]*' | cut -d: -f2)" -eq \
 		"$(grep -c event=peer_garbled "$DIR/coordinator.log")" ] || fail "$NAME: the coordinator counts other connections than it tells of"
 }
-# Messages both ways, with a payload and without. The other worker stands still meanwhile, lest it does the job alone.
+# Messages in both directions, with a payload and without. The other worker is stopped meanwhile, so that it does not do
+# the job alone.
 is_flipped() {
 	stand_still "$OTHER"
 	flipped=$(cat "$DIR/coordinator.log" "$DIR/w1.log" | grep -c event=peer_garbled) || :
@@ -179,7 +182,7 @@ crowd() {
 	finish_job
 	blameless
 }
-# The job goes on meanwhile; then it is held, lest it end before the coordinator is started again.
+# The job runs meanwhile; then it is held, so that it does not end before the coordinator is started again.
 crowd_comes() {
 	lines=$(grep -c . "$DIR/coordinator.log")
 	before=$(date +%s)
@@ -204,7 +207,7 @@ crowd_comes() {
 	[ $said -le $most ] || fail "$NAME: $said lines, at most $most"
 	[ "$i" -lt "$TIMES" ] || kill -9 "$COORDINATOR_PID"
 }
-# how many refusals the log tells of since then, and how many it counts
+# how many refusals the log has shown since then, and how many it has counted
 told() {
 	tail -n +$((lines + 1)) "$DIR/coordinator.log" |
 		awk '/ event=peer_(garbled|refused) / { n++ } / event=log_withheld of=peer_(garbled|refused) / { sub(/.* more=/, ""); n += $0 } END { print n + 0 }'

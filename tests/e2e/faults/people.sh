@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# What people do to a job, and workers that lie.
+# What users do to a job, and workers that return wrong results.
 
 fault held 10 1 "the job is held, and released"
 held() {
@@ -40,7 +40,7 @@ spoiled_states() {
 	finish_job
 	taken_back
 }
-# after the bootstrap, and long before the last epochs: nobody goes on from those
+# after the bootstrap, and long before the last epochs, from which no lease continues
 while_chains_go_on() {
 	i=0
 	while [ $i -lt "$TIMES" ]; do
@@ -49,7 +49,7 @@ while_chains_go_on() {
 		"$@"
 	done
 }
-# The other worker stands still meanwhile, lest it leaves only the last epochs.
+# The other worker is stopped meanwhile, so that more than the last epochs is left.
 somebody_spoils() {
 	hold_job $((RESULTS / 4)) $((RESULTS * 3 / 4))
 	faulty_worker "liar$i" spoil=1,lie=1,hang=3 --cache "$DIR/cache$i" # its own, or it would be another start of the same worker
@@ -125,7 +125,7 @@ targets() {
 		[ $i -eq 2 ] || same "$QUIET" "$DIR/real.exr"
 	done
 }
-# Before the first round is complete there is none.
+# Before the first round is complete there is no preview.
 fetches_preview_into() {
 	until_true 30 has_round || fail "$NAME: no round of $ID is complete"
 	fetches_into fetch --preview "$ID"
@@ -133,7 +133,8 @@ fetches_preview_into() {
 has_round() {
 	[ "$(value "$ID" rounds)" -gt 0 ] 2>/dev/null
 }
-# fetches_into ARGUMENT...: of hslt-job; what it writes is in real.exr but for the device, which is a mount: nobody could replace it
+# fetches_into ARGUMENT...: fetches the image with hslt-job to the I-th kind of target; what the target passes on is in
+# real.exr, except for the device, which drops it (and, being a mount, could not be replaced anyway)
 fetches_into() {
 	rm -f "$DIR/target.exr" "$DIR/real.exr"
 	case $i in
@@ -214,7 +215,7 @@ somebody_sends_it() {
 	until_true 60 is_state "$other" failed || fail "$NAME: $other is $(value "$other" state)"
 	"$BIN/hslt-job" log "$other" 2>&1 | grep -q 'large.png: 16000 x 16000 pixels; at most' || fail "$NAME: $("$BIN/hslt-job" log "$other" 2>&1)"
 }
-# The most memory that the process of a worker had, in KB.
+# Prints the peak memory of a worker's process, in KB.
 peak() {
 	awk '/^VmHWM/ { print $2 }' "/proc/$(renders "$WORKER")/status"
 }

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""picture.py PORT FOLDER: makes FOLDER/large.png, 140 KB that promise 16,000 x 16,000 pixels of one bit, and submits FOLDER/box.xml by hand,
-so that no program of ours looks at it before; until all of it is taken."""
+"""picture.py PORT FOLDER: makes FOLDER/large.png, 140 KB that announce 16,000 x 16,000 pixels of one bit, and submits
+FOLDER/box.xml by hand, so that no client program checks it before. Ends once the coordinator has all files."""
 import hashlib, os, socket, struct, sys, zlib
 from wire import field, frame, hello
 
@@ -37,7 +37,7 @@ def read(n):
 
 
 def hear(prefix):
-    """The next message but heartbeats, which say that an answer takes its time."""
+    """Returns the next message, skipping heartbeats, which are sent while an answer takes its time."""
     while True:
         message = read(struct.unpack(">I", read(prefix)[:4])[0])
         if message != b"\x1a\x00":

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A network of our own: proxy.py PORT-FILE TARGET-PORT ORDER-FILE passes frames on between who connects and the target.
+"""A faulty network: proxy.py PORT-FILE TARGET-PORT ORDER-FILE passes frames on between its callers and the target.
 
-When ORDER-FILE holds "ACTION FIELD", that is done to the next message of this field of the envelope (proto/farm.proto), either
-way, and the file goes:
-  cut    half of it, then the connection is closed on both sides
-  stall  half of it, then nothing more, either way, until one side hangs up
-  twice  it is sent twice
-  slow   it takes two seconds, piece by piece; then there is a file ORDER-FILE.done
-  late   it, and what is behind it, two and a half seconds later
-  flip   one of its bits is another one: of the first such message one in the middle, then any, also of its lengths and checksums"""
+When ORDER-FILE holds "ACTION FIELD", the action is applied to the next message with this field of the envelope (proto/farm.proto),
+in either direction, and the file is removed:
+  cut    half of the message passes, then the connection is closed on both sides
+  stall  half of the message passes, then nothing more in either direction until one side hangs up
+  twice  the message is sent twice
+  slow   the message takes two seconds, piece by piece; then the file ORDER-FILE.done is created
+  late   the message, and all that follows it, arrive two and a half seconds later
+  flip   a bit is flipped: in the middle of the first such message, then anywhere, including lengths and checksums"""
 import asyncio, os, random, sys
 
 port_file, target, order_file = sys.argv[1], int(sys.argv[2]), sys.argv[3]
@@ -56,7 +56,7 @@ def flip(frame):
 
 
 async def one_way(pair, source, sink):
-    before = 8  # what is before the header: of the first frame the lengths alone
+    before = 8  # bytes before the header: the first frame has only its lengths
     try:
         while True:
             prefix = await source.readexactly(before)

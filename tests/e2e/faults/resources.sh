@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# What machines run out of.
+# Resources that machines run out of.
 
-# A spool of its own size, where that is possible.
+# A spool on a disk of its own size, where that is possible.
 small_spool() {
 	[ -n "${HSLT_OWN_MOUNTS:-}" ] || { cannot "no name spaces for mounts here" && return 1; }
 	mkdir "$DIR/spool"
@@ -19,7 +19,7 @@ full_disk() {
 	each_time disk_is_full
 	finish_job
 }
-# The workers stand still until there is no room for what they send, lest the job ends before.
+# The workers are stopped until there is no room for their results, so that the job does not end before.
 disk_is_full() {
 	hold_job
 	stand_still "$first" "$WORKER"
@@ -36,7 +36,7 @@ disk_is_full() {
 	grep -q 'No space left\|full' "$DIR/submit.log" || fail "$NAME: the refusal does not say why: $(tail -n 1 "$DIR/submit.log")"
 	rm "$DIR/spool/filler"
 }
-# Again and again: the coordinator makes room by deleting the films of jobs that have ended.
+# Repeated, because the coordinator makes room by deleting the films of jobs that have ended.
 fill_disk() {
 	cat /dev/zero >>"$DIR/spool/filler" 2>/dev/null || :
 }
@@ -130,7 +130,7 @@ memory_runs_out() {
 	kill -0 "$COORDINATOR_PID" 2>/dev/null || again # as a service manager does
 	[ ! -s "$DIR/large" ] || until_true 30 is_refused "$(cat "$DIR/large")" || fail "$NAME: $(cat "$DIR/large") is $(value "$(cat "$DIR/large")" state)"
 }
-# A job that was taken fails with a sentence, or goes on when there is memory.
+# An accepted job fails with a sentence, or continues once there is memory.
 is_refused() {
 	"$BIN/hslt-job" cancel "$1" 2>>"$DIR/submit.log" || :
 	is_state "$1" failed || is_state "$1" cancelled || is_state "$1" done

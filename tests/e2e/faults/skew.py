@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""skew.py PORT: workers and clients of the version before and after, these with fields that nobody here knows. Fails unless each is
-told which side is the older one."""
+"""skew.py PORT: workers and clients of the previous and the next version, the latter with unknown fields. Fails unless each is told
+which side is the older one."""
 import socket, sys
 from wire import VERSION, field, first_frame
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A disk that is slow to read, for LD_PRELOAD: each piece of a job's journal takes HSLT_SLOW microseconds longer. */
+/* A disk with slow reads, for LD_PRELOAD: each piece of a job's journal takes HSLT_SLOW microseconds longer. */
 #define _GNU_SOURCE
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# Faults of what lies in the spool: bits that fall over, files that are gone.
+# Faults of files in the spool: flipped bits, missing files.
 
-# flip FILE SHARE: one bit, so far into the file
+# flip FILE SHARE: flips one bit at this share of the file's length
 flip() {
 	"$PYTHON" - "$1" "$2" <<'TEXT' || fail "$NAME: no bit of $1"
 import os, sys
@@ -15,8 +15,9 @@ with open(path, "r+b") as f:
 TEXT
 }
 
-# flip_result JOURNAL SHARE: one bit in the body of the first result (a record of kind 1 or 5; JOURNAL_RECORD in
-# coordinator/store/journal_file.h) that lies so far into the journal, and "result"; without one there, one bit anywhere
+# flip_result JOURNAL SHARE: flips one bit in the body of the first result (a record of kind 1 or 5; JOURNAL_RECORD in
+# coordinator/store/journal_file.h) from this share of the journal on, and prints "result"; if there is none, flips one
+# bit anywhere
 flip_result() {
 	"$PYTHON" - "$1" "$2" <<'TEXT' || fail "$NAME: no bit of $1"
 import struct, sys
@@ -37,7 +38,7 @@ with open(path, "r+b") as f:
 TEXT
 }
 
-# finish_damaged COUNT: so many results were damaged and are computed again; those are not what the row counts
+# finish_damaged COUNT: so many results were damaged on purpose and are computed again; the row does not count these
 finish_damaged() {
 	DAMAGED=$1
 	finish_job
@@ -52,14 +53,15 @@ journal_bit() {
 	job
 	each_time journal_is_damaged
 	finish_damaged "$TIMES"
-	# The first result that is damaged is named; a later one may have been taken back before, and is needed no more.
+	# The first damaged result is named; a later one may have been taken back before, and is no longer needed.
 	! grep -q result "$DIR/flipped" || grep -q 'level=error event=spool_fault .*the journal is damaged: .* computed again: [br]' "$DIR/coordinator.log" ||
 		fail "$NAME: it does not say what is lost"
-	# Whether a result behind the damaged one waits for it depends on where the journal was cut: of several, one does.
+	# Whether a result after the damaged one must wait for it depends on where the journal was cut: of several, one
+	# does.
 	[ "$TIMES" -lt 3 ] || grep -q 'batch_merged .*late=1' "$DIR/coordinator.log" || fail "$NAME: nothing waited for what was damaged"
 	blameless
 }
-# Held, lest it has ended and has no journal.
+# On hold, because an ended job has no journal.
 journal_is_damaged() {
 	hold_job
 	kill -9 "$COORDINATOR_PID"
@@ -88,7 +90,8 @@ clock_ahead() {
 	! grep -q 'event=job_cleared' "$DIR/coordinator.log" || fail "$NAME: $(grep 'event=job_cleared' "$DIR/coordinator.log")"
 	unset HSLT_CLOCK
 }
-# 40 days and 4 s ahead, a job ends (which makes the coordinator look at the ages), it starts again, and all is as before
+# The clock jumps 40 days and 4 s ahead, a job ends (which makes the coordinator look at the ages), the coordinator
+# restarts, and all is as before.
 clock_goes_ahead() {
 	echo 3456004 >"$DIR/clock"
 	"$BIN/hslt-submit" "$BOX" -o "$DIR/small$i.exr" --integrator path --size 16x16 --spp 1 --wait 2>>"$DIR/submit.log" >"$DIR/small.id" || fail "$NAME: no job"
@@ -111,7 +114,7 @@ jobs_database() {
 	finish_job
 	[ "$(grep -c 'level=error event=spool_fault' "$DIR/coordinator.log")" -gt 0 ] || fail "$NAME: it does not say what was lost"
 }
-# Held, lest it has ended.
+# On hold, so that the job does not end.
 database_is_damaged() {
 	hold_job
 	kill -9 "$COORDINATOR_PID"
@@ -139,7 +142,7 @@ plan_changed() {
 	finish_job
 	[ "$(grep -c 'its row in jobs.db was damaged: restored from jobs-copy.db' "$DIR/coordinator.log")" -eq "$TIMES" ] || fail "$NAME: not noticed"
 }
-# Held, lest it has ended.
+# On hold, so that the job does not end.
 plan_is_changed() {
 	hold_job
 	kill -9 "$COORDINATOR_PID"
@@ -200,7 +203,7 @@ folder_gone() {
 	finish_job
 	blameless
 }
-# The job is held meanwhile, lest it end before it is noticed.
+# The job is held meanwhile, so that it does not end before the loss is noticed.
 folder_goes() {
 	hold_job
 	seen=$(times_noticed)
@@ -224,7 +227,7 @@ times_noticed() {
 is_noticed() {
 	[ "$(times_noticed)" -gt "$seen" ]
 }
-# its results can be stored again since it was restored
+# its results can be stored again since the folder was restored
 is_mended() {
 	grep 'being restored\|state=released text=""' "$DIR/coordinator.log" | tail -n 1 | grep -q state=released
 }
@@ -239,7 +242,7 @@ file_damaged() {
 	finish_job
 	blameless
 }
-# Held meanwhile, lest the worker ends the job before it stops.
+# The job is held meanwhile, so that the worker does not end it before it is put on hold.
 file_is_damaged() {
 	hold_job
 	for f in "$DIR/spool/blobs"/[0-9a-f]*; do

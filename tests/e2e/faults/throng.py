@@ -25,13 +25,13 @@ class Peer:
         return out
 
     def hear(self):
-        """Message and payload."""
+        """Returns message and payload."""
         m, p = struct.unpack(">II", self.take(self.prefix)[:8])
         return self.take(m), self.take(p)
 
 
 def words(message):
-    """The fields of a message, the last one of each number."""
+    """Returns the fields of a message; of several with one number, the last."""
     out, i = {}, 0
 
     def number():
@@ -93,7 +93,7 @@ while waiting < 400 and not is_refused(clients[waiting]):
 print("chunk", largest, "waiting", waiting, flush=True)
 for c in clients[:-1]:
     c.s.close()
-for _ in range(1000):  # until it has noticed
+for _ in range(1000):  # until the coordinator has noticed
     if not is_refused(clients[-1]):
         print("accepted")
         break

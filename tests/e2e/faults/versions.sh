@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Programs that do not fit together.
+# Programs of different versions.
 
 fault skew 3 1 "workers and clients of an older and a newer protocol connect"
 skew() {
@@ -35,7 +35,7 @@ TEXT
 	grep -q event=batch_acknowledged "$DIR/o1.log" && fail "$NAME: the other build has worked on it"
 	return 0
 }
-# The job is held until the other worker has gone, lest that one ends it.
+# The job is held until the other worker has gone, so that that worker does not end it.
 another_comes() {
 	hold_job
 	stop "$WORKER"

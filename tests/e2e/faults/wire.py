@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The conversation's words, as bytes (proto/farm.proto), for peers that tests make up."""
+"""Messages of the protocol as bytes (proto/farm.proto), for peers that tests simulate."""
 import os, re, struct, sys
 
 sys.dont_write_bytecode = True
@@ -16,7 +16,7 @@ def varint(n):
 
 
 def field(number, value):
-    """A varint for a number, else bytes with their length."""
+    """Returns a field: a varint for a number, otherwise bytes with their length."""
     if isinstance(value, int):
         return varint(number << 3) + varint(value)
     return varint(number << 3 | 2) + varint(len(value)) + value
@@ -33,7 +33,7 @@ TABLE = list(_table())
 
 
 def crc32c(data):
-    """Castagnoli, a byte at a time."""
+    """CRC-32C (Castagnoli), one byte at a time."""
     c = 0xFFFFFFFF
     for byte in data:
         c = c >> 8 ^ TABLE[(c ^ byte) & 255]
@@ -41,18 +41,18 @@ def crc32c(data):
 
 
 def first_frame(message):
-    """The first one in its direction has no checksums."""
+    """Returns the first frame of a direction, which has no checksums."""
     return struct.pack(">II", len(message), 0) + message
 
 
 def hello(role, name, more=b"", version=VERSION):
-    """With the checksum of its bytes; more: its fields from 4 on."""
+    """Returns a hello with the checksum of its bytes; more: its fields from 4 on."""
     def words(check):
         return field(1, field(1, version) + field(2, role) + field(3, name) + more + struct.pack("<BI", 15 << 3 | 5, check))
     return first_frame(words(crc32c(words(0)[:-4])))
 
 
 def frame(message, payload=b""):
-    """What is longer than anybody takes is refused by its length."""
+    """Returns a later frame. A message too long to be accepted gets no checksum, because its length is refused first."""
     head = struct.pack(">III", len(message), len(payload), crc32c(message + payload) if len(message) < 1 << 23 else 0)
     return head + struct.pack(">I", crc32c(head)) + message + payload

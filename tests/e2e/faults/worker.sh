@@ -114,7 +114,8 @@ hang_worker() {
 	each_time one_thread_hangs
 	finish_job
 }
-# The job is held until it has come, and the others stand still until it has a lease, lest they leave nothing for it.
+# The job is held until this worker has connected, and the others are stopped until it has a lease, so that they leave
+# one for it.
 one_thread_hangs() {
 	hold_job
 	stand_still "$first" "$OTHER"
@@ -126,7 +127,7 @@ one_thread_hangs() {
 	CODE=0
 	wait "$WORKER" || CODE=$?
 	[ "$CODE" -eq 75 ] || fail "$NAME: it ended with $CODE"
-	# if others have computed it meanwhile, or the job has ended, there is nothing to give back
+	# if others have computed the lease meanwhile, or the job has ended, there is nothing to give back
 	[ "$TIMES" -eq 1 ] || grep -q "event=lease_failed job=$ID .*no progress for 0.5 s" "$DIR/h$i.log" ||
 		grep -q "event=lease_taken_back job=$ID" "$DIR/coordinator.log" || fail "$NAME: h$i keeps its lease"
 }
@@ -141,7 +142,8 @@ crash_worker() {
 	finish_job
 	[ "$(value "$ID" failures)" -ge "$TIMES" ] || fail "$NAME: $(value "$ID" failures) failures"
 }
-# The worker stays: it says what ended the process, and pauses. The other one stands still meanwhile, lest it computes that lease.
+# The worker stays, reports what ended the process, and pauses. The other one is stopped meanwhile, so that it does not
+# compute that lease.
 one_process_crashes() {
 	hold_job
 	faulty_worker "h$i" crash=1
@@ -185,7 +187,7 @@ extreme_numbers() {
 	blameless
 	! grep -q event=process_lost "$DIR"/w?.log || fail "$NAME: a process was lost"
 }
-# Each ended all workers once; and hslt-render with its own signal.
+# Each of these scenes once ended all workers, and hslt-render by a signal.
 one_extreme_scene() {
 	case $((i % 3)) in
 	0) set -- glass '<float name="intIOR" value="1.33"' '<float name="intIOR" value="1e-300"' intIOR=1e-300 ;;
