@@ -256,7 +256,7 @@ static void answers_while_it_reads(uint64_t job)
 	assert_true(client->heartbeats > 0);
 	m = scripted_hear(worker);
 	assert_true(m && m->body_case == FARM__ENVELOPE__BODY_JOB_INFO);
-	work_until(LEASES); /* none of them acknowledged before */
+	work_until(LEASES); /* no acknowledged result is asked for again */
 	end(SIGTERM, true);
 }
 
