@@ -58,8 +58,8 @@ mkdir "$DIR/homeless"
 grep -q -- '--ca DIR' "$DIR/err.log" && [ -z "$(ls -A "$DIR/homeless")" ] || fail "hslt-ca without a home: $(cat "$DIR/err.log")"
 
 start_coordinator
-code 1 "$BIN/hslt-coordinator" --listen 127.0.0.1:0 --spool "$DIR/spool" # one master a spool
-code 1 "$BIN/hslt-render" "$BOX" -o "$DIR/no/such/folder.exr" # before hours are spent, not after
+code 1 "$BIN/hslt-coordinator" --listen 127.0.0.1:0 --spool "$DIR/spool" # a spool belongs to one coordinator
+code 1 "$BIN/hslt-render" "$BOX" -o "$DIR/no/such/folder.exr" # refused before rendering, not after hours
 code 1 "$BIN/hslt-submit" "$BOX" -o "$DIR/no/such/folder.exr" --wait
 code 1 "$BIN/hslt-submit" "$DIR/none.xml" -o "$DIR/a.exr"
 code 2 "$BIN/hslt-submit" "$BOX" -o "$DIR/a.exr" --crop 0,0,0,0,0
@@ -92,7 +92,7 @@ for p in render submit; do
 		code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" -i path $wrong
 		code 2 "$BIN/hslt-$p" --estimate "$BOX" -i path $wrong
 	done
-	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" -i path --groups 1 --target-error 5% # would never end
+	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" -i path --groups 1 --target-error 5% # it would never end
 	grep -q 'a single group of samples gives no error' "$DIR/err.log" || fail "hslt-$p --groups 1: $(cat "$DIR/err.log")"
 	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --chains 2M
 	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" -i path --chains 10
@@ -114,7 +114,7 @@ grep -q '^hslt-status: j99: no such job$' "$DIR/err.log" || fail "hslt-status j9
 code 2 "$BIN/hslt-status" banana
 code 2 "$BIN/hslt-status" j
 code 1 "$BIN/hslt-job" cancel j1
-code 2 "$BIN/hslt-job" cancel j18446744073709551616 # more than there can be
+code 2 "$BIN/hslt-job" cancel j18446744073709551616 # larger than any id
 # Options of another verb would otherwise be ignored unnoticed: the log not written to the file, the job cancelled.
 code 2 "$BIN/hslt-job" log j1 -o "$DIR/j1.txt"
 grep -q -- '--output is only for fetch: the log goes to stdout' "$DIR/err.log" || fail "hslt-job log -o says: $(cat "$DIR/err.log")"

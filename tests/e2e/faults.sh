@@ -109,7 +109,7 @@ bad=$(awk -F'|' '$3 != 0 || $4 != 0 || $5 != "yes"' "$ROWS")
 {
 	echo '| fault | times injected | results lost | results doubled | bits equal | epochs of a chain computed again, at most, for each |'
 	echo '|---|---|---|---|---|---|'
-	for f in $FAULTS; do # what did not run stays
+	for f in $FAULTS; do # rows of faults that did not run stay
 		eval "grep -F \"\$text_$f|\" \"$ROWS\" | sed 's/|/ | /g; s/^/| /; s/$/ |/' | grep . || grep -F \"| \$text_$f |\" \"$README\"" || :
 	done
 } >"$TOP/table"

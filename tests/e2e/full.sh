@@ -24,9 +24,9 @@ code 6 "$BIN/hslt-submit" "$BOX" -o "$DIR/large.exr" --integrator hslt --size 64
 grep -q "it may need .* MB for its files and films, and the disk of the coordinator's spool has 33.6 MB in all" "$DIR/err.log" ||
 	fail "the refusal does not say why: $(tail -n 1 "$DIR/err.log")"
 
-head -c 3000000 /dev/zero >"$DIR/spool/ballast" # a disk must have 4,700 KB in all for the films
+head -c 3000000 /dev/zero >"$DIR/spool/ballast" # the films need a disk of 4,700 KB
 used=$(df --output=used -k "$DIR/spool" | tail -n 1)
-mount -o remount,size=$((used + 4900))k "$DIR/spool" # all batches take 5,000, and a checkpoint would as well
+mount -o remount,size=$((used + 4900))k "$DIR/spool" # all results take 5,000 KB, and so would a checkpoint
 id=$(submit "$BOX" -o "$DIR/full.exr" $JOB)
 until_true 20 is_state "$id" held || fail "$id is $(value "$id" state), and $(df -k "$DIR/spool" | tail -n 1)"
 value "$id" waiting | grep -q 'No space left' || fail "it does not say why: $(value "$id" waiting)"
@@ -50,7 +50,7 @@ same "$DIR/quiet.exr" "$DIR/full.exr"
 
 used=$(df --output=used -k "$DIR/spool" | tail -n 1)
 mount -o remount,size=$((used + 3000))k "$DIR/spool"
-# What the end of no job would make room for is refused as well: what is free, and belongs to files and jobs, is too little.
+# A job is also refused if no other job's end would make room for it: free space plus that of files and jobs is too small.
 # shellcheck disable=SC2086
 code 6 "$BIN/hslt-submit" "$BOX" -o "$DIR/gone.exr" $JOB
 grep -q 'it may need [0-9]* bytes for .* spool has [0-9]*: [0-9]* are free, [0-9]* belong' "$DIR/err.log" ||

@@ -66,7 +66,7 @@ for id in $timed $exact $counted; do
 done
 "$BIN/hslt-render" "$BOX" -o "$DIR/render.exr" $PATHS --spp $total 2>/dev/null
 same "$DIR/$counted.exr" "$DIR/render.exr"
-for id in $timed $exact; do # the header has the options that give the same bits
+for id in $timed $exact; do # the header has options that give the same bits
 	options=$(strings -n 8 "$DIR/$id.exr" | sed -n 's/hslt:.*//; /^--integrator /p' | head -n 1)
 	"$BIN/hslt-render" "$BOX" -o "$DIR/$id-again.exr" $options 2>/dev/null || fail "hslt-render $options"
 	same "$DIR/$id.exr" "$DIR/$id-again.exr"

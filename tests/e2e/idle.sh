@@ -6,7 +6,7 @@ need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-render h
 JOB="--integrator pssmlt --bootstrap 20000 --mutations 100000 --epoch 200"
 "$BIN/hslt-render" "$BOX" -o "$DIR/alone.exr" $JOB 2>>"$DIR/render.log"
 seconds() {
-	date +%s%N | cut -b1-11 # tenths
+	date +%s%N | cut -b1-11 # tenths of a second
 }
 # leaves NAME TENTHS: starts a worker that must exit after so many tenths of a second without work
 leaves() {

@@ -52,7 +52,7 @@ inner=$(cat /proc/$outer/task/$outer/children | tr -d ' ')
 command=$(sed -n 3p "$DIR/hook")
 [ "$(sed -n 1,2p "$DIR/hook" | tr '\n' ' ')" = "sh -c " ] && [ -n "$command" ] || fail "no hook: $(cat "$DIR/hook")"
 begin=$(date +%s)
-timeout 30 nsenter --target "$inner" --pid --mount sh -c "$command" 2>>"$DIR/hook.log" || : # it goes with process 1
+timeout 30 nsenter --target "$inner" --pid --mount sh -c "$command" 2>>"$DIR/hook.log" || : # it ends with process 1
 code=0
 wait $outer || code=$?
 [ $code -eq 0 ] || fail "the worker ended with $code"

@@ -23,7 +23,7 @@ stop $pilot
 	fail "ended in its pilot: $CODE, $(cat "$DIR/pilot.log")"
 
 # Interrupted in its first round: no image is written or mentioned; the bootstrap is kept for the same command.
-EARLY="--integrator path --size 64x64 --epoch 512 --spp 65536 --threads 1" # of many threads all leases of a round end at once
+EARLY="--integrator path --size 64x64 --epoch 512 --spp 65536 --threads 1" # with many threads all leases of a round would end at once
 "$BIN/hslt-render" "$BOX" -o "$DIR/early.exr" $EARLY 2>"$DIR/early.log" &
 early=$!
 PIDS="$PIDS $early"
@@ -42,7 +42,7 @@ stop $early
 [ $CODE = 1 ] || fail "the second time it ended with $CODE"
 
 # SIGHUP when a terminal closes, which may come twice, acts like SIGTERM, but not if SIGHUP is ignored.
-ticks() { # of processor time that $hup has used
+ticks() { # prints the processor time that $hup has used
 	sed 's/.*) //' "/proc/$hup/stat" | awk '{ print $12 + $13 }'
 }
 has_used() {
@@ -54,7 +54,7 @@ hang_up() { # HOW: env --default-signal or --ignore-signal
 	hup=$!
 	PIDS="$PIDS $hup"
 	until_true 60 grep -q '^running' "$DIR/hup.log" || fail "it does not run: $(cat "$DIR/hup.log")"
-	enough=$(($(ticks) + $(getconf CLK_TCK) / 2)) # for several rounds
+	enough=$(($(ticks) + $(getconf CLK_TCK) / 2)) # enough for several rounds
 	until_true 60 has_used $enough || fail "it stands still"
 	kill -HUP $hup
 	kill -HUP $hup 2>/dev/null || :
@@ -144,7 +144,7 @@ for words in '<integrator type="path"> is ignored except for' '<bsdf type="irawa
 	grep -qF "$escaped" "$DIR/shown.json" && grep -qF "$escaped" "$DIR/log-fork" || fail "JSON or the log does not say '$words'"
 done
 same "$DIR/fork.exr" "$DIR/farm-fork.exr"
-for kind in black no_light stuck; do # no_light: it would never have the error that it is to stop at
+for kind in black no_light stuck; do # no_light: it would never reach its target error
 	[ $kind = black ] && options=$BLACK words='image is black: none of the 16,384 bootstrap samples' ||
 		options=$STUCK words='of 320 chain epochs accepted nothing .*16 chains.*longest run: [0-9,]* rejections'
 	[ $kind != no_light ] || options=$NO_LIGHT words='image is black: no sample found light'

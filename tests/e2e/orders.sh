@@ -44,7 +44,7 @@ start_coordinator -v --journal 0.2
 start_worker w1
 
 # ---- hold, release, priority
-for again in 1 2 3 4 5; do # where we are slower than the worker it is done by then
+for again in 1 2 3 4 5; do # again if the worker is faster than this script and has done the job
 	a=$(submit "$BOX" -o "$DIR/a.exr" --integrator path --spp 500)
 	until_true 20 merged_more "$a" 3 || fail "nothing of $a is merged"
 	! job hold "$a" 2>>"$DIR/hold.log" || break
@@ -56,7 +56,7 @@ b=$(submit "$BOX" -o "$DIR/b.exr" --integrator path --spp 4)
 done_in 30 "$b"
 again
 [ "$(value "$a" state)" = held ] || fail "$a is $(value "$a" state) after a restart"
-c=$(submit "$BOX" -o "$DIR/c.exr" --integrator path --spp 50000 --epoch 4) # neither ends by itself
+c=$(submit "$BOX" -o "$DIR/c.exr" --integrator path --spp 50000 --epoch 4) # neither job ends by itself
 d=$(submit "$BOX" -o "$DIR/d.exr" --integrator path --spp 50000 --epoch 4)
 job priority "$d" -5
 job priority "$c" 7
@@ -106,7 +106,7 @@ refused 2 'a bound is missing' job extend "$e"
 "$BIN/hslt-job" extend "$e" --spp +100 >"$DIR/extend.log" && grep -qE "^$e continues after 1 round, until [0-9]+ are done$|^$e continues after [0-9]+ rounds, until" "$DIR/extend.log" ||
 	fail "extend says: $(cat "$DIR/extend.log")"
 job fetch "$e" -o "$DIR/between.exr" || fail "the image of before is gone while it goes on"
-again # in the midst of it
+again # during the extension
 done_in 60 "$e"
 again # and after its end
 first=$(value "$e" rounds)
@@ -114,7 +114,7 @@ before=$(value "$e" merged)
 refused 2 "such as +8, not .300." job extend "$e" --spp 300
 job extend "$e" --spp +300
 until_true 60 merged_more "$e" "$before" || fail "nothing more of $e is merged"
-job extend "$e" --spp +100 # while it runs, at a worker that knows the bound of before, or just after
+job extend "$e" --spp +100 # while it runs at a worker that knows the earlier bound, or just after
 until_true 60 more_rounds "$e" "$first" || fail "$e does not go on after $first rounds"
 done_in 60 "$e"
 job fetch "$e" -o "$DIR/extended.exr"
@@ -144,7 +144,7 @@ h=$(submit "$BOX" -o "$DIR/h.exr" --integrator path --spp 500)
 repeated() {
 	[ "$(value "$1" repeats)" -ge "$2" ]
 }
-for pause in 0.5 5 20; do # they are written down now and then; a busy machine takes its time
+for pause in 0.5 5 20; do # the counts are stored now and then, later on a busy machine
 	until_true 60 repeated "$h" 5 || fail "nothing of $h is repeated"
 	sleep $pause
 	again

@@ -9,8 +9,8 @@ SEED=${SEED:-7}
 KILLS=${KILLS:-9}
 CHAINS="--integrator hslt --bootstrap 100000 --mutations 5000000"
 SAMPLES="--integrator path --spp 500"
-TARGET="--integrator path --spp 1200 --target-error 6%" # looks at the error on the way
-JOURNAL=0.5 # MB: some kills meet a checkpoint, some a journal without one
+TARGET="--integrator path --spp 1200 --target-error 6%" # estimates the error on the way
+JOURNAL=0.5 # MB: some kills come while there is a checkpoint, some while there is only a journal
 echo "seed $SEED"
 
 moment() {
@@ -76,7 +76,7 @@ while [ $killed -lt "$KILLS" ]; do
 	fi
 	again
 	for j in $a $b $c; do
-		least=$(acknowledged "$j") # first: both grow
+		least=$(acknowledged "$j") # read first, because both numbers grow
 		known=$(merged "$j")
 		[ "$known" -ge "$least" ] || fail "$j knows $known leases, and $least were acknowledged"
 	done

@@ -142,7 +142,7 @@ pause() {
 # requeued JOB: the job waits for its next start, which is moved from two minutes later to now
 requeued() {
 	until_true 60 is_job "$1" PENDING || return 1
-	sleep 2 # a slurmd kills a job that begins anew in the second in which it was told to end it
+	sleep 2 # a slurmd kills a job that restarts within the second in which the slurmd was told to end it
 	scontrol update JobId="$1" StartTime=now
 	until_true 60 is_job "$1" RUNNING
 }
@@ -182,7 +182,7 @@ until_true 5 has_workers 2 || fail "it stays at the coordinator"
 batch --partition=urgent --nodelist="$(job_field "${first}_1" BatchHost)" --wrap "sleep 1"
 urgent=$JOB
 until_true 10 is_job "$urgent" RUNNING || fail "the urgent job is $(job_state "$urgent"): $(squeue)"
-pause hold # Slurm takes its time, and the job shall last
+pause hold # Slurm is slow, and the job must not end before
 requeued "${first}_1" || fail "the worker that was preempted is $(job_state "${first}_1")"
 until_true 10 has_worker "^${first}_1\.1@" || fail "the preempted worker does not come back: $(workers)"
 pause release

@@ -18,7 +18,7 @@ for name in "$(printf %0200d 0)" "$(printf 'a\033[2J')"; do
 	grep -q -e '--name takes 1 to 127 bytes of UTF-8 without control characters' "$DIR/err.log" || fail "a name: $(cat "$DIR/err.log")"
 	code 2 "$BIN/hslt-worker" --name "$name" --cache "$DIR/cache"
 done
-long=$DIR/$(printf %0150d 0).xml # without --name, the file's name is the job's, cut
+long=$DIR/$(printf %0150d 0).xml # without --name the job has the file's name, truncated
 cp "$BOX" "$long"
 named=$(submit "$long" --path "$(dirname "$BOX")" -o "$DIR/b.exr" --integrator path --spp 1) || fail "a long name: $named"
 [ "$(value "$named" name)" = "$(printf %0127d 0)" ] || fail "its name: $(value "$named" name)"

@@ -65,7 +65,7 @@ start_coordinator --tls "$CA/coordinator" --tls-check 0.5 --quota-assets 0.1
 start_worker node1 --tls "$CA/node"
 start_worker node2 --tls "$CA/node"
 start_worker lost --tls "$CA/lost"
-ca worker brief --days 0.00017 # 15 s, in which it must have come
+ca worker brief --days 0.00017 # 15 s, within which the worker must connect
 start_worker brief --tls "$CA/brief"
 until_true 10 grep -q 'event=peer_hello.*name="brief"' "$DIR/coordinator.log" || fail "the worker whose certificate is about to expire does not come"
 export HSLT_TLS="$CA/ann"

@@ -11,7 +11,7 @@ start_worker w1
 started() {
 	is_state "$low" running || is_state "$low" done
 }
-for again in 1 2 3 4 5; do # where we are slower than the worker it is done by then
+for again in 1 2 3 4 5; do # again if the worker is faster than this script and has done the job
 	low=$(submit "$BOX" -o "$DIR/low.exr" $LOW)
 	until_true 10 started || fail "$low does not run"
 	! "$BIN/hslt-job" hold "$low" 2>>"$DIR/hold.log" || break

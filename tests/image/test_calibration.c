@@ -1,20 +1,21 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Is the error that an image carries its error? 200 small renders of a case, which differ in their seeds only, are
- * compared with a long reference of another integrator or more samples, whose own variance is subtracted from each
- * comparison. The figures of the run that this was written with are in tests/image/README.md.
+ * Is the error that an image states its true error? 200 small renders of a case, which differ in their seeds only, are
+ * compared with a long reference of another integrator or with more samples, whose own variance is subtracted from each
+ * comparison. tests/image/README.md has figures of one run.
  *
  * Checked for each case:
  *
- * - The interval. rel_mse_95, where it is stated, holds the realised relMSE of at least 90 % of the renders. Level and
- *   power, if all 200 state one: at a true coverage of 95 % this fails with a probability of 0.16 %, at 94 % with
- *   0.9 %, at 92 % with 12 %; at 85 % it is found with 97 %, at 80 % with 99.99 %. Seeds are fixed: a run that passes
- *   passes always.
- * - The middle. The median of realised over estimated relMSE is within 10 % of 1, or as far as the case says.
- * - The pixels. The share of pixels and channels with |image - reference| <= 1.96 error, over all renders, is within
- *   0.87 and 0.975: Student's t with 15 degrees would be 93.1 %, skewed pixels have less.
- * - b, with chains. b_error holds the reference's b (2.131 of them, t with 15 degrees) in 170 to 199 of 200 renders:
- *   95 % fails with less than 1e-4, an error too small by 1.5 (84 %) is found with 61 %, by 2 (71 %) with 100.000 %.
+ * - The interval. rel_mse_95, where it is stated, contains the realised relMSE of at least 90 % of the renders. Level
+ *   and power, if all 200 state one: at a true coverage of 95 % this fails with a probability of 0.16 %, at 94 % with
+ *   0.9 %, at 92 % with 12 %; a coverage of 85 % is found with 97 %, one of 80 % with 99.99 %. Seeds are fixed, so the
+ *   result is always the same.
+ * - The median. The median of realised over estimated relMSE is within 10 % of 1, or as far as the case allows.
+ * - The pixels. The share of pixels and channels with |image - reference| <= 1.96 error, over all renders, is between
+ *   0.87 and 0.975: Student's t with 15 degrees of freedom gives 93.1 %, skewed pixels have less.
+ * - b, with chains. b plus or minus 2.131 b_error (t with 15 degrees) contains the reference's b in 170 to 199 of 200
+ *   renders: a coverage of 95 % fails with less than 1e-4; an error too small by 1.5 (84 %) is found with 61 %, by 2
+ *   (71 %) with 100.000 %.
  * - Planted faults. Intervals and errors made too small by 1.3 (the relMSE by 1.69) are refused.
  *
  * FULL=1: larger pictures with more samples, and the cases after the fourth.

@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * `path` against reference images of another renderer, where HSLT_SCENES names the folder of public scenes.
+ * `path` against another renderer's reference images, if HSLT_SCENES names the folder of public scenes.
  *
  * The references are of an RGB renderer, so colours are compared with `colour=rgb`: all three channels, and their
  * means. With spectra, light that meets saturated walls several times has another colour, since the product of smooth
- * spectra is not the product of their RGB triples; of that picture the luminance is compared, of one scene, and with
- * FULL=1 of the other.
+ * spectra is not the product of their RGB triples; so of a spectral picture only the luminance is compared, for one
+ * scene, and with FULL=1 also for the other.
  *
- * The references were filtered at their own size, so this renders at their size, with the scene's filter, and averages
- * both to 256 pixels wide: at least 128 samples a pixel that is compared, FULL=1: 256. With HSLT_TEST_SCALE=N there
- * are N times fewer, of one picture, and figures are only printed: most of what is left is noise, four times the
+ * The references were filtered at their own size, so this test renders at their size, with the scene's filter, and
+ * averages both to a width of 256 pixels: at least 128 samples per compared pixel, FULL=1: 256. HSLT_TEST_SCALE=N takes
+ * N times fewer, for one picture, and only prints the figures: most of the difference is then noise, and four times the
  * samples give a quarter of it.
  */
 #include "common/base/color.h"

@@ -44,7 +44,7 @@ struct coordinator {
 	uint64_t sizes[2];     /* size of the file in the first and second answer */
 	bool once;	       /* stops answering after the first answer */
 	int drops;	       /* number of fetches that are dropped */
-	size_t flood, payload; /* so many unrequested messages of this payload before the coordinator reads on */
+	size_t flood, payload; /* number and payload of unrequested messages, sent before the coordinator reads on */
 	atomic_bool hold;      /* delays the flood */
 	atomic_bool deaf;      /* the coordinator does not read while this is set */
 	atomic_bool said;

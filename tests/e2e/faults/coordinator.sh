@@ -67,7 +67,7 @@ patient_client() {
 	PIDS="$PIDS $waiting"
 	ID=j1
 	until_true 60 test -s "$DIR/id" || fail "$NAME: no job: $(cat "$DIR/wait.log")"
-	coordinator_dies # the first time before there is a worker: later ones may come when the image has been fetched
+	coordinator_dies # the first time before there is a worker; later ones may come after the image was fetched
 	says wait 'trying again'
 	worker w0
 	first=$WORKER

@@ -20,7 +20,7 @@ fault() {
 begin() {
 	NAME=$1
 	DIR=$TOP/$NAME
-	COUNTED= # results of other films do not tell
+	COUNTED= # results of other films do not count
 	mkdir "$DIR"
 	PIDS=
 	export HSLT_STATUS_SOCKET="$DIR/status"
@@ -132,7 +132,7 @@ has_said() {
 finish_job() {
 	until_true 120 is_state "$ID" done || fail "$NAME: $ID is $(value "$ID" state): $(value "$ID" waiting)"
 	[ -s "$DIR/image.exr" ] || "$BIN/hslt-job" fetch "$ID" -o "$DIR/image.exr" 2>>"$DIR/fetch.log" || fail "$NAME: no image"
-	sleep 0.1 # the last word to a worker
+	sleep 0.1 # so that the worker gets its last message
 	equal=yes
 	"$BIN/hslt-compare" --exact "$QUIET" "$DIR/image.exr" >"$DIR/compare.log" 2>&1 || equal=no
 	# shellcheck disable=SC2046

@@ -68,7 +68,7 @@ slow_result() {
 # The other worker is stopped until the result has arrived, so that it does not do the job alone meanwhile.
 is_slow() {
 	stand_still "$OTHER"
-	for try in 1 2 3 4 5; do # a machine that stands still for a second cuts it off, too
+	for try in 1 2 3 4 5; do # again if the machine stood still for a second, which also cuts the worker off
 		calls=$(times_said w1 event=connect\ )
 		rm -f "$DIR/order.done"
 		happens slow 22
@@ -96,7 +96,7 @@ is_late() {
 	stand_still "$OTHER"
 	happens late 22
 	[ "$i" -eq "$TIMES" ] || return 0
-	for try in 1 2 3 4 5; do # by a coordinator that stands still nobody is missed
+	for try in 1 2 3 4 5; do # again if the coordinator stood still, because then it gives up no worker
 		! until_true 1 is_missed || break
 		happens late 22
 	done
@@ -177,7 +177,7 @@ crowd() {
 		i=$((i + 1))
 		crowd_comes
 	done
-	again # which tells what it finds
+	again # it logs what it finds
 	release_job
 	finish_job
 	blameless
@@ -203,7 +203,7 @@ crowd_comes() {
 	says crowd done 60
 	until_true 30 all_told || fail "$NAME: of 1,000 connections that were refused $(told) are told of"
 	said=$(($(grep -c . "$DIR/coordinator.log") - lines))
-	most=$((2 * (100 + 5 * ($(date +%s) - before + 1)) + 50)) # of two kinds
+	most=$((2 * (100 + 5 * ($(date +%s) - before + 1)) + 50)) # for two kinds of lines
 	[ $said -le $most ] || fail "$NAME: $said lines, at most $most"
 	[ "$i" -lt "$TIMES" ] || kill -9 "$COORDINATOR_PID"
 }

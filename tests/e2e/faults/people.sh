@@ -52,7 +52,7 @@ while_chains_go_on() {
 # The other worker is stopped meanwhile, so that more than the last epochs is left.
 somebody_spoils() {
 	hold_job $((RESULTS / 4)) $((RESULTS * 3 / 4))
-	faulty_worker "liar$i" spoil=1,lie=1,hang=3 --cache "$DIR/cache$i" # its own, or it would be another start of the same worker
+	faulty_worker "liar$i" spoil=1,lie=1,hang=3 --cache "$DIR/cache$i" # a cache of its own, or it would count as another start of the same worker
 	says coordinator "event=peer_hello .*name=\"liar$i\""
 	stand_still "$OTHER"
 	release_job
@@ -141,7 +141,7 @@ fetches_into() {
 	1)
 		mkfifo "$DIR/target.exr"
 		cat "$DIR/target.exr" >"$DIR/real.exr" &
-		PIDS="$PIDS $!" # it would wait for ever if nobody writes
+		PIDS="$PIDS $!" # without a writer it would wait for ever
 		code 0 timeout 100 "$BIN/hslt-job" "$@" -o "$DIR/target.exr"
 		[ -p "$DIR/target.exr" ] || fail "$NAME: the FIFO is replaced"
 		wait $!

@@ -66,7 +66,7 @@ journal_is_damaged() {
 	hold_job
 	kill -9 "$COORDINATOR_PID"
 	wait "$COORDINATOR_PID" 2>/dev/null || :
-	for journal in "$DIR/spool/jobs/$ID"/journal.*; do # two when a new one is just made: either may be the one that counts
+	for journal in "$DIR/spool/jobs/$ID"/journal.*; do # two while a new one is being made: either may be the valid one
 		flip_result "$journal" "0.$((20 + 10 * i))" >>"$DIR/flipped"
 	done
 	again
@@ -190,12 +190,12 @@ TEXT
 
 fault folder_gone 6 2 "a job's folder is removed, moved away, or removed twice while the job runs"
 folder_gone() {
-	farm # the second start makes a new journal from the first's; in the second run there are checkpoints
+	farm # the second start makes a new journal from that of the first; in the second run there are checkpoints
 	worker w0
 	worker w1
 	job
 	i=0
-	while [ $i -lt "$TIMES" ]; do # in the first half of the job: the folder of one that is over would be gone, image and all
+	while [ $i -lt "$TIMES" ]; do # in the first half of the job: once the job had ended, its image would be lost with the folder
 		i=$((i + 1))
 		until_true 60 is_merged $((RESULTS * i / (2 * TIMES))) || fail "$NAME: $(merged) of $RESULTS results at time $i"
 		folder_goes
@@ -214,7 +214,7 @@ folder_goes() {
 	esac
 	until_true 30 is_noticed || fail "$NAME: it does not notice"
 	until_true 30 is_mended || fail "$NAME: it is not mended: $(tail -n 3 "$DIR/coordinator.log")"
-	[ "$i" -ne 2 ] || { kill -9 "$COORDINATOR_PID" && again --journal 0.2; } # all is in the new folder
+	[ "$i" -ne 2 ] || { kill -9 "$COORDINATOR_PID" && again --journal 0.2; } # everything is in the new folder
 	release_job
 }
 # The coordinator may put a file into the folder while rm walks through it.

@@ -154,7 +154,7 @@ one_process_crashes() {
 	says coordinator "event=lease_failed job=$ID worker=\"h$i\" own=0 text=\"box.xml: .*ended by SIGSEGV .*($ID, "
 	go_on "$OTHER"
 	kill -0 "$WORKER" || fail "$NAME: h$i is gone"
-	stop "$WORKER" # with 1 where another lease has ended it meanwhile
+	stop "$WORKER" # exits with 1 if another lease has ended it meanwhile
 	[ "$CODE" -le 1 ] || fail "$NAME: h$i ended with $CODE"
 }
 
