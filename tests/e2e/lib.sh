@@ -171,7 +171,7 @@ start_coordinator() {
 	until_true 60 has_read || fail "the coordinator does not read its jobs"
 }
 
-# start_worker NAME [OPTION...]: its process id is in WORKER
+# start_worker NAME [OPTION...]: starts a worker; its process id is in WORKER
 start_worker() {
 	name=$1
 	shift

@@ -52,7 +52,7 @@ until [ -z "$NAPS" ] || [ "$(wc -l <"$DIR/naps")" -ge "$NAPS" ]; do /bin/sleep 0
 echo 7700 >"$port"
 exec /bin/sleep 600
 TEXT
-# Takes a moment to leave.
+# The worker takes a moment to leave.
 program hslt-worker <<'TEXT'
 trap '/bin/sleep 0.05; echo left >>"$DIR/worker.left"; kill $p; exit 0' TERM
 /bin/sleep 600 &

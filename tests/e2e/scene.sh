@@ -216,7 +216,7 @@ grep -q "^relMSE  *0 " "$DIR/out" || fail "the image is another with --path: $(c
 code 2 "$BIN/hslt-render" --path "$DIR/nowhere" "$BOX" -o "$DIR/x.exr"
 grep -q "is not a folder" "$DIR/err.log" || fail "a --path that is not there: $(cat "$DIR/err.log")"
 
-# Sensors by their ids.
+# Sensors are chosen by their ids.
 mkdir "$DIR/two"
 cp -r "${BOX%/*}/meshes" "$DIR/two"
 sed 's:</scene>:<sensor type="perspective" id="aside"><float name="fov" value="30"/></sensor></scene>:' "$BOX" >"$DIR/two/two.xml"

@@ -122,7 +122,7 @@ job_field() {
 	scontrol show job "$1" | sed -n "s/.* *$2=\([^ ]*\).*/\1/p" | head -n 1
 }
 
-# Names of the workers at the coordinator, one per line.
+# Prints the names of the workers at the coordinator, one per line.
 workers() {
 	"$BIN/hslt-status" --json 2>/dev/null | sed 's/.*"workers":\[//; s/\],"leases":\[.*//' | grep -o '"name":"[^"]*"' | sed 's/.*:"//; s/"//'
 }
@@ -155,7 +155,7 @@ for kind in long short; do
 done
 start_cluster
 export HSLT_BIN="$BIN" HSLT_CACHE="$DIR/cache" TMPDIR="$DIR" HSLT_IDLE=4
-# Each program in its role.
+# Each program gets a certificate for its role.
 export HSLT_CA="$DIR/ca"
 { "$BIN/hslt-ca" init && "$BIN/hslt-ca" worker worker && "$BIN/hslt-ca" client client; } >>"$DIR/ca.log" 2>&1 || fail "hslt-ca"
 export HSLT_TLS="$HSLT_CA/client"

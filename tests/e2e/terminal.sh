@@ -70,7 +70,8 @@ code=0
 interrupted "$DIR/again" 'bootstrap .* [0-9]*[2-9][.][0-9] %' "$@" || code=$?
 [ $code -eq 1 ] && [ -s "$DIR/start.exr.bootstrap" ] || fail "Ctrl-C after continuing: $code, $(cat -v "$DIR/again" | tail -c 400)"
 
-# Before a lease of it is finished there is nothing to keep, which is said with what would help, and that does.
+# Before a lease of the bootstrap is finished there is nothing to keep; the message says so and names the option that
+# would help, which then does.
 for when in "1:scene built" "64:bootstrap .* ([1-9][0-9]*[.]|0[.][1-9])[0-9]* %"; do
 	code=0 parts=${when%%:*}
 	interrupted "$DIR/early" "${when#*:}" "$BIN/hslt-render" "$BOX" --size 32x24 --integrator pssmlt --bootstrap 4M --mutations 1000 \

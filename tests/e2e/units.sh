@@ -32,7 +32,7 @@ systemd-analyze verify ./hslt-worker@.service >/dev/null 2>&1 && fail "verify do
 grep -qx 'TimeoutStartSec=infinity' hslt-coordinator.service || fail "the coordinator's start has a limit"
 cd "$HOME_FOLDER"
 
-# Options in the units and the examples are options of the programs.
+# Options in the units and examples must be options of the programs.
 for f in "$UNITS"/*.service "$UNITS"/*.example; do
 	program=$(basename "$f" | sed 's/^hslt-//; s/[@.].*//')
 	for o in $(grep '^ExecStart\|HSLT_OPTIONS' "$f" | grep -o -e ' --[a-z-]*\|=--[a-z-]*' | tr -d ' ='); do

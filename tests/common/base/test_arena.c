@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Arenas: bytes that are asked for again are the same ones, if all of them are equal; and the limit holds for them. */
+/* Arenas: arena_share() returns the same copy for equal bytes, and the limit of the arena applies to these copies as
+ * well. */
 #include "common/base/arena.h"
 
 #include <setjmp.h>
@@ -22,7 +23,7 @@ static void test_equal_bytes_are_shared(void **state)
 	for (int i = 0; i < 1000; i++)
 		assert_ptr_equal(arena_share(&a, other, SIZE), first);
 	assert_int_equal(a.used, used);
-	/* Bytes between those that are hashed count as well; so does the size. */
+	/* Bytes between the hashed ones count as well; so does the size. */
 	for (size_t i = 0; i < 5; i++) {
 		other[150 + i] = 1;
 		const struct arena_share *s = arena_share(&a, other, SIZE);

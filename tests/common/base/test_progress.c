@@ -13,7 +13,7 @@
 #include <string.h>
 #include <unistd.h>
 
-/* What is written to stderr between begin and end. */
+/* Text written to stderr between begin and end. */
 static char said[4096];
 static FILE *file;
 static int kept;

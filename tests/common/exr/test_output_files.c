@@ -95,7 +95,7 @@ static void test_two_outputs(void **state)
 			NULL, "-o and --stats are the same file");
 	accepts(&(struct output_files){{{"-o", "new.exr", OUTPUT_EXR}, {"--stats", "a/new.json", OUTPUT_JSON}}}, NULL);
 	accepts(&(struct output_files){{{"-o", "/dev/null", OUTPUT_EXR}, {"--stats", "/dev/null", OUTPUT_JSON}}}, NULL);
-	/* One pipe by the numbers of two descriptors, and another one. */
+	/* One pipe, named by two of its descriptors, and another pipe. */
 	int ends[2], others[2];
 	char first[32], again[32], other[32];
 	assert_true(pipe(ends) == 0 && pipe(others) == 0);

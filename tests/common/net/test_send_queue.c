@@ -25,7 +25,7 @@
 enum {
 	LIMIT = 1 << 20,
 	KERNEL = 1 << 16,
-	LARGE = 4 << 20 /* more than the kernel takes at once, which is twice KERNEL */
+	LARGE = 4 << 20 /* more than the kernel takes at once, which is 2 x KERNEL */
 };
 
 static uv_loop_t loop;
@@ -179,7 +179,7 @@ static void first_plain_then_checked(void **state)
 	mem_free(expected[1]);
 }
 
-/* One frame of any size may wait; the next must fit. */
+/* A single frame of any size may wait; further ones must fit below the limit. */
 static void what_waits_is_bounded(void **state)
 {
 	(void)state;

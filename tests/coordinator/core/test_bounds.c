@@ -13,7 +13,7 @@
 
 #include <cmocka.h>
 
-/* One worker, one slot: the leases follow each other. */
+/* One worker with one slot: the leases follow each other. */
 /* clang-format off */
 #define START(options)                                                 \
 	"[0] submit groups=1 " options " -> j1 submitted, j1 is queued", \

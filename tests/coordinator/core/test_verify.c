@@ -120,8 +120,8 @@ static void one_worker_twice(void **state)
 	transcript_play(
 		f,
 		(const char *const[]){
-			/* another connection of the same name is the same worker; and so is another name of the same
-			   home */
+			/* another connection of the same name is the same worker, and so is another name with the same
+			 * home */
 			"[1] w2 joins A threads=1 name=a home=c start=1 -> -",
 			"[1] w2 wants 1 -> -",
 			"[1] w3 joins A threads=1 name=b home=c start=1 -> close w2",

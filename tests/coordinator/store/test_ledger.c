@@ -75,7 +75,7 @@ static void add(struct ledger *l, uint64_t id)
 	assert_int_equal(ledger_add(l, &j, &e), 0);
 }
 
-/* Memory runs out for the copy of a submission: the row is not written without it. */
+/* Memory runs out while a submission is copied: then the row is not written at all. */
 static void no_memory(void **state)
 {
 	(void)state;
