@@ -137,6 +137,7 @@ int blend_join(struct bsdf *b, const struct bsdf *part, const char *type, const 
 		b->only_straight = false;
 	}
 	b->two_sided |= part->two_sided;
+	b->mirrored |= part->mirrored;
 	b->modes |= part->modes;
 	b->has_smooth |= part->has_smooth;
 	b->has_delta |= part->has_delta;

@@ -99,6 +99,7 @@ struct bsdf {
 	bool dispersive;       /* the index depends on the wavelength: use bsdf_eta; paths carry one wavelength only */
 	const struct ior *ior; /* laws of dispersion of both sides, by enum ior_side; NULL: only eta is known */
 	bool two_sided;	       /* scatters light that arrives from below the normal */
+	bool mirrored;	       /* two_sided only since bsdf_mirror_back (twosided.h) made some part of it so */
 	bool textured;
 	bool directed;	 /* not reciprocal; paths from a light choose specular lobes with other probabilities than paths
 			    from the camera */

@@ -97,7 +97,7 @@ int bsdf_mirror_back(struct bsdf *b, const struct bsdf_build *build, struct erro
 	t->side[0] = t->side[1] = *b;
 	b->data = t;
 	b->ops = &bsdf_ops_twosided;
-	b->two_sided = true;
+	b->two_sided = b->mirrored = true;
 	return 0;
 }
 

@@ -400,10 +400,10 @@ static int prepare(struct builder *b, const struct render_options *o)
 	return rc;
 }
 
-/* Whether backs are black by the file's rule rather than by the user's choice. */
+/* Whether backs are as the kind of file decides, not the user, and either black or other than in Mitsuba 0.6. */
 static bool backs_may_surprise(const struct builder *b)
 {
-	return b->w->accuracy.backs <= SETTING_BACKS_AUTO && backs_are_black(b);
+	return b->w->accuracy.backs <= SETTING_BACKS_AUTO && (b->scene->black_backs || !b->scene->dialect_3);
 }
 
 static uint32_t segments_of(const struct geom_shape *g)
@@ -448,7 +448,7 @@ static int new_world(struct world **out, bool with_accel, const struct scene *s,
 	if (!rc && b.w->accel && with_accel && emitter_choice_make(b.w) < 0)
 		rc = build_out_of_memory(e);
 	if (!rc && look && b.w->accel)
-		backs_note(b.w);
+		backs_note(b.w, s->black_backs);
 	crash_place(NULL, NULL, 0);
 	arena_fini(&b.scratch);
 	if (rc)

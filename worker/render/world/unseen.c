@@ -100,21 +100,22 @@ void dark_note(struct world *w, bool lost)
 			 "the scene has no emitter with an area: the image is black");
 }
 
-/* ---- black backs ---- */
+/* ---- backs ---- */
 
 enum { SIDE = 32, LEAST = 20 }; /* the note appears from a fraction of 1 / LEAST on */
 
-static bool is_black_back(const struct world *w, const struct ray_hit *hit, vec3 from, vec3 d)
+/* Whether a ray meets the back of an opaque material that `twosided` does not cover, black or lit by `backs`. */
+static bool is_bare_back(const struct world *w, const struct ray_hit *hit, vec3 from, vec3 d)
 {
 	const struct bsdf *b = &w->bsdfs[w->parts[hit->prim.shape].bsdf];
 	struct surface_point x;
-	if (b->black || b->two_sided)
+	if (b->black || (b->two_sided && !b->mirrored))
 		return false;
 	surface_from_hit(&w->shapes[hit->prim.shape], from, d, hit, &x);
 	return vec3_dot(x.ng, d) > 0;
 }
 
-void backs_note(struct world *w)
+void backs_note(struct world *w, bool black)
 {
 	static const double middle[2] = {0.5, 0.5};
 	const struct camera *c = &w->camera;
@@ -131,11 +132,13 @@ void backs_note(struct world *w)
 		if (!accel_closest(w->accel, &from, d, low, high, &hit))
 			continue;
 		hits++;
-		backs += is_black_back(w, &hit, from.p, d);
+		backs += is_bare_back(w, &hit, from.p, d);
 	}
 	if (backs > 0 && backs * LEAST >= hits)
-		snprintf(w->notes.backs, sizeof w->notes.backs,
-			 "%.0f %% of the surfaces that the camera sees are black backs of opaque materials without "
-			 "`twosided`, as in Mitsuba 3; --set backs=lit shows them",
-			 ceil(100.0 * backs / hits));
+		snprintf(w->notes.backs, sizeof w->notes.backs, "%.0f %% of the surfaces that the camera sees are %s",
+			 ceil(100.0 * backs / hits),
+			 black ? "black backs of opaque materials without `twosided`, as in Mitsuba 3; --set "
+				 "backs=lit shows them"
+			       : "backs of opaque materials without `twosided`, which Mitsuba 0.6 shows black; --set "
+				 "backs=black does");
 }

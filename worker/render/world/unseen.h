@@ -17,8 +17,8 @@ void unseen_note(struct world *w, const struct box *boxes);
 void dark_note(struct world *w, bool lost);
 
 /* Sets w->notes.backs if at least one in twenty of the camera rays that meet a surface meets the back of an opaque
- * material that only reflects on its front, because the scene's dialect makes backs black: a surprise where a mesh is
- * inside out. Traces 1,024 rays; needs w->accel. */
-void backs_note(struct world *w);
+ * material without `twosided`. black: the scene's dialect makes backs black, a surprise where a mesh is inside out;
+ * otherwise they are lit, which differs from Mitsuba 0.6. Traces 1,024 rays; needs w->accel. */
+void backs_note(struct world *w, bool black);
 
 #endif

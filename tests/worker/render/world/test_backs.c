@@ -1,17 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The setting `backs`: the appearance of the back of an opaque material without `twosided`, alone, under a mask and
- * in a blend, under a sky of radiance 1, of which a grey of 0.5 reflects one half; the note about black backs; and
- * two integrators that must agree on a room of rectangles, some of which face away from the light.
+ * in a blend, under a sky of radiance 1, of which a grey of 0.5 reflects one half; the notes about backs that are
+ * black, or lit where Mitsuba 0.6 has them black; and two integrators that must agree on a room of rectangles, some of
+ * which face away from the light.
  */
 #include "tests/support/agree.h"
 #include "tests/support/leases.h"
+#include "tests/support/memory_assets.h"
 #include "tests/support/worlds.h"
 
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
+#include <stdio.h>
 #include <string.h>
 
 #include <cmocka.h>
@@ -66,6 +69,17 @@ static void backs_by_material_and_setting(void **state)
 	}
 }
 
+static bool is_noted(const struct world *w, const char *words)
+{
+	struct render_summary s;
+	char sentence[1024];
+	bool noted = false;
+	world_summary(w, &s);
+	for (size_t k = 0; render_scene_note(&s, k, sentence, sizeof sentence); k++)
+		noted |= strstr(sentence, words) != NULL;
+	return noted;
+}
+
 /* The note appears if black backs cover at least one twentieth of the visible surfaces under the file's own rule;
  * lamps, glass and two-sided materials do not count. */
 static void one_sided_materials_are_noted(void **state)
@@ -104,14 +118,49 @@ static void one_sided_materials_are_noted(void **state)
 			cases[i].half, cases[i].back ? 180 : 0, cases[i].material);
 		/* clang-format on */
 		worlds_accuracy = NULL;
-		struct render_summary s;
-		char sentence[1024];
-		bool noted = false;
-		world_summary(w, &s);
-		for (size_t k = 0; render_scene_note(&s, k, sentence, sizeof sentence); k++)
-			noted |= strstr(sentence, "black backs of opaque materials") != NULL;
+		bool noted = is_noted(w, "black backs of opaque materials");
 		if (noted != cases[i].noted)
 			fail_msg("case %zu: the note is %sthere", i, noted ? "" : "not ");
+		world_free(w);
+	}
+}
+
+/* In files of 0.5/0.6 backs are lit, which Mitsuba 0.6 does not do; a note says so if the camera sees some, unless the
+ * user has chosen. */
+static void lit_backs_are_noted(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *accuracy, *material;
+		bool back, noted;
+	} cases[] = {
+		{"backs=auto", GREY, true, true},
+		{"backs=auto", GREY, false, false},
+		{"backs=lit", GREY, true, false},
+		{"backs=black", GREY, true, false},
+		{"backs=auto", TWO_SIDES, true, false},
+		{"backs=auto", "<bsdf type='mask'>" GREY "</bsdf>", true, true},
+		{"backs=auto", "<bsdf type='mask'>" TWO_SIDES "</bsdf>", true, false},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		char xml[2048];
+		/* clang-format off */
+		snprintf(xml, sizeof xml,
+			"<scene version='0.6.0'>"
+			SKY
+			SENSOR("0,0,1", "0,0,0")
+			"<shape type='rectangle'>"
+				"<transform name='toWorld'><scale value='9'/><rotate y='1' angle='%d'/></transform>"
+				"%s"
+			"</shape></scene>",
+			cases[i].back ? 180 : 0, cases[i].material);
+		/* clang-format on */
+		const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {0}};
+		worlds_accuracy = cases[i].accuracy;
+		struct world *w = world_of_files(SIDE, SIDE, files);
+		worlds_accuracy = NULL;
+		if (is_noted(w, "which Mitsuba 0.6 shows black") != cases[i].noted)
+			fail_msg("case %zu: the note is %sthere", i, cases[i].noted ? "not " : "");
 		world_free(w);
 	}
 }
@@ -137,6 +186,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(backs_by_material_and_setting),
 		cmocka_unit_test(one_sided_materials_are_noted),
+		cmocka_unit_test(lit_backs_are_noted),
 		cmocka_unit_test(integrators_agree),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
