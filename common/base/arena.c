@@ -63,13 +63,20 @@ char *arena_strdup(struct arena *a, const char *s)
 	return p;
 }
 
-/* A hash table with open addressing, in the arena; it doubles when it is half full. */
-struct arena_shares {
-	size_t room, count; /* room: a power of two */
-	struct arena_share **at;
+struct slot {
+	size_t hash;
+	struct arena_share *share; /* NULL: free */
 };
 
-enum { SHARES_FIRST = 64, SHARE_SAMPLES = 32, SHARE_TRIES = 8 };
+/* A hash table with open addressing, in the arena; it doubles when it is half full. It may miss some of what is
+ * shared: a search takes at most SHARE_STEPS steps and compares the bytes of SHARE_ALIKE entries, so that bytes chosen
+ * to have one hash take no time that grows with their number. */
+struct arena_shares {
+	size_t room, count; /* room: a power of two */
+	struct slot *at;
+};
+
+enum { SHARES_FIRST = 64, SHARE_SAMPLES = 32, SHARE_ALIKE = 8, SHARE_STEPS = 256 };
 
 /* Of the size and of parts of the bytes: whether they are equal is compared, but for few. */
 static size_t share_hash(const void *bytes, size_t size)
@@ -83,12 +90,35 @@ static size_t share_hash(const void *bytes, size_t size)
 	return (size_t)fnv_add(h, p + size - sizeof h, sizeof h);
 }
 
-static struct arena_share **free_place(const struct arena_shares *s, size_t hash)
+/* Adds an entry, unless the place where it would be searched is full. */
+static void add(struct arena_shares *s, size_t hash, struct arena_share *share)
 {
-	size_t i = hash & (s->room - 1);
-	while (s->at[i])
-		i = (i + 1) & (s->room - 1);
-	return &s->at[i];
+	for (size_t k = 0; k < SHARE_STEPS; k++) {
+		struct slot *at = &s->at[(hash + k) & (s->room - 1)];
+		if (at->share)
+			continue;
+		*at = (struct slot){hash, share};
+		s->count++;
+		return;
+	}
+}
+
+/* Returns the entry with these bytes, or NULL. *full: so many entries have this hash that another is not added. */
+static struct arena_share *find(const struct arena_shares *s, size_t hash, const void *bytes, size_t size, bool *full)
+{
+	size_t alike = 0;
+	for (size_t k = 0; k < SHARE_STEPS && alike < SHARE_ALIKE; k++) {
+		const struct slot *at = &s->at[(hash + k) & (s->room - 1)];
+		if (!at->share)
+			break;
+		if (at->hash != hash)
+			continue;
+		if (at->share->size == size && (size == 0 || memcmp(at->share->bytes, bytes, size) == 0))
+			return at->share;
+		alike++;
+	}
+	*full = alike == SHARE_ALIKE;
+	return NULL;
 }
 
 static bool make_room(struct arena *a)
@@ -100,13 +130,13 @@ static bool make_room(struct arena *a)
 	if (!s)
 		return false;
 	s->room = old ? 2 * old->room : SHARES_FIRST;
-	s->count = old ? old->count : 0;
-	s->at = arena_alloc(a, s->room, sizeof(struct arena_share *));
+	s->count = 0;
+	s->at = arena_alloc(a, s->room, sizeof *s->at);
 	if (!s->at)
 		return false;
 	for (size_t i = 0; old && i < old->room; i++)
-		if (old->at[i])
-			*free_place(s, share_hash(old->at[i]->bytes, old->at[i]->size)) = old->at[i];
+		if (old->at[i].share)
+			add(s, old->at[i].hash, old->at[i].share);
 	a->shares = s;
 	return true;
 }
@@ -114,13 +144,10 @@ static bool make_room(struct arena *a)
 struct arena_share *arena_share(struct arena *a, const void *bytes, size_t size)
 {
 	size_t hash = share_hash(bytes, size);
-	if (a->shares) {
-		const struct arena_shares *s = a->shares;
-		size_t i = hash & (s->room - 1);
-		for (int tries = 0; s->at[i] && tries < SHARE_TRIES; i = (i + 1) & (s->room - 1), tries++)
-			if (s->at[i]->size == size && (size == 0 || memcmp(s->at[i]->bytes, bytes, size) == 0))
-				return s->at[i];
-	}
+	bool full = false;
+	struct arena_share *known = a->shares ? find(a->shares, hash, bytes, size, &full) : NULL;
+	if (known)
+		return known;
 	if (!make_room(a))
 		return NULL;
 	struct arena_share *new = arena_alloc(a, 1, sizeof *new);
@@ -130,8 +157,8 @@ struct arena_share *arena_share(struct arena *a, const void *bytes, size_t size)
 	if (size)
 		memcpy(copy, bytes, size);
 	*new = (struct arena_share){.bytes = copy, .size = size};
-	*free_place(a->shares, hash) = new;
-	a->shares->count++;
+	if (!full)
+		add(a->shares, hash, new);
 	return new;
 }
 
