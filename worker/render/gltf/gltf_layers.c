@@ -41,9 +41,9 @@ static bool is_listed(const struct gltf *g, const char *list, const char *extens
 }
 
 /* Sets the boundary's reflectance. In the format it is f (F0 + (1 - F0) (1 - cos)^5) with F0 = min(r^2 c, 1), where r^2
- * is the reflectance of the index at normal incidence, f a strength and c a colour. Here f is `specular_strength`, the
- * largest component of c's factor is included in the index, and c relative to it becomes `specular_color`. For
- * materials that transmit light the index stays as it is, and the components of the colour are at most 1. */
+ * is the reflectance of the index at normal incidence, f a strength and c a colour. Here f is `specular_strength` and c
+ * `specular_color`. If c's factor has a component above 1, the largest is included in the index, and the colour is
+ * relative to it; for materials that transmit light the index stays as it is, and the components are at most 1. */
 static void put_reflection(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
 {
 	const json_t *ior = gltf_extension(g, at, at->json, "KHR_materials_ior"),
@@ -56,20 +56,22 @@ static void put_reflection(struct gltf *g, struct xml_element *el, const struct 
 	}
 	const json_t *texture = specular ? gltf_object(g, at, specular, "specularTexture") : NULL,
 		     *colour = specular ? gltf_object(g, at, specular, "specularColorTexture") : NULL;
-	double most = fmax(fmax(rgb[0], fmax(rgb[1], rgb[2])), 0);
+	double most = fmax(rgb[0], fmax(rgb[1], rgb[2])), whole = fmax(most, 1);
 	bool enters = transmission && gltf_number(g, at, transmission, "transmissionFactor", 0) > 0;
-	if (enters && most > 1)
+	if (enters && whole > 1) {
 		gltf_note(g, "specular colours above 1 of materials that transmit light count as 1");
+		whole = 1;
+	}
 	for (int k = 0; k < 3; k++)
-		rgb[k] = enters ? fmin(fmax(rgb[k], 0), 1) : fmax(rgb[k], 0) / (most > 0 ? most : 1);
-	bool coloured = (enters || most > 0) && (colour || rgb[0] != 1 || rgb[1] != 1 || rgb[2] != 1);
+		rgb[k] = fmin(fmax(rgb[k], 0) / whole, 1);
+	bool coloured = colour || rgb[0] != 1 || rgb[1] != 1 || rgb[2] != 1;
 	/* In the format an index of 0 means total reflection. */
-	double root = eta > 0 ? fabs((eta - 1) / (eta + 1)) : 1, scaled = fmin(root * sqrt(enters ? 1 : most), 1);
+	double root = eta > 0 ? fabs((eta - 1) / (eta + 1)) : 1, scaled = fmin(root * sqrt(whole), 1);
 	gltf_put_number(g, el, at, "eta", fmin((1 + scaled) / fmax(1 - scaled, 0.1), 10));
 	if (strength < 1 || texture)
 		gltf_put_share(g, el, at, "specular_strength", strength, strength > 0 ? texture : NULL, "a");
 	if (coloured)
-		gltf_put_colour(g, el, at, "specular_color", rgb, colour);
+		gltf_put_colour(g, el, at, "specular_color", rgb, most > 0 ? colour : NULL);
 }
 
 static void put_coat(struct gltf *g, struct xml_element *el, const struct gltf_at *at)

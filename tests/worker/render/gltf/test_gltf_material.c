@@ -227,14 +227,15 @@ static void test_materials(void **state)
 	scene_fini(&s);
 }
 
-/* The reflectance at normal incidence is min(r^2 c, 1) f: f is the strength, and a colour is its largest component,
- * which the index includes, times `specular_color`. Glass keeps its index. */
+/* The reflectance at normal incidence is min(r^2 c, 1) f: f is the strength, and c is `specular_color`, times its
+ * largest component if that is above 1, which the index includes. Glass keeps its index. */
 #define R2 ((0.75 / 2.75) * (0.75 / 2.75))
 static void test_reflection(void **state)
 {
 	(void)state;
 	/* of the cases below */
-	static const double of_others[3] = {0, 1, 0.5}, of_glass[][3] = {[3] = {0, 0, 0}, [4] = {0, 1, 1}};
+	static const double of_others[][3] = {[3] = {0}, [4] = {0.25, 0.25, 0.25}, [5] = {0}, [6] = {0, 1, 0.5}},
+			    of_glass[][3] = {[3] = {0}, [4] = {0.25, 0.25, 0.25}, [5] = {0}, [6] = {0, 1, 1}};
 	static const struct {
 		const char *members;
 		double ior, want, strength;    /* want: the square of the index's r; strength: -1: a texture */
@@ -244,7 +245,10 @@ static void test_reflection(void **state)
 		{"\"specularColorFactor\": [2, 2, 2]", 1.75, 2 * R2, 1, NULL, NULL},
 		{"\"specularColorFactor\": [100, 100, 100], \"specularFactor\": 0.25", 1.75, 1 / 1.21 * 0.81, 0.25,
 		 NULL, NULL},
-		{"\"specularColorFactor\": [0, 0, 0]", 1.5, 0, 1, NULL, "rgb"},
+		{"\"specularColorFactor\": [0, 0, 0]", 1.5, 0.04, 1, "rgb", "rgb"},
+		{"\"specularColorFactor\": [0.25, 0.25, 0.25]", 1.5, 0.04, 1, "rgb", "rgb"},
+		{"\"specularColorFactor\": [0, 0, 0], \"specularColorTexture\": {\"index\": 0}", 1.5, 0.04, 1, "rgb",
+		 "rgb"},
 		{"\"specularColorFactor\": [0, 2, 1], \"specularFactor\": 0.5", 1.5, 2 * 0.04, 0.5, "rgb", "rgb"},
 		{"\"specularColorTexture\": {\"index\": 0}", 1.5, 0.04, 1, "bitmap", "bitmap"},
 		{"\"specularTexture\": {\"index\": 0}", 1.5, 0.04, -1, NULL, NULL},
@@ -267,7 +271,7 @@ static void test_reflection(void **state)
 			assert_true((colour != NULL) == (want != NULL));
 			if (want && strcmp(want, "rgb") == 0)
 				for (int k = 0; k < 3; k++)
-					assert_true(colour->value.as.rgb[k] == (glass ? of_glass[i][k] : of_others[k]));
+					assert_true(colour->value.as.rgb[k] == ((glass ? of_glass : of_others)[i][k]));
 			else if (want)
 				assert_string_equal(node_ref(bsdf, "specular_color")->type, want);
 			if (files[i].strength < 0)
@@ -276,7 +280,7 @@ static void test_reflection(void **state)
 			else
 				assert_near(node_float(bsdf, "specular_strength", 1), files[i].strength);
 			assert_true(scene_has_note(&s, "specular colours above 1") ==
-				    (glass && (i == 1 || i == 2 || i == 4)));
+				    (glass && (i == 1 || i == 2 || i == 6)));
 			scene_fini(&s);
 		}
 }

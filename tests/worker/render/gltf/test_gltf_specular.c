@@ -148,10 +148,30 @@ static void test_textures_are_factors(void **state)
 		}
 }
 
+/* The colour scales what is reflected at normal incidence alone: black surfaces still reflect grazing light. */
+static void test_grazing_light(void **state)
+{
+	(void)state;
+	struct material none, some;
+	make(&none, "0, 0, 0", "", "\"specularColorFactor\": [0, 0, 0]");
+	make(&some, "0, 0, 0", "", "\"specularColorFactor\": [0.25, 0.25, 0.25]");
+	for (int i = 0; i < 18; i++) {
+		double z = 0.05 + 0.05 * i, grazing = pow(1 - z, 5);
+		spectrum p = value(&none, 0.5, direction(z, 0), direction(z, PI)),
+			 q = value(&some, 0.5, direction(z, 0), direction(z, PI));
+		for (int l = 0; l < SPECTRUM_LANES; l++)
+			if (!(q.v[l] > 0 && fabs(p.v[l] / q.v[l] - grazing / (0.01 + 0.99 * grazing)) <= 1e-6))
+				fail_msg("at a cosine of %g: %.9g of %.9g", z, p.v[l], q.v[l]);
+	}
+	release(&none);
+	release(&some);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_textures_are_factors),
+		cmocka_unit_test(test_grazing_light),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
