@@ -192,6 +192,17 @@ static double coat_reflects(const struct principled_point *s, double cosine)
 	return s->share[COAT] * (CLEARCOAT_REFLECTANCE + (1 - CLEARCOAT_REFLECTANCE) * schlick(cosine));
 }
 
+/* Returns about the share of the boundary's facets on which light from below is reflected totally: those whose slope
+ * towards wo takes it beyond the critical angle. GGX slopes along a line have the cumulative distribution
+ * (1 + x / sqrt(a^2 + x^2)) / 2. */
+static double totally_reflects(const struct principled_point *s, vec3 wo)
+{
+	double cosine = min_of(fabs(wo.z), 1), sine = sqrt((1 - cosine) * (1 + cosine)), critical = 1 / s->eta,
+	       below = sqrt((1 - critical) * (1 + critical)), over = sine * below - cosine * critical,
+	       along = cosine * below + sine * critical, spread = microfacet_mean(&s->facets) * along;
+	return 0.5 + 0.5 * over / sqrt(over * over + spread * spread);
+}
+
 /* Computes the probabilities of sampling each lobe for light from wo. */
 static void lobe_chances(const struct principled_point *s, vec3 wo, double chance[LOBES])
 {
@@ -199,13 +210,13 @@ static void lobe_chances(const struct principled_point *s, vec3 wo, double chanc
 	bool below = wo.z < 0;
 	double clear = 1 - s->metallic, glass = clear * s->share[TRANSMISSION];
 	double reflected = fresnel_dielectric(min_of(fabs(wo.z), 1), below ? 1 / p->eta : p->eta).reflected, sum = 0;
+	/* The strength does not scale total reflection, which some facets may have where the plane does not. */
+	if (p->scaled) {
+		double total = below ? totally_reflects(s, wo) : 0;
+		reflected = total + (1 - total) * reflected * s->share[SPECULAR_STRENGTH];
+	}
 	/* Never 0: where the plane reflects totally, some facets still transmit. */
 	chance[LOBE_TRANSMIT] = glass * max_of(1 - reflected, 0.05);
-	/* The strength does not scale total reflection, which some facets may have where the plane does not. */
-	if (p->scaled)
-		reflected = below ? max_of(reflected < 1 ? reflected * s->share[SPECULAR_STRENGTH] : 1,
-					   min_of(reflected, 0.05))
-				  : reflected * s->share[SPECULAR_STRENGTH];
 	chance[LOBE_SPECULAR] = below ? glass * reflected : clear * reflected + s->metallic * max_of(p->base_max, 0.04);
 	chance[LOBE_DIFFUSE] =
 		below ? 0
