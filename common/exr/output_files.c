@@ -100,7 +100,7 @@ static int find(struct place *p, const char *path, struct error *e)
 	}
 	p->exists = true;
 	p->regular = S_ISREG(st.st_mode);
-	p->stream = S_ISFIFO(st.st_mode) || S_ISSOCK(st.st_mode) || t.descriptor >= 0;
+	p->stream = S_ISFIFO(st.st_mode) || S_ISSOCK(st.st_mode) || (t.descriptor >= 0 && !S_ISCHR(st.st_mode));
 	p->device = st.st_dev;
 	p->inode = st.st_ino;
 	return 0;

@@ -109,6 +109,11 @@ static void test_two_outputs(void **state)
 		"-o and --stats are the same file");
 	accepts(&(struct output_files){{{"-o", first, OUTPUT_EXR}, {"--stats", other, OUTPUT_JSON}}}, NULL);
 	accepts(&(struct output_files){{{"-o", first, OUTPUT_EXR}, {"--stats", "/dev/null", OUTPUT_JSON}}}, NULL);
+	int nothing = open("/dev/null", O_WRONLY);
+	snprintf(other, sizeof other, "/dev/fd/%d", nothing);
+	accepts(&(struct output_files){{{"-o", other, OUTPUT_EXR}, {"--stats", "/dev/null", OUTPUT_JSON}}}, NULL);
+	accepts(&(struct output_files){{{"-o", other, OUTPUT_EXR}, {"--stats", other, OUTPUT_JSON}}}, NULL);
+	close(nothing);
 	for (int i = 0; i < 2; i++) {
 		close(ends[i]);
 		close(others[i]);
