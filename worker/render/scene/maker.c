@@ -440,28 +440,55 @@ static int read_unknown(struct maker *m, const struct xml_element *el)
 	return transform_report(whole, r, &m->report, m->error);
 }
 
-/* Reports the problems inside an object that is refused: in its objects, such as the film of a sensor of unknown
- * type, and in how its values are written. Which parameters it may have is not known. */
-static int read_inside(struct maker *m, struct xml_element *el, int refused)
+/* Reports the problems inside an object of unknown type: in its objects, such as the film of a sensor, in the names of
+ * its elements, and in how its values are written. Which parameters it may have is not known, nor whether it may have
+ * the elements of Mitsuba's that are not supported. */
+static int read_inside(struct maker *m, struct xml_element *el)
 {
-	if (refused >= 0 || (refused = report_problem(&m->report, refused, m->error)))
-		return refused;
 	int r = 0;
 	m->depth++;
 	for (struct xml_element *c = el->first; c && !r; c = c->next) {
 		enum plugin_class cls;
 		const struct scene_node *unused;
 		struct xml_element *target;
-		if (!c->ignored && plugin_class_find(c->name, &cls))
+		bool not_ours = strcmp(c->name, "field") == 0 || strcmp(c->name, "subsurface") == 0;
+		if (c->ignored || not_ours || strcmp(c->name, "default") == 0)
+			continue;
+		if (plugin_class_find(c->name, &cls))
 			r = maker_node(m, c, &unused);
-		else if (!c->ignored && strcmp(c->name, "ref") == 0)
+		else if (strcmp(c->name, "ref") == 0)
 			r = id_table_find(&m->ids, c, &target, m->error);
-		else if (!c->ignored && value_is_element(c->name))
+		else if (value_is_element(c->name))
 			r = read_unknown(m, c);
+		else if (strcmp(c->name, "include") != 0 || !c->unset)
+			r = maker_foreign(m, c);
 		r = report_problem(&m->report, r, m->error);
 	}
 	m->depth--;
 	return r ? r : REPORT_TOLD;
+}
+
+/* Reports the problems inside an object of unknown type as if it were of the nearest type, and makes no node. */
+static int read_as(struct maker *m, struct xml_element *el, const struct plugin_decl *decl)
+{
+	struct scene_node node = {
+		.cls = decl->cls, .type = decl->type, .file = el->file, .line = el->line, .decl = decl};
+	struct draft d = {.node = &node, .decl = decl, .nesting = {.height = 1, .objects = 1}};
+	el->busy = true;
+	m->depth++;
+	int r = fill_node(m, &d, el);
+	m->depth--;
+	el->busy = false;
+	return r ? r : REPORT_TOLD;
+}
+
+/* Reports that an object is refused, and the problems inside it. */
+static int report_refused(struct maker *m, struct xml_element *el, enum plugin_class cls, const char *type, int refused)
+{
+	if (refused >= 0 || (refused = report_problem(&m->report, refused, m->error)))
+		return refused;
+	const struct plugin_decl *meant = meant_type(m->decls, el, cls, type);
+	return meant ? read_as(m, el, meant) : read_inside(m, el);
 }
 
 /* Fills in d's node from el's contents, and records whether it may be flawed. */
@@ -536,9 +563,9 @@ int maker_node(struct maker *m, struct xml_element *el, const struct scene_node 
 	bool stands_in = !decl;
 	struct xml_element *inner = NULL;
 	if (!decl && !m->lenient)
-		return read_inside(m, el, refuse_type(m->decls, el, cls, type, m->error));
+		return report_refused(m, el, cls, type, refuse_type(m->decls, el, cls, type, m->error));
 	if (!decl && (r = substitute_plugin(&m->notes, m->decls, &m->ids, el, cls, &type, &decl, &inner)))
-		return read_inside(m, el, r);
+		return report_refused(m, el, cls, type, r);
 	if (inner) {
 		r = make_inner(m, el, inner, out);
 		el->node = r ? NULL : *out;

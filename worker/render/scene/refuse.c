@@ -77,23 +77,41 @@ int refuse_element(const struct xml_element *el, struct error *e)
 			 s.best ? spelling_hint(&s, hint, sizeof hint) : "; --lenient leaves it out");
 }
 
+/* Offers the types of a class, unless a type is known to be right, or is no name but an image format. */
+static void offer_types(const struct plugin_decl *decls, const struct xml_element *el, enum plugin_class cls,
+			struct spelling *s)
+{
+	if (!(cls == PLUGIN_TEXTURE && gltf_is(el->file)) && !plugin_is_mitsubas(cls, s->wanted))
+		plugin_offer_types(decls, cls, s);
+}
+
+const struct plugin_decl *meant_type(const struct plugin_decl *decls, const struct xml_element *el,
+				     enum plugin_class cls, const char *type)
+{
+	struct spelling s = {.wanted = type};
+	offer_types(decls, el, cls, &s);
+	return s.best ? plugin_find(decls, cls, s.best) : NULL;
+}
+
 int refuse_type(const struct plugin_decl *decls, const struct xml_element *el, enum plugin_class cls, const char *type,
 		struct error *e)
 {
-	char hint[128], near[128] = "", list[512];
+	char hint[128], near[128] = "", checked[96] = "", list[512];
 	struct spelling s = {.wanted = type};
 	if (cls == PLUGIN_TEXTURE && gltf_is(el->file)) /* an extension, whose name is the image's format */
 		return xml_error(el, e, ENOTSUP, "images of %.64s are not supported; export PNG, JPEG or WebP%s", type,
 				 LENIENT_TEXTURE_HINT);
-	plugin_offer_types(decls, cls, &s);
+	offer_types(decls, el, cls, &s);
 	plugin_list_types(decls, cls, list, sizeof list);
 	if (plugin_is_mitsubas(cls, type))
 		return xml_error(el, e, EINVAL, "this %s of Mitsuba's is not supported%s (supported: %s)",
 				 plugin_class_name(cls), lenient_hint(el, cls, type, hint, sizeof hint), list);
 	spelling_hint(&s, near, sizeof near);
+	if (s.best && el->first)
+		snprintf(checked, sizeof checked, "its content is checked as that of `%.48s`; ", s.best);
 	const char *lenient = lenient_hint(el, cls, type, hint, sizeof hint);
-	return xml_error(el, e, EINVAL, "there is no %s of this type%s%s (supported: %s)", plugin_class_name(cls), near,
-			 *near && *lenient ? lenient + 1 : lenient, list); /* after a "?", no ";" */
+	return xml_error(el, e, EINVAL, "there is no %s of this type%s%s (%ssupported: %s)", plugin_class_name(cls),
+			 near, *near && *lenient ? lenient + 1 : lenient, checked, list); /* after a "?", no ";" */
 }
 
 /* Returns whether the shorter of two names is the first or the last words of the longer one, as `ior` is of

@@ -217,6 +217,36 @@ static void test_values_in_unknown_types(void **state)
 	lists_of(xml, said);
 }
 
+/* The content of an unknown type is checked as that of the type it resembles, and elements of unknown names are
+ * reported in any. */
+static void test_inside_misspelt_types(void **state)
+{
+	(void)state;
+	static const char xml[] =
+		S "<sensor type='perspectve'><flot name='fov' value='40'/>\n<float name='fv' value='3'/>\n"
+		  "<float name='fov' value='200'/></sensor>\n"
+		  "<shape type='sphere'><bsdf type='plstic'><float name='int_ir' value='2'/>\n"
+		  "<texture name='diffuse_reflectance' type='checkerbord'><rgb name='color2' value='0.5'/></texture>"
+		  "</bsdf></shape>\n<bsdf type='plstic' id='a'/>\n<bsdf type='of_a_fork'><flot name='x' value='1'/>\n"
+		  "<default name='y' value='1'/></bsdf>" END;
+	static const char *const said[] = {
+		"s.xml:1: <sensor type=\"perspectve\">: there is no sensor of this type; did you mean `perspective`? "
+		"(its content is checked as that of `perspective`; supported: ",
+		"s.xml:1: <flot>: there is no element of this name; did you mean `float`?",
+		"s.xml:2: <float>: <sensor type=\"perspective\"> has no `fv`; did you mean `fov`?",
+		"s.xml:3: <float>: fov=200 is outside",
+		"s.xml:4: <bsdf type=\"plstic\">: there is no bsdf of this type; did you mean `plastic`?",
+		"s.xml:4: <float>: <bsdf type=\"plastic\"> has no `int_ir`; did you mean `int_ior`?",
+		"s.xml:5: <texture type=\"checkerbord\">: there is no texture of this type; did you mean `checkerboard`?",
+		"s.xml:5: <rgb>: <texture type=\"checkerboard\"> has no `color2`",
+		"s.xml:6: <bsdf type=\"plstic\">: there is no bsdf of this type; did you mean `plastic`? --lenient uses "
+		"the bsdf inside it, or `diffuse`, instead (supported: ",
+		"s.xml:7: <bsdf type=\"of_a_fork\">: there is no bsdf of this type",
+		"s.xml:7: <flot>: there is no element of this name; did you mean `float`?",
+		NULL};
+	lists_of(xml, said);
+}
+
 /* Complete objects before the error in a truncated file are checked, open ones are not, and everything in the
  * including files is. */
 static void test_included_files_that_break_off(void **state)
@@ -290,11 +320,17 @@ static void test_gltf(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_names_without_values),	      cmocka_unit_test(test_paths_without_values),
-		cmocka_unit_test(test_files_that_are_not_there),      cmocka_unit_test(test_ids),
-		cmocka_unit_test(test_inside_unknown_types),	      cmocka_unit_test(test_files_that_break_off),
-		cmocka_unit_test(test_includes_that_break_off),	      cmocka_unit_test(test_wrong_steps),
-		cmocka_unit_test(test_values_in_unknown_types),	      cmocka_unit_test(test_gltf),
+		cmocka_unit_test(test_names_without_values),
+		cmocka_unit_test(test_paths_without_values),
+		cmocka_unit_test(test_files_that_are_not_there),
+		cmocka_unit_test(test_ids),
+		cmocka_unit_test(test_inside_unknown_types),
+		cmocka_unit_test(test_files_that_break_off),
+		cmocka_unit_test(test_includes_that_break_off),
+		cmocka_unit_test(test_wrong_steps),
+		cmocka_unit_test(test_values_in_unknown_types),
+		cmocka_unit_test(test_inside_misspelt_types),
+		cmocka_unit_test(test_gltf),
 		cmocka_unit_test(test_included_files_that_break_off),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
