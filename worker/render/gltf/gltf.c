@@ -223,11 +223,17 @@ static void visit_lists(struct gltf *g, const struct gltf_at *node, const mat4 *
 	if (hidden)
 		return;
 	const json_t *instances = gltf_extension(g, node, node->json, "EXT_mesh_gpu_instancing");
-	bool mesh = gltf_follow(g, node, node->json, "mesh", GLTF_MESHES, &what) > 0 && !is_scaled_away(node, to_world);
+	bool mesh = gltf_follow(g, node, node->json, "mesh", GLTF_MESHES, &what) > 0;
+	if (mesh && is_scaled_away(node, to_world)) {
+		g->first_away = g->scaled_away++ == 0 ? node->index : g->first_away;
+		mesh = false;
+	}
 	if (mesh && instances)
 		gltf_mesh_instances(g, &what, node, instances, to_world);
 	else if (mesh)
 		gltf_mesh(g, &what, node, to_world);
+	gltf_go_on(g);
+	gltf_follow(g, node, node->json, "skin", GLTF_SKINS, &what); /* the mesh may have no joints to use it for */
 	gltf_go_on(g);
 	const json_t *light = gltf_extension(g, node, node->json, "KHR_lights_punctual");
 	if (light && gltf_follow(g, node, light, "light", GLTF_LIGHTS, &what) > 0)
@@ -277,6 +283,18 @@ static void visit_all(struct gltf *g, struct walk *w, const mat4 *world)
 	}
 }
 
+static void note_scaled_away(struct gltf *g)
+{
+	char text[192];
+	snprintf(
+		text, sizeof text,
+		"the mesh%s of %zu node%s, which a scale of 0 makes a line or a point, %s left out (first: nodes[%zu])",
+		g->scaled_away == 1 ? "" : "es", g->scaled_away, g->scaled_away == 1 ? "" : "s",
+		g->scaled_away == 1 ? "is" : "are", g->first_away);
+	if (g->scaled_away)
+		gltf_note(g, text);
+}
+
 static void read_scene(struct gltf *g)
 {
 	struct gltf_at scene;
@@ -293,6 +311,7 @@ static void read_scene(struct gltf *g)
 	memset(w.above, 0, w.nodes * sizeof *w.above);
 	if (none) {
 		visit_all(g, &w, &world);
+		note_scaled_away(g);
 		return;
 	}
 	const json_t *roots = json_object_get(scene.json, "nodes");
@@ -304,6 +323,7 @@ static void read_scene(struct gltf *g)
 			visit(&w, (uint64_t)json_integer_value(root), &world, 0, false);
 		gltf_go_on(g);
 	}
+	note_scaled_away(g);
 }
 
 /* Returns whether the number of values is within its limit, by an upper bound: each value begins with, or comes

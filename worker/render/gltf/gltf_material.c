@@ -10,6 +10,7 @@
 #include "worker/render/gltf/gltf_layers.h"
 #include "worker/render/gltf/gltf_texture.h"
 
+#include <stdio.h>
 #include <string.h>
 
 #define DARKEST 1e-6 /* black would have an infinite coefficient */
@@ -127,12 +128,26 @@ static void put_base_colour(struct gltf *g, struct xml_element *el, const struct
 
 /* ---- the material */
 
+/* A mode that the format does not have is refused; a lenient reader leaves it out, and the material is opaque. */
+static struct xml_element *put_unknown_mode(struct gltf *g, struct xml_element *parent, const struct gltf_at *at,
+					    const char *mode)
+{
+	char name[64];
+	struct xml_element *mask = gltf_plugin(g, parent, at, "bsdf", "mask", NULL);
+	snprintf(name, sizeof name, "alphaMode \"%.32s\"", mode);
+	gltf_put_text(g, mask, at, name, ELEMENT_UNSUPPORTED);
+	gltf_put_number(g, mask, at, "opacity", 1);
+	return mask;
+}
+
 /* Wraps the BSDF in a mask, which lets a part of the light through unchanged, if the material has one. */
 static struct xml_element *put_mask(struct gltf *g, struct xml_element *parent, const struct gltf_at *at,
 				    const json_t *texture, double alpha, bool vertex_alpha)
 {
 	const char *mode = gltf_text(g, at, at->json, "alphaMode", "OPAQUE");
 	bool cut = strcmp(mode, "MASK") == 0;
+	if (!cut && strcmp(mode, "OPAQUE") != 0 && strcmp(mode, "BLEND") != 0)
+		return put_unknown_mode(g, parent, at, mode);
 	if (strcmp(mode, "OPAQUE") == 0 || (!texture && !cut && alpha == 1 && !vertex_alpha))
 		return parent;
 	double cutoff = gltf_number(g, at, at->json, "alphaCutoff", 0.5);

@@ -75,7 +75,8 @@ bool gltf_entry(struct gltf *g, enum gltf_array array, uint64_t index, struct gl
 	*out = (struct gltf_at){array, (size_t)index, json_array_get(list, (size_t)index)};
 	if (json_is_object(out->json))
 		return true;
-	gltf_fail(g, NULL, EINVAL, "there is no %s[%llu]", array_names[array], (unsigned long long)index);
+	gltf_fail(g, NULL, EINVAL, out->json ? "%s[%llu] is not an object" : "there is no %s[%llu]", array_names[array],
+		  (unsigned long long)index);
 	return false;
 }
 

@@ -93,6 +93,7 @@ struct gltf {
 	double *mesh_uses;		   /* by mesh: number of nodes that use it */
 	bool *mesh_made;		   /* by mesh: a shapegroup was made of it */
 	struct xml_element *scene;
+	size_t scaled_away, first_away; /* nodes whose meshes a scale of 0 makes lines or points; index of the first */
 	bool has_camera, has_light;
 	bool is_blenders;  /* Blender's exporter wrote the file */
 	bool is_burleys;   /* the writer's diffuse surfaces follow Burley, not Lambert, as the format's do */

@@ -114,6 +114,8 @@ static const struct {
 	 "requires the extensions EXT_x, EXT_y, (no text), which are not supported"},
 	{"[0, 1, 4, 5, 6]", "[0, 1, 4, 5, 9]", "there is no nodes[9]"},
 	{"[0, 1, 4, 5, 6]", "[0, \"1\"]", "not indices"},
+	{"\"cameras\": [", "\"cameras\": [1, ", "s.gltf: cameras[0] is not an object"},
+	{"\"mesh\": 0,", "\"mesh\": 0, \"skin\": 0,", "there is no skins[0]"},
 	{"\"children\": [2, 3]", "\"children\": [2, 1]", "s.gltf:7: nodes[1]: it is its own ancestor"},
 	{"\"children\": [2, 3]", "\"children\": [2, 0.5]", "nodes[1]: its children are not indices"},
 	{"\"rotation\": [1, 0, 0, 0]", "\"rotation\": [0, 0, 0, 0]", "nodes[4]: its rotation is not a quaternion"},
@@ -462,6 +464,8 @@ static void test_no_area(void **state)
 	struct scene whole = gltf_files_scene(NULL, NULL, false),
 		     s = gltf_files_scene(scale, "\"scale\": [0, 0, 0]", false);
 	assert_true(s.object_count < whole.object_count);
+	assert_true(scene_has_note(&s, "the mesh of 1 node, which a scale of 0 makes a line or a point, is left out "
+				       "(first: nodes["));
 	scene_fini(&s);
 	s = gltf_files_scene(scale, "\"scale\": [0, 1, 0]", false);
 	assert_true(s.object_count < whole.object_count);

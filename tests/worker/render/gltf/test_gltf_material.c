@@ -182,6 +182,17 @@ static void test_materials(void **state)
 	assert_string_equal(node_child(map, PLUGIN_BSDF, 0)->type, "principled");
 	scene_fini(&s);
 
+	/* Unknown modes are refused; a lenient reader shows the material as opaque. */
+	static const char unknown[] = "\"metallicFactor\": 0.5},\n\"alphaMode\": \"MASKED\", \"x\": {";
+	static struct gltf_files f;
+	struct error e;
+	assert_true(gltf_files_read(gltf_files_change(&f, "\"metallicFactor\": 0.5,", unknown), false, &s, &e) < 0);
+	assert_non_null(strstr(e.text, "`alphaMode \"MASKED\"` is not supported; --lenient leaves it out"));
+	s = gltf_files_scene("\"metallicFactor\": 0.5,", unknown, true);
+	assert_true(node_float(scene_named(&s, second), "opacity", 0) == 1);
+	assert_true(scene_has_note(&s, "the parameter `alphaMode \"MASKED\"` is not supported and left out (lenient)"));
+	scene_fini(&s);
+
 	/* Abbe's number is 20 / dispersion: (n(d) - 1) / (n(F) - n(C)). */
 	s = gltf_files_scene(IOR, "\"KHR_materials_dispersion\": {\"dispersion\": 0.5}, " IOR, false);
 	const struct scene_node *glass = scene_named(&s, third);
