@@ -203,6 +203,18 @@ static int on_texture(struct report *r, const struct scene_node *n, struct error
 	return remark(r, n, e, "`value` has no effect: the texture inside is scaled, as in Mitsuba 0.6");
 }
 
+/* Notes groups without shapes: once for all of a type. Where something was refused it may be what they lack. */
+static int on_shape(struct report *r, const struct scene_node *n, struct error *e)
+{
+	char text[REPORT_TEXT_MAX];
+	bool group = strcmp(n->type, "merge") == 0 || strcmp(n->type, "shapegroup") == 0;
+	if (!group || n->child_count > 0 || r->problem_count > 0)
+		return 0;
+	snprintf(text, sizeof text, "%s:%d: <shape type=\"%s\"> holds no shape: nothing of it is seen", n->file,
+		 n->line, n->type);
+	return report_text(r, n->file, n->type, text, e);
+}
+
 int remarks_on_object(const struct scene_node *n, struct report *r, struct error *e)
 {
 	switch (n->cls) {
@@ -210,6 +222,8 @@ int remarks_on_object(const struct scene_node *n, struct report *r, struct error
 		return on_metal(r, n, e);
 	case PLUGIN_SENSOR:
 		return on_sensor(r, n, e);
+	case PLUGIN_SHAPE:
+		return on_shape(r, n, e);
 	case PLUGIN_TEXTURE:
 		return on_texture(r, n, e);
 	default:

@@ -15,6 +15,7 @@
 #include "worker/render/xml/element_make.h"
 #include "worker/render/text/number.h"
 #include "worker/render/xml/upgrade.h"
+#include "worker/render/xml/version.h"
 #include "worker/render/xml/xml_files.h"
 #include "worker/render/xml/xml_tidy.h"
 
@@ -45,7 +46,8 @@ struct reader {
 	struct xml_element *current; /* innermost open element */
 	struct xml_element *hook;    /* the <include> element that the file replaces; NULL for the main file */
 	int depth;
-	int minor; /* minor version of a file before 0.5; otherwise -1 */
+	const char *newer; /* the note that a file is of an unknown version */
+	int minor;	   /* minor version of a file before 0.5; otherwise -1 */
 	bool snake;
 };
 
@@ -208,18 +210,17 @@ static int begin_file(struct reader *r, struct xml_element *el)
 	if (strcmp(el->name, "scene") == 0)
 		drop_attributes(el);
 	const char *version = version_of(r, el);
-	int64_t major;
-	const char *rest = version ? number_scan_int(version, version + strlen(version), &major) : NULL;
-	if (!rest || (*rest != 0 && *rest != '.') || major < 0)
+	int64_t major, minor;
+	if (!version || !version_read(version, &major, &minor))
 		return needs_version(r, el);
-	int64_t minor = 0;
-	const char *end = *rest == '.' ? number_scan_int(rest + 1, version + strlen(version), &minor) : rest;
-	r->minor = major == 0 && end && minor >= 0 && minor < 5 ? (int)minor : -1;
+	r->minor = major == 0 && minor >= 0 && minor < 5 ? (int)minor : -1;
 	if (r->minor >= 0 && r->minor < 4 && !r->upgraded && r->tree->note_count < XML_NOTES_MAX) {
 		r->upgraded = true;
 		r->tree->notes[r->tree->note_count++] =
 			"is of a version before 0.4: read as by Mitsuba 0.5, which mirrors the cameras of such files";
 	}
+	if (!r->newer && r->tree->note_count < XML_NOTES_MAX && (r->newer = version_newer(el, major, r->arena)))
+		r->tree->notes[r->tree->note_count++] = r->newer;
 	r->snake = major < 2;
 	bool dialect_3 = major >= 2;
 	if (el->parent && !r->mixed && r->tree->dialect_3 != dialect_3 && r->tree->note_count < XML_NOTES_MAX) {
@@ -240,9 +241,8 @@ static int begin_object(struct reader *r, struct xml_element *el)
 	const char *version = xml_attribute(el, "version");
 	if (el == r->top || !version || !r->tree->dialect_3 || el->ignored || el->unset)
 		return 0;
-	int64_t major;
-	const char *rest = number_scan_int(version, version + strlen(version), &major);
-	if (!rest || (*rest != 0 && *rest != '.') || major < 0)
+	int64_t major, minor;
+	if (!version_read(version, &major, &minor))
 		return xml_error(el, r->error, EINVAL, "version=\"%.64s\" is not one of Mitsuba's", version);
 	el->snake |= major < 2;
 	return 0;

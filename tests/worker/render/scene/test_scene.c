@@ -280,6 +280,34 @@ static void test_textures_of_shapes(void **state)
 	scene_fini(&s);
 }
 
+/* A file of a version that does not exist yet is read as one of version 3. */
+static void test_newer_versions(void **state)
+{
+	(void)state;
+	struct scene s = read_ok("<scene version='9.0.0'><shape type='sphere'/></scene>");
+	assert_true(scene_has_note(
+		&s, "s.xml: version=\"9.0.0\" in s.xml:1 is newer than any known: read as by Mitsuba 3"));
+	scene_fini(&s);
+	s = read_ok("<scene version='3.9'><shape type='sphere'/></scene>");
+	assert_false(scene_has_note(&s, "newer"));
+	scene_fini(&s);
+}
+
+/* Groups without shapes are noted, once for each type. */
+static void test_empty_groups(void **state)
+{
+	(void)state;
+	struct scene s = read_ok("<scene version='3.0.0'><shape type='merge'/>\n<shape type='merge'/>"
+				 "<shape type='shapegroup' id='g'/></scene>");
+	assert_true(scene_has_note(&s, "s.xml:1: <shape type=\"merge\"> holds no shape: nothing of it is seen"));
+	assert_false(scene_has_note(&s, "s.xml:2: <shape type=\"merge\">"));
+	assert_true(scene_has_note(&s, "s.xml:2: <shape type=\"shapegroup\"> holds no shape"));
+	scene_fini(&s);
+	s = read_ok("<scene version='3.0.0'><shape type='merge'><shape type='sphere'/></shape></scene>");
+	assert_false(scene_has_note(&s, "holds no shape"));
+	scene_fini(&s);
+}
+
 static void test_numbers_given_as_colours(void **state)
 {
 	(void)state;
@@ -540,6 +568,8 @@ int main(void)
 		cmocka_unit_test(test_capitals_of_types),
 		cmocka_unit_test(test_parameters_of_forks),
 		cmocka_unit_test(test_textures_of_shapes),
+		cmocka_unit_test(test_newer_versions),
+		cmocka_unit_test(test_empty_groups),
 		cmocka_unit_test(test_numbers_given_as_colours),
 		cmocka_unit_test(test_lenient_numbers),
 		cmocka_unit_test(test_nesting_and_references),

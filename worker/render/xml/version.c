@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/xml/version.h"
+
+#include "worker/render/text/number.h"
+
+#include <stdio.h>
+#include <string.h>
+
+enum { NEWEST = 3, NOTE_MAX = 256 };
+
+bool version_read(const char *text, int64_t *major, int64_t *minor)
+{
+	const char *end = text + strlen(text), *rest = number_scan_int(text, end, major);
+	*minor = 0;
+	if (!rest || (*rest != 0 && *rest != '.') || *major < 0)
+		return false;
+	if (*rest == '.' && !number_scan_int(rest + 1, end, minor))
+		*minor = -1;
+	return true;
+}
+
+const char *version_newer(const struct xml_element *el, int64_t major, struct arena *arena)
+{
+	char text[NOTE_MAX];
+	if (major <= NEWEST)
+		return NULL;
+	snprintf(text, sizeof text, "version=\"%.32s\" in %.160s:%d is newer than any known: read as by Mitsuba %d",
+		 xml_attribute(el, "version"), el->file, el->line, NEWEST);
+	return arena_strdup(arena, text);
+}
