@@ -85,6 +85,7 @@ struct emitter {
 	bool infinite, textured, delta;
 	bool beam; /* a delta emitter of one direction: nothing connects to it, and all its light sub-paths begin alike
 		    */
+	uint64_t negative;	/* number of pixels of its image with a negative value, which counts as 0 */
 	enum color_shape shape; /* CONSTANT, D65: the same spectrum everywhere, up to a factor */
 	double power; /* for choosing among emitters: area x pi x mean radiance; infinite ones: mean radiance x 4 pi, or
 			 irradiance, which the caller multiplies by the scene's cross section pi R^2 */

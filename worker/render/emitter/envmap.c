@@ -307,6 +307,7 @@ static int envmap_create(struct emitter *em, const struct scene_node *n, const s
 	if (!code)
 		code = raster_read(&picture, n, build->assets, &(struct raster_range){0, HUGE_VAL, false, IMAGE_ALL},
 				   build->arena, e);
+	em->negative = picture.raised;
 	return code ? code : envmap_make(em, &picture, build->dialect_3, node_float(n, "scale", 1), &axes, n, build, e);
 }
 

@@ -29,6 +29,7 @@ struct picture_key {
 
 struct picture {
 	struct indexed_image image;
+	uint64_t raised; /* number of pixels with a value that was raised to the least of the range */
 	/* Computed by users of the picture; negative: not known yet. */
 	double largest; /* largest of all values, at least 0 */
 	double bound;	/* upper bound of the spectra of all pixels */

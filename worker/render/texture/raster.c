@@ -31,6 +31,23 @@ static int decode(struct raster *r, const struct scene_node *n, const struct ass
 	return code ? node_error(n, e, -code, "%s", reason.text) : 0;
 }
 
+/* Returns the number of pixels with a value below `least`. */
+static uint64_t count_below(const struct indexed_image *i, double least)
+{
+	size_t numbers = indexed_image_numbers(i), values = (size_t)i->width * i->height * i->channels;
+	uint64_t count = 0;
+	bool any = false;
+	for (size_t k = 0; k < numbers && !any; k++)
+		any = (double)i->number[k] < least;
+	for (size_t k = 0; k < values && any; k += i->channels) {
+		bool below = false;
+		for (size_t c = 0; c < i->channels; c++)
+			below |= (double)indexed_image_at(i, k + c) < least;
+		count += below;
+	}
+	return count;
+}
+
 /* Applies the threshold, if there is one, and clamps to the range. Returns whether a pixel was outside the range. */
 static bool cut_to(struct indexed_image *i, double threshold, const struct raster_range *range)
 {
@@ -75,14 +92,18 @@ int raster_read(struct raster *r, const struct scene_node *n, const struct asset
 	r->shared = decoded ? picture_find(decoded, &key, range->least, range->largest) : NULL;
 	if (r->shared) {
 		r->image = r->shared->image;
+		r->raised = r->shared->raised;
 		return 0;
 	}
 	int code = decode(r, n, assets, &key, arena, e);
 	if (code)
 		return code;
+	r->raised = key.threshold >= 0 ? 0 : count_below(&r->image, range->least);
 	bool cut = cut_to(&r->image, key.threshold, range);
 	if (decoded)
 		r->shared = picture_add(decoded, &key, &r->image, range->least, range->largest, cut, arena);
+	if (r->shared)
+		r->shared->raised = r->raised;
 	return 0;
 }
 

@@ -20,6 +20,7 @@ struct raster {
 	enum raster_wrap wrap_u, wrap_v;
 	bool nearest;		/* otherwise bilinear */
 	struct picture *shared; /* NULL: the pixels are not shared */
+	uint64_t raised;	/* number of pixels with a value below the range given */
 };
 
 struct raster_range {

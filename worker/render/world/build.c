@@ -229,8 +229,10 @@ static int create_emitters(struct builder *b)
 		if (!rc && environment && w->environment >= 0)
 			rc = node_error(n, b->e, EINVAL,
 					"a scene may have one environment only; remove this one or the one before");
-		if (!rc)
+		if (!rc) {
+			negative_note(w, em, n);
 			rc = moving_emitter(b, em, n);
+		}
 		if (em->infinite)
 			em->power *= M_PI * w->radius * w->radius;
 		if (!rc && !isfinite(em->power))

@@ -45,6 +45,7 @@ struct world_notes {
 	char gone[256];	     /* how many shapes are too small for the scene */
 	char materials[384]; /* how many shape files name materials that are not read */
 	char unseen[192];    /* that the camera sees no shape */
+	char negative[384];  /* how many pixels of an emitter's image are negative */
 	char dark[128];	     /* that the emitters give no light */
 	char backs[192];     /* that the camera sees backs that are black */
 	char endless[256];   /* that the camera stands in a medium that no light from infinity gets through */

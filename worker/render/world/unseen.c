@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/world/unseen.h"
 
+#include "worker/render/asset/asset_name.h"
+
 #include <stdio.h>
 
 /* The planes that a box can be beyond: the near and the far plane, and four planes through the edges of the film. */
@@ -82,6 +84,17 @@ void unseen_note(struct world *w, const struct box *boxes)
 			 all >> NEAR & 1  ? "all are behind it, or nearer than its near plane"
 			 : all >> FAR & 1 ? "all are beyond its far plane"
 					  : "all are beside the image or behind it");
+}
+
+void negative_note(struct world *w, const struct emitter *em, const struct scene_node *n)
+{
+	char place[NODE_PLACE_MAX], file[129];
+	if (em->negative == 0)
+		return;
+	snprintf(w->notes.negative, sizeof w->notes.negative,
+		 "%s: %llu pixel%s of %s ha%s a negative value, which counts as 0", node_place(n, place),
+		 (unsigned long long)em->negative, em->negative == 1 ? "" : "s",
+		 asset_name_shown(node_string(n, "filename", ""), file, sizeof file), em->negative == 1 ? "s" : "ve");
 }
 
 void dark_note(struct world *w, bool lost)

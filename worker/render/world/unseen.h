@@ -16,6 +16,9 @@ void unseen_note(struct world *w, const struct box *boxes);
  * rendered. lost: emitters on shapes have been left out, so that no emitter at all is left. */
 void dark_note(struct world *w, bool lost);
 
+/* Sets w->notes.negative if the image of the emitter em, made from n, has negative pixels. */
+void negative_note(struct world *w, const struct emitter *em, const struct scene_node *n);
+
 /* Sets w->notes.backs if at least one in twenty of the camera rays that meet a surface meets the back of an opaque
  * material without `twosided`. black: the scene's dialect makes backs black, a surprise where a mesh is inside out;
  * otherwise they are lit, which differs from Mitsuba 0.6. Traces 1,024 rays; needs w->accel. */

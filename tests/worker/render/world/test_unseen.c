@@ -5,6 +5,7 @@
  * emitter gives light that is rendered.
  */
 #include "tests/support/dice.h"
+#include "tests/support/memory_assets.h"
 #include "tests/support/worlds.h"
 #include "worker/render/geom/accel.h"
 
@@ -144,12 +145,38 @@ static void test_dark(void **state)
 	}
 }
 
+/* Negative pixels of an environment count as 0, with a note, whatever the others are. */
+static void test_negative_pixels(void **state)
+{
+	(void)state;
+	static const char xml[] = "<scene version='3.0.0'>" SENSOR(
+		"0,0,9", "0,0,0") "\n<emitter type='envmap'>"
+				  "<string name='filename' value='sky.pfm'/></emitter></scene>";
+	static const float pixels[3][6] = {{-1, -1, -1, 1, -2, 1}, {1, 1, 1, 0, -0.5f, 0}, {0, 1, 2, 3, 4, 5}};
+	static const char *const said[] = {"scene.xml:2: 2 pixels of sky.pfm have a negative value, which counts as 0",
+					   "scene.xml:2: 1 pixel of sky.pfm has a negative value, which counts as 0",
+					   ""};
+	for (int i = 0; i < 3; i++) {
+		char pfm[64], note[1024];
+		int head = snprintf(pfm, sizeof pfm, "PF\n2 1\n-1\n");
+		memcpy(pfm + head, pixels[i], sizeof pixels[i]);
+		const struct memory_file files[] = {{"scene.xml", xml, strlen(xml)},
+						    {"sky.pfm", pfm, (size_t)head + sizeof pixels[i]},
+						    {NULL, NULL, 0}};
+		struct world *w = world_of_files(32, 32, files);
+		note_of(w, "negative", note);
+		assert_string_equal(note, said[i]);
+		world_free(w);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_sentences),
 		cmocka_unit_test(test_against_rays),
 		cmocka_unit_test(test_dark),
+		cmocka_unit_test(test_negative_pixels),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
