@@ -103,11 +103,10 @@ static int fill_mesh(struct mesh *m, const struct scene_node *n, const struct ac
 			m->position[i][k] = read_number(position, i, k);
 		if (!vec3_is_finite(mesh_load(m->position[i])))
 			return node_error(n, e, EINVAL, "vertex %u is not finite", i);
-		if (m->normal) {
-			vec3 v = mesh_unit((vec3){read_number(normal, i, 0), read_number(normal, i, 1),
-						  read_number(normal, i, 2)});
-			mesh_store(m->normal[i], vec3_is_finite(v) ? v : (vec3){0, 0, 0});
-		}
+		if (m->normal)
+			mesh_set_normal(m, i,
+					(vec3){read_number(normal, i, 0), read_number(normal, i, 1),
+					       read_number(normal, i, 2)});
 		for (unsigned k = 0; m->uv && k < 2; k++)
 			m->uv[i][k] = read_number(texcoord, i, k);
 		if (m->uv && !(isfinite(m->uv[i][0]) && isfinite(m->uv[i][1])))

@@ -12,6 +12,12 @@ vec3 mesh_unit(vec3 v)
 	return largest > 0 ? vec3_normalize((vec3){v.x / largest, v.y / largest, v.z / largest}) : v;
 }
 
+void mesh_set_normal(struct mesh *m, uint32_t i, vec3 normal)
+{
+	m->odd += !vec3_is_finite(normal);
+	mesh_store(m->normal[i], mesh_unit(normal));
+}
+
 int mesh_open(const struct scene_node *n, const struct asset_source *assets, struct asset *a, struct error *e)
 {
 	const char *name = node_string(n, "filename", NULL);

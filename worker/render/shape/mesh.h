@@ -13,6 +13,7 @@ struct mesh {
 	uint32_t vertex_count, triangle_count;
 	double (*position)[3];
 	double (*normal)[3]; /* NULL: flat shading; otherwise unit vectors, facing outwards */
+	uint32_t odd;	     /* number of vertices whose normals are not finite in the file, and count as missing */
 	double (*uv)[2];     /* NULL: none */
 	uint32_t (*index)[3];
 	uint32_t attribute_count;
@@ -39,6 +40,10 @@ static inline void mesh_store(double out[3], vec3 v)
 
 /* Returns v normalised, however long it is; 0 if v has no length or is not finite. */
 vec3 mesh_unit(vec3 v);
+
+/* Stores the normal of a vertex, of any length. One that is not finite becomes 0, which is a missing one, and is
+ * counted. */
+void mesh_set_normal(struct mesh *m, uint32_t i, vec3 normal);
 
 /* Opens the file that shape n names; the caller closes it. Returns 0 or a negative error code. */
 int mesh_open(const struct scene_node *n, const struct asset_source *assets, struct asset *a, struct error *e);

@@ -36,7 +36,7 @@ static void set_vertex(const struct obj_file *o, struct mesh *m, uint32_t i, con
 {
 	memcpy(m->position[i], (const double *)o->positions.items + 3 * (c->v - 1), sizeof m->position[i]);
 	if (m->normal && c->vn)
-		memcpy(m->normal[i], (const double *)o->normals.items + 3 * (c->vn - 1), sizeof m->normal[i]);
+		mesh_set_normal(m, i, mesh_load((const double *)o->normals.items + 3 * (c->vn - 1)));
 	if (m->uv && c->vt) {
 		const double *uv = (const double *)o->uvs.items + 2 * (c->vt - 1);
 		m->uv[i][0] = uv[0];

@@ -108,12 +108,7 @@ static int read_position(struct reader *o)
 
 static int read_normal(struct reader *o)
 {
-	int r = read_numbers(o, "vn", &o->file->normals, 3, 3);
-	if (r)
-		return r;
-	double *n = (double *)o->file->normals.items + 3 * (o->file->normals.count - 1);
-	mesh_store(n, mesh_unit(mesh_load(n)));
-	return 0;
+	return read_numbers(o, "vn", &o->file->normals, 3, 3);
 }
 
 /* Reads an index. Indices count from 1, or backwards from -1 for the last element. */

@@ -349,7 +349,7 @@ static int store_vertex(struct ply *f, const struct element *el, uint64_t i, con
 			return item_error(f, el, i, "a number that is not finite, or beyond 1e60");
 	memcpy(m->position[i], v, sizeof m->position[i]);
 	if (m->normal)
-		mesh_store(m->normal[i], mesh_unit((vec3){v[ROLE_NX], v[ROLE_NY], v[ROLE_NZ]}));
+		mesh_set_normal(m, (uint32_t)i, (vec3){v[ROLE_NX], v[ROLE_NY], v[ROLE_NZ]});
 	if (m->uv) {
 		m->uv[i][0] = v[ROLE_U];
 		m->uv[i][1] = f->flip ? 1 - v[ROLE_V] : v[ROLE_V];

@@ -134,9 +134,10 @@ bool render_scene_note(const struct render_summary *scene, size_t i, char *text,
 			 scene->brightest > 0 ? "" : "; it has no emitter either: the image is black");
 		return true;
 	}
-	const char *const met[] = {scene->notes.unseen, scene->notes.negative, scene->notes.dark, scene->notes.endless,
-				   scene->notes.backs,	scene->notes.scales,   scene->notes.flat, scene->notes.without,
-				   scene->notes.gone,	scene->notes.materials};
+	const char *const met[] = {scene->notes.unseen,	 scene->notes.negative, scene->notes.dark,
+				   scene->notes.endless, scene->notes.backs,	scene->notes.scales,
+				   scene->notes.flat,	 scene->notes.normals,	scene->notes.close,
+				   scene->notes.without, scene->notes.gone,	scene->notes.materials};
 	for (size_t k = 0; k < sizeof met / sizeof *met; k++)
 		if (*met[k] && i-- == 0) {
 			snprintf(text, size, "%s", met[k]);

@@ -30,6 +30,9 @@ struct counted {
 	const struct scene_node *first;
 	uint32_t without; /* meshes without any triangles */
 	const struct scene_node *first_without;
+	uint64_t odd;	  /* vertices whose normals are not finite */
+	uint32_t strange; /* meshes that have such */
+	const struct scene_node *first_strange;
 	uint32_t materials;
 	const struct scene_node *first_material;
 };
@@ -61,6 +64,23 @@ static void note_flat(struct world *w, const struct counted *f)
 		 "%llu triangle%s without area %s left out, in %u shape%s (first: %s)%s",
 		 (unsigned long long)f->triangles, f->triangles == 1 ? "" : "s", f->triangles == 1 ? "is" : "are",
 		 f->shapes, f->shapes == 1 ? "" : "s", node_title(f->first, first), empty);
+}
+
+static void count_odd(struct counted *c, const struct scene_node *n, uint32_t odd)
+{
+	if (odd && c->strange++ == 0)
+		c->first_strange = n;
+	c->odd += odd;
+}
+
+static void note_odd(struct world *w, const struct counted *c)
+{
+	char first[NODE_TITLE_MAX];
+	if (c->odd)
+		snprintf(w->notes.normals, sizeof w->notes.normals,
+			 "%llu normal%s in %u mesh%s (first: %s) %s not finite and count%s as missing",
+			 (unsigned long long)c->odd, c->odd == 1 ? "" : "s", c->strange, c->strange == 1 ? "" : "es",
+			 node_title(c->first_strange, first), c->odd == 1 ? "is" : "are", c->odd == 1 ? "s" : "");
 }
 
 static void count_materials(struct counted *c, const struct builder *b, const struct scene_node *n,
@@ -112,6 +132,7 @@ static int take_geometry(struct builder *b, const struct scene_node *n, const st
 {
 	count_flat(counted, n, dropped, g->kind == SHAPE_MESH && g->mesh.triangle_count == 0);
 	count_materials(counted, b, n, g);
+	count_odd(counted, n, g->mesh.odd);
 	b->triangles += g->mesh.triangle_count + g->curve.chain_points;
 	return b->triangles <= TRIANGLES_MAX
 		       ? 0
@@ -213,6 +234,7 @@ int build_read_shapes(struct builder *b)
 	if (rc)
 		return rc;
 	note_flat(b->w, &counted);
+	note_odd(b->w, &counted);
 	note_materials(b->w, &counted);
 	crash_place("building the scene", NULL, 0);
 	if (b->w->shape_count == 0)
@@ -224,6 +246,13 @@ int build_read_shapes(struct builder *b)
  * is a few thousand times as large as these errors, integrators agree; at 2^-44 of the scene's size, path
  * and bdpt differed by 2 %. */
 #define LEAST_SCALE 0x1p-42
+
+/* Whether p lies in the box, or not farther than `margin` from it along each axis. */
+static bool is_in(const struct box *b, vec3 p, double margin)
+{
+	return p.x >= b->low.x - margin && p.x <= b->high.x + margin && p.y >= b->low.y - margin &&
+	       p.y <= b->high.y + margin && p.z >= b->low.z - margin && p.z <= b->high.z + margin;
+}
 
 static void note_scales(struct builder *b)
 {
@@ -240,6 +269,45 @@ static void note_scales(struct builder *b)
 			 "%s is too small for a scene with %s: double precision does not suffice for both, and its "
 			 "image may be wrong",
 			 node_title(b->shape_nodes[small], little), node_title(b->shape_nodes[large], big));
+}
+
+/* Whether a triangle lies at a distance of less than `limit` from p, but not at 0. */
+static bool has_triangle_near(const struct mesh *m, vec3 p, double limit)
+{
+	for (uint32_t i = 0; i < m->triangle_count; i++) {
+		struct box box = box_empty();
+		vec3 a = mesh_load(m->position[m->index[i][0]]), side[2];
+		for (int k = 0; k < 3; k++)
+			box_grow(&box, mesh_load(m->position[m->index[i][k]]));
+		for (int k = 0; k < 2; k++)
+			side[k] = vec3_sub(mesh_load(m->position[m->index[i][k + 1]]), a);
+		double away = fabs(vec3_dot(vec3_normalize(vec3_cross(side[0], side[1])), vec3_sub(p, a)));
+		if (away > 0 && away < limit && is_in(&box, p, limit))
+			return true;
+	}
+	return false;
+}
+
+/* Rays are traced in floats that start as far before the camera as errors of the scene's size demand, so that nearer
+ * hits drown: a plane at 2^-46 of the scene's size vanished. Curves and instances are not looked at. */
+static void note_close(struct builder *b)
+{
+	struct world *w = b->w;
+	vec3 eye = vec3_madd(w->center, 1 / w->scale, w->camera.position);
+	double limit = LEAST_SCALE * box_extent(&b->all);
+	char title[NODE_TITLE_MAX];
+	for (uint32_t i = 0; i < w->shape_count && !*w->notes.close; i++) {
+		const struct shape_geometry *g = &b->geometry[i];
+		double away = fabs(vec3_length(vec3_sub(eye, g->sphere.center)) - g->sphere.radius);
+		bool near = g->kind == SHAPE_SPHERE
+				    ? away > 0 && away < limit
+				    : g->kind == SHAPE_MESH && !b->shared[i] && is_in(&b->boxes[i], eye, limit) &&
+					      has_triangle_near(&g->mesh, eye, limit);
+		if (near)
+			snprintf(w->notes.close, sizeof w->notes.close,
+				 "the camera is too near to %s for a scene as large as this: rays may miss it",
+				 node_title(b->shape_nodes[i], title));
+	}
 }
 
 int build_rescale(struct builder *b)
@@ -271,6 +339,8 @@ int build_rescale(struct builder *b)
 		if (n->cls == PLUGIN_SENSOR)
 			return error_prefix(b->e, rc, "%s:%d: <sensor>", n->file, n->line);
 	}
+	if (!rc)
+		note_close(b);
 	return rc ? rc : moving_camera(b);
 }
 

@@ -41,6 +41,8 @@ struct render_coincident {
 struct world_notes {
 	char scales[512];    /* a shape that is too small relative to another one, by name */
 	char flat[384];	     /* how many triangles without area were left out */
+	char normals[256];   /* how many normals of meshes are not finite */
+	char close[256];     /* a shape that is too near to the camera */
 	char without[256];   /* how many meshes have no triangles at all */
 	char gone[256];	     /* how many shapes are too small for the scene */
 	char materials[384]; /* how many shape files name materials that are not read */

@@ -101,6 +101,28 @@ static void test_without_triangles(void **state)
 	world_free(w);
 }
 
+/* Normals that are not finite are counted, in files of all meshes. */
+static void test_odd_normals(void **state)
+{
+	(void)state;
+	static const char xml[] = "<scene version='3.0.0'><emitter type='constant'/>" FILE_OF(
+		"obj", "a.obj", "") "\n" FILE_OF("obj", "b.obj", "") FILE_OF("obj", "a.obj", "") "</scene>",
+			  odd[] = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn nan 0 0\nvn 0 0 1\nf 1//1 2//2 3//1\n",
+			  even[] = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1\n";
+	const struct memory_file files[] = {{"scene.xml", xml, sizeof xml - 1},
+					    {"a.obj", odd, sizeof odd - 1},
+					    {"b.obj", even, sizeof even - 1},
+					    {NULL, NULL, 0}};
+	struct world *w = world_of_files(8, 8, files);
+	assert_string_equal(
+		w->notes.normals,
+		"4 normals in 2 meshes (first: the obj in scene.xml:1) are not finite and count as missing");
+	world_free(w);
+	w = world_with("<emitter type='constant'/><shape type='sphere'/>");
+	assert_string_equal(w->notes.normals, "");
+	world_free(w);
+}
+
 /* The glTF specification forbids such meshes, but some exporters write them: here with 0 indices. */
 static void test_without_triangles_in_gltf(void **state)
 {
@@ -213,8 +235,11 @@ static void test_no_meshes(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_without_triangles), cmocka_unit_test(test_without_triangles_in_gltf),
-		cmocka_unit_test(test_too_small),	  cmocka_unit_test(test_flattened),
+		cmocka_unit_test(test_odd_normals),
+		cmocka_unit_test(test_without_triangles),
+		cmocka_unit_test(test_without_triangles_in_gltf),
+		cmocka_unit_test(test_too_small),
+		cmocka_unit_test(test_flattened),
 		cmocka_unit_test(test_no_meshes),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

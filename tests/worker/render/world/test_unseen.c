@@ -145,6 +145,37 @@ static void test_dark(void **state)
 	}
 }
 
+/* A shape so large that rays from the camera beside it drown in its rounding is named; one at a proper distance, or
+ * with the camera beside it, is not. */
+static void test_too_close(void **state)
+{
+	(void)state;
+#define WIDE(turn, size) \
+	"<shape type='rectangle'><transform name='to_world'><scale value='" size "'/>" turn "</transform></shape>"
+	static const struct {
+		const char *shape;
+		bool close;
+	} cases[] = {
+		{WIDE("", "1e16"), true},
+		{WIDE("<rotate x='1' y='1' angle='40'/><translate z='4.5'/>", "1e16"), true},
+		{"<shape type='sphere'><float name='radius' value='1e16'/><point name='center' z='-1e16'/></shape>",
+		 true},
+		{WIDE("", "1e9"), false},
+		{WIDE("", "1"), false},
+		{WIDE("<translate z='-1e10'/>", "1e16"), false},
+		{WIDE("<translate x='1.1e16'/>", "1e16"), false},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		struct world *w =
+			world_of_text(32, 32, LOOK("0,0,0", "") "<emitter type='constant'/>%s", cases[i].shape);
+		char note[1024];
+		note_of(w, "the camera is too near to the ", note);
+		if ((*note != 0) != cases[i].close)
+			fail_msg("%s: '%s'", cases[i].shape, note);
+		world_free(w);
+	}
+}
+
 /* Negative pixels of an environment count as 0, with a note, whatever the others are. */
 static void test_negative_pixels(void **state)
 {
@@ -173,10 +204,9 @@ static void test_negative_pixels(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_sentences),
-		cmocka_unit_test(test_against_rays),
-		cmocka_unit_test(test_dark),
-		cmocka_unit_test(test_negative_pixels),
+		cmocka_unit_test(test_sentences), cmocka_unit_test(test_against_rays),
+		cmocka_unit_test(test_dark),	  cmocka_unit_test(test_negative_pixels),
+		cmocka_unit_test(test_too_close),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
