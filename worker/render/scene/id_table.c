@@ -40,7 +40,7 @@ int id_table_find(struct id_table *t, const struct xml_element *el, struct xml_e
 {
 	const char *id = xml_attribute(el, "id");
 	if (!id)
-		return xml_error(el, e, EINVAL, "needs an attribute `id`");
+		return element_needs(el, "id", e);
 	if ((*out = id_table_look(t, id)))
 		return 0;
 	if (t->incomplete || el->unset)
@@ -86,7 +86,7 @@ static int read_alias(struct id_table *t, const struct xml_element *el, struct e
 	if (el->unset)
 		return REPORT_TOLD;
 	if (!as)
-		return xml_error(el, e, EINVAL, "needs an attribute `as`");
+		return element_needs(el, "as", e);
 	int r = element_check(el, "id|as", false, e);
 	if (!r)
 		r = id_table_find(t, el, &target, e);

@@ -114,3 +114,9 @@ const struct scene_node *integrators_without_media(const struct scene_node *n)
 	}
 	return NULL;
 }
+
+void integrators_offer(struct spelling *s)
+{
+	for (size_t i = 0; i < TYPES; i++)
+		spelling_offer(s, types[i].type);
+}

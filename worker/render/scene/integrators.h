@@ -3,6 +3,7 @@
 #ifndef WORKER_RENDER_SCENE_INTEGRATORS_H
 #define WORKER_RENDER_SCENE_INTEGRATORS_H
 
+#include "common/base/spelling.h"
 #include "worker/render/scene/node.h"
 
 #include <stdbool.h>
@@ -36,5 +37,8 @@ int64_t integrators_depth(const struct scene_node *n);
 /* Returns the first integrator, n or one inside it, whose image has no media in Mitsuba; NULL if there is none. n
  * may be NULL. */
 const struct scene_node *integrators_without_media(const struct scene_node *n);
+
+/* Offers the types of known integrators. */
+void integrators_offer(struct spelling *s);
 
 #endif

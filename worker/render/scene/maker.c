@@ -193,7 +193,7 @@ static int read_property(struct maker *m, struct draft *d, const struct xml_elem
 	const char *written = xml_attribute(el, "name");
 	const struct animation *animation = NULL;
 	if (!written)
-		return xml_error(el, m->error, EINVAL, "needs an attribute `name`");
+		return element_needs(el, "name", m->error);
 	bool unset = element_is_unset(el);
 	if (unset && (strchr(written, '$') || strcmp(el->name, "animation") == 0))
 		return REPORT_TOLD;
@@ -556,7 +556,7 @@ int maker_node(struct maker *m, struct xml_element *el, const struct scene_node 
 		return r;
 	const char *type = xml_attribute(el, "type");
 	if (!type)
-		return xml_error(el, m->error, EINVAL, "needs an attribute `type`");
+		return element_needs(el, "type", m->error);
 	if (el->unset && strchr(type, '$'))
 		return REPORT_TOLD;
 	const struct plugin_decl *decl = plugin_find(m->decls, cls, type);

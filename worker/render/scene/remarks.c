@@ -45,16 +45,20 @@ static int on_integrator(struct report *r, const struct scene_node *n, struct er
 	while (inner && integrators_show_other(inner))
 		inner = integrators_inner(inner);
 	const char *how = strcmp(n->type, "stokes") == 0 ? ", without its polarization" : "";
+	char hint[128];
+	struct spelling s = {.wanted = inner ? inner->type : n->type};
+	integrators_offer(&s);
+	spelling_hint(&s, hint, sizeof hint);
 	if (inner && !integrators_are_known(inner))
 		rc = remark(r, n, e,
-			    "the `%s` inside it is not known: the image shows all light, on surfaces and in media%s",
-			    inner->type, how);
+			    "the `%s` inside it is not known: the image shows all light, on surfaces and in media%s%s",
+			    inner->type, how, hint);
 	else if (integrators_show_other(n) && inner)
 		rc = remark(r, n, e, "the image shows the light that the `%s` inside it asks for%s", inner->type, how);
 	else if (integrators_show_other(n))
 		rc = remark(r, n, e, "the image shows all light, on surfaces and in media%s", how);
 	else if (!integrators_are_known(n))
-		rc = remark(r, n, e, "is not known: the image shows all light, on surfaces and in media");
+		rc = remark(r, n, e, "is not known: the image shows all light, on surfaces and in media%s", hint);
 	int64_t depth = node_int(n, "max_depth", SCENE_DIRECT_DEPTH);
 	if (!rc && depth_is_direct(n->type) && (depth < 0 || depth >= SCENE_DIRECT_DEPTH))
 		rc = remark(r, n, e, "the image shows light that is scattered once%s; --max-depth shows more",
@@ -231,6 +235,14 @@ int remarks_on_object(const struct scene_node *n, struct report *r, struct error
 	}
 }
 
+/* Notes that a scene with a camera has no emitter: not of a line, since there is none to point at. */
+static int on_darkness(struct report *r, const struct scene_node *camera, struct error *e)
+{
+	char text[REPORT_TEXT_MAX];
+	snprintf(text, sizeof text, "%s: the scene has no emitter: the image is black", camera->file);
+	return report_text(r, camera->file, text, text, e);
+}
+
 int remarks_on_scene(const struct scene_node *const *objects, uint32_t count, bool dialect_3, struct report *r,
 		     struct error *e)
 {
@@ -268,6 +280,6 @@ int remarks_on_scene(const struct scene_node *const *objects, uint32_t count, bo
 	if (!rc && light && !seen)
 		rc = on_one_edge(r, integrator, e);
 	if (!rc && !light && camera && r->problem_count == 0)
-		rc = remark(r, camera, e, "the scene has no emitter: the image is black");
+		rc = on_darkness(r, camera, e);
 	return rc;
 }

@@ -9,6 +9,7 @@
 #include "worker/render/scene/spectral.h"
 
 #include "common/base/spelling.h"
+#include "worker/render/asset/asset_name.h"
 #include "worker/render/math/cie.h"
 #include "worker/render/text/number.h"
 
@@ -58,22 +59,23 @@ static bool table(const struct xml_element *el, uint32_t n, struct arena *arena,
 	return false;
 }
 
-static int check_table(const struct xml_element *el, const struct value *v, struct error *e)
+/* file: the name of the file that the values are from, followed by ": "; "" if they are in the scene. */
+static int check_table(const struct xml_element *el, const char *file, const struct value *v, struct error *e)
 {
 	const double *nm = v->as.spectrum.nm;
 	if (v->as.spectrum.count < 2)
 		return xml_error(el, e, EINVAL,
-				 "one pair nm:value is not a spectrum; give a single number for a constant");
+				 "%sone pair nm:value is not a spectrum; give a single number for a constant", file);
 	for (uint32_t i = 0; i < v->as.spectrum.count; i++)
 		if (!(nm[i] > 0) || (i && !(nm[i] > nm[i - 1])))
-			return xml_error(el, e, EINVAL, "wavelengths must be positive and ascend: %g nm does not",
-					 nm[i]);
+			return xml_error(el, e, EINVAL, "%swavelengths must be positive and ascend: %g nm does not",
+					 file, nm[i]);
 	return 0;
 }
 
 /* Reads "400:0.1, 500:0.2", or lines "400 0.1" of a file. Returns the number of points, or 0 if the text is
- * malformed. */
-static uint32_t scan_pairs(const char *p, const char *end, char between, double *nm, double *value)
+ * malformed; *stop is then the pair that is none, or the end. */
+static uint32_t scan_pairs(const char *p, const char *end, char between, double *nm, double *value, const char **stop)
 {
 	uint32_t n = 0;
 	while (p < end) {
@@ -87,6 +89,7 @@ static uint32_t scan_pairs(const char *p, const char *end, char between, double 
 		if (p == end)
 			break;
 		double x, y;
+		*stop = p;
 		p = number_scan(p, end, &x);
 		if (!p || p == end || n == SPECTRAL_POINTS_MAX || (between == ':' ? *p != ':' : !number_is_blank(*p)))
 			return 0;
@@ -102,26 +105,46 @@ static uint32_t scan_pairs(const char *p, const char *end, char between, double 
 		}
 		n++;
 	}
+	*stop = end;
 	return n;
 }
 
-static int read_pairs(const struct xml_element *el, const char *text, const char *end, char between,
+/* Refuses a file at the place where it is no list. */
+static int refuse_line(const struct xml_element *el, const char *file, const char *text, const char *stop,
+		       const char *end, struct error *e)
+{
+	char shown[257];
+	int line = 1;
+	for (const char *p = text; p < stop; p++)
+		line += *p == '\n';
+	asset_name_shown(file, shown, sizeof shown);
+	if (stop == end)
+		return xml_error(el, e, EINVAL, "%s: has no line `nm value`", shown);
+	return xml_error(el, e, EINVAL, "%s:%d: not a line `nm value`, of at most %d", shown, line,
+			 SPECTRAL_POINTS_MAX);
+}
+
+/* file: NULL if the text is in the scene. */
+static int read_pairs(const struct xml_element *el, const char *file, const char *text, const char *end,
 		      struct arena *arena, struct value *out, struct error *e)
 {
-	uint32_t n = scan_pairs(text, end, between, NULL, NULL);
+	char between = file ? ' ' : ':', name[260] = "";
+	const char *stop;
+	uint32_t n = scan_pairs(text, end, between, NULL, NULL, &stop);
 	if (n == 0)
-		return between == ':'
-			       ? xml_error(el, e, EINVAL,
-					   "`%.64s` is neither a number nor a list nm:value, nm:value, ... of "
-					   "at most %d",
-					   text, SPECTRAL_POINTS_MAX)
-			       : xml_error(el, e, EINVAL, "the file is not a list of lines `nm value`, at most %d",
-					   SPECTRAL_POINTS_MAX);
+		return file ? refuse_line(el, file, text, stop, end, e)
+			    : xml_error(el, e, EINVAL,
+					"`%.64s` is neither a number nor a list nm:value, nm:value, ... of at most %d",
+					text, SPECTRAL_POINTS_MAX);
 	double *nm, *value;
 	if (!table(el, n, arena, out, &nm, &value, e))
 		return -ENOMEM;
-	scan_pairs(text, end, between, nm, value);
-	return check_table(el, out, e);
+	scan_pairs(text, end, between, nm, value, &stop);
+	if (file) {
+		asset_name_shown(file, name, sizeof name - 2);
+		strcat(name, ": ");
+	}
+	return check_table(el, name, out, e);
 }
 
 /* A file is read once, however often the scene names it. */
@@ -140,7 +163,7 @@ static int read_file(const struct xml_element *el, const char *name, const struc
 	if (r)
 		return xml_error(el, e, -r, "%s", inner.text);
 	const char *text = (const char *)a.bytes;
-	r = read_pairs(el, a.size ? text : "", a.size ? text + a.size : "", ' ', arena, out, e);
+	r = read_pairs(el, name, a.size ? text : "", a.size ? text + a.size : "", arena, out, e);
 	assets->close(assets->user, &a);
 	kept = known && !r ? arena_alloc(arena, 1, sizeof *kept) : NULL;
 	if (kept) {
@@ -156,7 +179,7 @@ static int read_value(const struct xml_element *el, const char *text, const stru
 	double x[3];
 	(void)assets;
 	if (strchr(text, ':'))
-		return read_pairs(el, text, text + strlen(text), ':', arena, out, e);
+		return read_pairs(el, NULL, text, text + strlen(text), arena, out, e);
 	if (number_parse(text, x)) {
 		if (!el->snake)
 			return constant(el, x[0], arena, out, e);
@@ -273,7 +296,7 @@ static int pair_up(const struct xml_element *el, int n, const double *nm, const 
 	out->as.spectrum.count = (uint32_t)n;
 	out->as.spectrum.nm = nm;
 	out->as.spectrum.value = value;
-	return check_table(el, out, e);
+	return check_table(el, "", out, e);
 }
 
 static int read_regular(const struct xml_element *el, struct arena *arena, struct value *out, struct error *e)

@@ -33,7 +33,7 @@ static int read_triple(const struct xml_element *el, const char *attribute, vec3
 	const char *text = xml_attribute(el, attribute);
 	double v[3];
 	if (!text)
-		return xml_error(el, e, EINVAL, "needs an attribute `%s`", attribute);
+		return element_needs(el, attribute, e);
 	if (number_list(text, v, 3) != 3)
 		return xml_error(el, e, EINVAL, "%s=\"%.64s\" is not three numbers", attribute, text);
 	for (int i = 0; i < 3; i++) {

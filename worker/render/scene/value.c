@@ -19,7 +19,7 @@
 static int need_value(const struct xml_element *el, const char **text, struct error *e)
 {
 	*text = xml_attribute(el, "value");
-	return *text ? 0 : xml_error(el, e, EINVAL, "needs an attribute `value`");
+	return *text ? 0 : element_needs(el, "value", e);
 }
 
 static int read_bool(const struct xml_element *el, struct value *out, struct error *e)

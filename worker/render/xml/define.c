@@ -86,10 +86,11 @@ int define_without_value(struct define_table *t, const char *name, struct error 
 	return add_missing(t, name, e);
 }
 
+/* Refuses a name that is not defined. length 0: there is none at all, and `name` is what follows the $. */
 static int refuse_unknown(struct define_table *t, const char *name, size_t length, struct error *e)
 {
 	char wanted[65], hint[128];
-	size_t n = length < sizeof wanted - 1 ? length : sizeof wanted - 1;
+	size_t all = length ? length : strlen(name), n = all < sizeof wanted - 1 ? all : sizeof wanted - 1;
 	memcpy(wanted, name, n);
 	wanted[n] = 0;
 	if (t->incomplete || t->missing_count == DEFINE_MISSING_MAX ||
@@ -98,6 +99,11 @@ static int refuse_unknown(struct define_table *t, const char *name, size_t lengt
 	int r = add_missing(t, wanted, e);
 	if (r)
 		return r;
+	if (length == 0)
+		return error_set(
+			e, ENOENT,
+			"in `$%s` no name follows the $: write $name to insert a parameter, \\$ for the character",
+			wanted);
 	struct spelling s = {.wanted = wanted};
 	for (size_t i = 0; i < t->count; i++)
 		spelling_offer(&s, t->entries[i].name);

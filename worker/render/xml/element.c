@@ -74,6 +74,15 @@ static int refuse_attribute(const struct xml_element *el, const char *known, con
 			 spelling_hint(&s, hint, sizeof hint), known);
 }
 
+int element_needs(const struct xml_element *el, const char *attribute, struct error *e)
+{
+	struct spelling s = {.wanted = attribute};
+	for (uint32_t i = 0; i < el->attribute_count; i++)
+		spelling_offer(&s, el->attributes[i].name);
+	return xml_error(el, e, EINVAL, "needs an attribute `%s`%s%s%s", attribute, s.best ? ", but has `" : "",
+			 s.best ? s.best : "", s.best ? "`" : "");
+}
+
 int element_check(const struct xml_element *el, const char *known, bool children, struct error *e)
 {
 	for (uint32_t i = 0; i < el->attribute_count; i++)

@@ -57,6 +57,9 @@ bool element_is_unset(const struct xml_element *el);
 __attribute__((format(printf, 4, 5))) int xml_error(const struct xml_element *el, struct error *e, int errno_value,
 						    const char *format, ...);
 
+/* Refuses an element for lack of an attribute, with the attribute that may be meant for it. */
+int element_needs(const struct xml_element *el, const char *attribute, struct error *e);
+
 /* Refuses attributes that are not in `known` (names separated by '|'), text and, unless `children` is set, child
  * elements. */
 int element_check(const struct xml_element *el, const char *known, bool children, struct error *e);

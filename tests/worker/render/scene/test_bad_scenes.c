@@ -230,6 +230,9 @@ static void test_bad_values(void **state)
 	refuses(BSDF("<float name='alpha' value='1.5'/>"), "alpha=1.5 is outside [0.0001, 1]");
 	refuses(BSDF("<float name='alpha'/>"), "needs an attribute `value`");
 	refuses(BSDF("<float value='1'/>"), "needs an attribute `name`");
+	refuses(BSDF("<float nme='alpha' value='1'/>"), "needs an attribute `name`, but has `nme`");
+	refuses(BSDF("<float name='alpha' value='${1+2}'/>"),
+		"in `${1+2}` no name follows the $: write $name to insert a parameter, \\$ for the character");
 	refuses(BSDF("<float name='alpha' valeu='1'/>"), "has no attribute `valeu`; did you mean `value`?");
 	refuses(BSDF("<float name='alpha' value='$x'/>"), "$x is not defined");
 	refuses(BSDF("<float name='alpha' value='0.1'/><float name='alpha' value='0.2'/>"), "given twice");

@@ -245,8 +245,7 @@ static void test_notes_on_the_whole(void **state)
 	static const struct {
 		const char *xml, *note;
 	} cases[] = {
-		{"<sensor type='perspective'/>",
-		 "s.xml:1: <sensor type=\"perspective\">: the scene has no emitter: the image is black"},
+		{"<sensor type='perspective'/>", "s.xml: the scene has no emitter: the image is black"},
 		{"<sensor type='perspective'><string name='rolling_shutter_type' value='left'/><float name='shutter_close' "
 		 "value='1'/></sensor>",
 		 "s.xml:1: <sensor type=\"perspective\">: lines of the film are exposed one after the other"},

@@ -64,6 +64,32 @@ static void test_files(void **state)
 	scene_fini(&scene);
 }
 
+/* Mistakes in a file are told with its name, and its line if they have one. */
+static void test_bad_files(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *content, *said;
+	} cases[] = {
+		{"400 0.5\n# b\n5oo 1\n", "<spectrum>: lib/c.spd:3: not a line `nm value`, of at most "},
+		{"400 1\n500\n", "<spectrum>: lib/c.spd:2: not a line `nm value`"},
+		{"# none\n", "<spectrum>: lib/c.spd: has no line `nm value`"},
+		{"400 1\n", "<spectrum>: lib/c.spd: one pair nm:value is not a spectrum"},
+		{"400 1\n300 1\n", "<spectrum>: lib/c.spd: wavelengths must be positive and ascend: 300 nm does not"},
+	};
+	static const char xml[] = "<scene version='3.0.0'><bsdf type='roughconductor'>"
+				  "<spectrum name='eta' filename='lib/c.spd'/></bsdf></scene>";
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		const struct memory_file files[] = {
+			{"s.xml", xml, sizeof xml - 1}, {"lib/c.spd", cases[i].content, strlen(cases[i].content)}, {0}};
+		struct asset_source assets = memory_assets(files);
+		struct error e;
+		assert_true(scene_read(&scene, &assets, "s.xml", scene_tables(), NULL, 0, &e) < 0);
+		if (!strstr(e.text, cases[i].said))
+			fail_msg("%s", e.text);
+	}
+}
+
 static void test_three_numbers(void **state)
 {
 	(void)state;
@@ -189,9 +215,10 @@ static void test_booleans(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_files),	 cmocka_unit_test(test_three_numbers), cmocka_unit_test(test_types),
-		cmocka_unit_test(test_textures), cmocka_unit_test(test_references),    cmocka_unit_test(test_blackbody),
-		cmocka_unit_test(test_booleans),
+		cmocka_unit_test(test_files),	      cmocka_unit_test(test_bad_files),
+		cmocka_unit_test(test_three_numbers), cmocka_unit_test(test_types),
+		cmocka_unit_test(test_textures),      cmocka_unit_test(test_references),
+		cmocka_unit_test(test_blackbody),     cmocka_unit_test(test_booleans),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

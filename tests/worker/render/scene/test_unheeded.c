@@ -165,6 +165,9 @@ static void test_known_integrators(void **state)
 	}
 	check("<integrator type='my_direct'/>",
 	      "<integrator type=\"my_direct\">: is not known: the image shows all light, on surfaces and in media");
+	check("<integrator type='pathh'/>",
+	      "<integrator type=\"pathh\">: is not known: the image shows all light, on surfaces and in media; did you mean "
+	      "`path`?");
 	check("<integrator type='stokes'><integrator type='my_direct'/></integrator>",
 	      "<integrator type=\"stokes\">: the `my_direct` inside it is not known: the image shows all light, on "
 	      "surfaces and in media, without its polarization");
