@@ -118,6 +118,9 @@ for from in "$DIR:whole.xml:" "$DIR/parts:../whole.xml:../" "/:$DIR/whole.xml:$D
 	grep -q "^note: ${place#*:}parts/odd.xml:1: " "$DIR/err.log" || fail "$from: $(cat "$DIR/err.log")"
 	grep -aq "parts/odd.xml:1: " "$DIR/whole.exr" && ! grep -aq "[./]parts/odd.xml" "$DIR/whole.exr" || fail "$from: the image has the place here"
 done
+# So does a message about the scene file as a whole.
+(cd / && "$PROGRAMS/hslt-scene" check "$DIR/parts") >"$DIR/out" 2>&1 && fail "a folder is no scene"
+grep -q "$DIR/parts: not a regular file" "$DIR/out" || fail "of a folder it says: $(cat "$DIR/out")"
 
 # A film of more pixels than one render may have.
 cat >"$DIR/wall.xml" <<'XML'

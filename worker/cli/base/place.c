@@ -21,6 +21,9 @@ void place_print(FILE *to, const char *label, const char *scene, const char *tex
 	char path[PATH_MAX];
 	const char *slash = strrchr(scene, '/');
 	int folder = slash ? (int)(slash + 1 - scene) : 0, name = (int)place_length(text);
+	size_t own = slash ? strlen(slash + 1) : 0;
+	if (!name && own && strncmp(text, slash + 1, own) == 0 && text[own] == ':') /* of the scene file as a whole */
+		name = (int)own;
 	int n = folder && name ? snprintf(path, sizeof path, "%.*s%.*s", folder, scene, name, text) : -1;
 	if (n < 0 || (size_t)n >= sizeof path || access(path, F_OK))
 		folder = 0;
