@@ -9,8 +9,9 @@
 
 #include <stdio.h>
 
-/* Prints `label`, the text and a newline. If the text begins with a line of a file in the scene's folder, or with
- * the name of the scene file itself, the folder is printed before it, as it is written in `scene`, the argument of the command line. Any thread. */
+/* Prints `label`, the text and a newline. If the text begins with a line of a file in the scene's folder, or with the
+ * name of the scene file, the folder is printed before it, as it is written in `scene`, the argument of the command
+ * line. Any thread. */
 void place_print(FILE *to, const char *label, const char *scene, const char *text);
 
 #endif

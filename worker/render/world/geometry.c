@@ -279,10 +279,12 @@ static bool has_triangle_near(const struct mesh *m, vec3 p, double limit)
 		vec3 a = mesh_load(m->position[m->index[i][0]]), side[2];
 		for (int k = 0; k < 3; k++)
 			box_grow(&box, mesh_load(m->position[m->index[i][k]]));
+		if (!is_in(&box, p, limit))
+			continue;
 		for (int k = 0; k < 2; k++)
 			side[k] = vec3_sub(mesh_load(m->position[m->index[i][k + 1]]), a);
 		double away = fabs(vec3_dot(vec3_normalize(vec3_cross(side[0], side[1])), vec3_sub(p, a)));
-		if (away > 0 && away < limit && is_in(&box, p, limit))
+		if (away > 0 && away < limit)
 			return true;
 	}
 	return false;

@@ -164,6 +164,7 @@ static void test_too_close(void **state)
 		{WIDE("", "1"), false},
 		{WIDE("<translate z='-1e10'/>", "1e16"), false},
 		{WIDE("<translate x='1.1e16'/>", "1e16"), false},
+		{WIDE("<translate z='5'/>", "1e16"), false}, /* the camera is in its plane */
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		struct world *w =
