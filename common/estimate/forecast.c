@@ -32,6 +32,9 @@ static const double memory = 2,
 		    memory_sd = 0.8;	/* e-folds of work over which a trend decays; the spread of its logarithm */
 static const double drift = 0.08;	/* standard deviation of unforeseen changes of x per e-fold of work */
 static const double price_floor = 0.03; /* least relative spread of the time per sample over time */
+static const double price_other =
+	0.08; /* the same from one render to another: leases of other lengths cost up to 6 % more or less per sample */
+static const double near = 4; /* looks at up to so many times the work that a target takes tell what it takes */
 static const double log_four = 1.3862943611198906;
 
 /* ---- looks */
@@ -106,7 +109,8 @@ struct fit {
 	double seen;			   /* e-folds of work covered by the looks; limits the trend into the past */
 	double now;			   /* deviation of the last look, in units of spread */
 	double margin, margin_sd;	   /* log(upper end / estimate) of looks whose interval is known */
-	double doubt;			   /* probability that a look's error is in doubt */
+	double doubt;			   /* probability that a look's error is in doubt, from the last look on */
+	const struct forecast_history *h;  /* the looks; before the last, the probability is theirs */
 	double cpu, cpu_sd, wall, wall_sd; /* seconds per sample, and their relative spread */
 };
 
@@ -212,7 +216,7 @@ static double seconds_spent(const struct forecast_look *l, bool wall)
 }
 
 /* Computes the seconds per sample, and how much they vary between looks, since machines are shared. */
-static void fit_price(const struct forecast_history *h, bool wall, double *price, double *sd)
+static void fit_price(const struct forecast_history *h, bool wall, double least, double *price, double *sd)
 {
 	const struct forecast_look *end = last_look(h);
 	double square = 0, before = 0, work = 0;
@@ -224,7 +228,7 @@ static void fit_price(const struct forecast_history *h, bool wall, double *price
 		before = seconds_spent(l, wall);
 		work = l->work;
 	}
-	*sd = *price > 0 ? sqrt(square + price_floor * price_floor) : 0;
+	*sd = *price > 0 ? sqrt(square + least * least) : 0;
 }
 
 static struct fit fit(const struct forecast_history *h)
@@ -236,6 +240,7 @@ static struct fit fit(const struct forecast_history *h)
 	double d = fmax(end->degrees, 1);
 	/* Spread and shift of the logarithm of chi-square over its degrees; the spread includes bursts of light. */
 	struct fit f = {.work = end->work,
+			.h = h,
 			.spread = sqrt(2 / d + 2 / (d * d) + burst * burst),
 			.shift = -1 / d - 1 / (3 * d * d)};
 	f.seen = log(end->work / h->looks[first].work);
@@ -243,8 +248,23 @@ static struct fit fit(const struct forecast_history *h)
 	f.now = (log(end->rel_mse * end->work) - f.shift - f.level) / f.spread;
 	fit_margin(&f, h, first);
 	fit_doubt(&f, h, first);
-	fit_price(h, false, &f.cpu, &f.cpu_sd);
-	fit_price(h, true, &f.wall, &f.wall_sd);
+	fit_price(h, false, price_floor, &f.cpu, &f.cpu_sd);
+	fit_price(h, true, price_floor, &f.wall, &f.wall_sd);
+	return f;
+}
+
+/* Fits a new render to a pilot that may have gone far beyond the target: how often its error is in doubt, the margin
+ * and the trend are then taken from the looks around the work at which the pilot reached the target, since these change
+ * as samples find the rare light. Times per sample are taken from all looks. *around: the looks used. */
+static struct fit fit_new(const struct forecast_history *h, double target, struct forecast_history *around)
+{
+	const struct forecast_look *reached = forecast_reached(h, target);
+	*around = *h;
+	while (reached && last_look(around)->work > near * reached->work)
+		around->count--;
+	struct fit f = fit(around);
+	fit_price(h, false, price_other, &f.cpu, &f.cpu_sd);
+	fit_price(h, true, price_other, &f.wall, &f.wall_sd);
 	return f;
 }
 
@@ -293,17 +313,32 @@ static struct scenario scenario_of(const struct fit *f, struct dice *d)
 	return y;
 }
 
-/* Returns whether the current look is in doubt. Of the variance that decides this, half (`rare`) stays the same for a
- * render, and half (`seen`) changes as fast as the deviations of looks. */
-static bool is_in_doubt(const struct fit *f, const struct scenario *y)
+/* Returns the probability that a look after this much work is in doubt: the share of the looks at about that work, and
+ * for no looks the share at the end. */
+static double doubt_at(const struct fit *f, double work)
 {
-	return 0.5 * erfc(0.5 * (y->rare + y->seen)) < f->doubt;
+	double sum = f->doubt, n = 1, at = fmax(work, f->h->looks[0].work);
+	for (uint32_t i = 0; at < f->work && i < f->h->count; i++) {
+		const struct forecast_look *l = &f->h->looks[i];
+		if (l->work < 0.5 * at || l->work > 2 * at)
+			continue;
+		sum += in_doubt(l);
+		n++;
+	}
+	return sum / n;
+}
+
+/* Returns whether the look after this much work is in doubt. Of the variance that decides this, half (`rare`) stays the
+ * same for a render, and half (`seen`) changes as fast as the deviations of looks. */
+static bool is_in_doubt(const struct fit *f, const struct scenario *y, double work)
+{
+	return 0.5 * erfc(0.5 * (y->rare + y->seen)) < doubt_at(f, work);
 }
 
 /* Draws `rare` and `seen` again until the scenario's current look is in doubt exactly if the render's last look is. */
 static void condition_on_doubt(const struct fit *f, struct scenario *y, bool doubt, struct dice *d)
 {
-	for (int i = 0; i < TRIES_MOST && is_in_doubt(f, y) != doubt; i++) {
+	for (int i = 0; i < TRIES_MOST && is_in_doubt(f, y, f->work) != doubt; i++) {
 		y->rare = normal(d);
 		y->seen = normal(d);
 	}
@@ -339,8 +374,8 @@ static double simulate(const struct fit *f, struct scenario *y, const struct pla
 		double estimate = expected_log_mse(f, y, work) + f->shift + f->spread * deviation;
 		if (rare_stop > 0)
 			y->seen = r * y->seen + news * normal(d);
-		if (rare_stop > 0 && is_in_doubt(f, y) ? estimate <= 2 * log(rare_stop)
-						       : estimate + y->margin <= 2 * log(target))
+		if (rare_stop > 0 && is_in_doubt(f, y, work) ? estimate <= 2 * log(rare_stop)
+							     : estimate + y->margin <= 2 * log(target))
 			return (double)rounds;
 		if (rounds >= UINT64_MAX / 4)
 			break;
@@ -404,12 +439,13 @@ bool forecast_target(const struct forecast_history *h, const struct plan *p, dou
 	const struct forecast_look *end = last_look(h);
 	if (!end)
 		return false;
-	struct fit f = fit(h);
+	bool same = run == FORECAST_SAME;
+	struct forecast_history around;
+	struct fit f = same ? fit(h) : fit_new(h, target, &around);
 	struct dice d = {1};
 	struct plays s;
 	double round = (double)plan_round_mutations(p);
-	bool same = run == FORECAST_SAME;
-	double rare_stop = rare_stop_of(h, p, target);
+	double rare_stop = rare_stop_of(same ? h : &around, p, target);
 	for (int i = 0; i < PLAYS; i++) {
 		struct scenario y = scenario_of(&f, &d);
 		if (same)

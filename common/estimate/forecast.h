@@ -14,8 +14,9 @@
  * Then renders are simulated, each with a level, a trend, a time per sample and a deviation at each look, until the
  * upper end of the interval meets the target. If light is rare, that interval is unknown, and a render of samples goes
  * on until a multiple of the estimate meets the target (stated_error_upper); simulated renders are in such doubt as
- * often as the looks, half of which is a lasting property of the render. The results are quantiles of the costs of the
- * simulated renders, and so account for the margin, the schedule of looks and the luck of the stopping rule.
+ * often as the looks at about the same work, half of which is a lasting property of the render. The results are
+ * quantiles of the costs of the simulated renders, and so account for the margin, the schedule of looks and the luck of
+ * the stopping rule.
  */
 #ifndef COMMON_ESTIMATE_FORECAST_H
 #define COMMON_ESTIMATE_FORECAST_H
@@ -75,7 +76,8 @@ bool forecast_error_at(const struct forecast_history *h, double work, struct for
  * rare (stated_error_rare_stop). 0: it is not in doubt now, or made of chains, whose doubt ends. */
 double forecast_stop_in_doubt(const struct forecast_history *h, const struct plan *p, double target);
 /* Stores the cost at which a render with the rounds of plan p, whose bounds are ignored, will reach this target. With
- * FORECAST_SAME, simulated renders are in doubt now if the last look is, and the cost includes that of the looks. */
+ * FORECAST_SAME, simulated renders are in doubt now if the last look is, and the cost includes that of the looks. With
+ * FORECAST_NEW, a pilot that went far beyond the target is judged by its looks around the target. */
 bool forecast_target(const struct forecast_history *h, const struct plan *p, double target, enum forecast_run run,
 		     struct forecast_cost *c);
 /* Stores the cost of halving the error, counted from the last look, in rounds of plan p. */

@@ -269,6 +269,44 @@ static void doubt_is_counted(void **state)
 	}
 }
 
+/* A pilot whose doubt ended long after its error was below the target, but long before the pilot did: a new render
+ * waits for that end. */
+static void doubt_of_the_past_is_counted(void **state)
+{
+	(void)state;
+	struct plan p = {.kind = PLAN_SAMPLES, .groups = 16, .epoch = 1, .crop_width = 10, .crop_height = 10};
+	struct forecast_history h = {0}, clear = {0};
+	for (double work = 1e4; work < 1e8; work *= 1.3) {
+		struct forecast_look l = {work, work, work, 1000 / work, 1050 / work, 3000, 0};
+		forecast_add_look(&clear, &l);
+		l.doubtful = work < 1e6;
+		forecast_add_look(&h, &l);
+	}
+	struct forecast_cost c, sure;
+	assert_true(forecast_target(&h, &p, 0.2, FORECAST_NEW, &c));
+	assert_true(forecast_target(&clear, &p, 0.2, FORECAST_NEW, &sure));
+	printf("in doubt up to 1e6 samples: %.2g (%.2g to %.2g), without doubt %.2g\n", c.work.middle, c.work.low,
+	       c.work.high, sure.work.middle);
+	assert_true(sure.work.high < 5e4 && c.work.middle > 1e5);
+}
+
+/* A pilot whose error fell more slowly once it was far below the target: this says nothing about the target. */
+static void the_far_side_of_the_target_does_not_count(void **state)
+{
+	(void)state;
+	struct plan p = {.kind = PLAN_SAMPLES, .groups = 16, .epoch = 1, .crop_width = 10, .crop_height = 10};
+	struct forecast_history h = {0}, regular = {0};
+	for (double work = 1e4; work < 1e8; work *= 1.3) {
+		double error = 1000 / work, slow = error * sqrt(fmax(1, work / 1e6));
+		forecast_add_look(&regular, &(struct forecast_look){work, work, work, error, 1.05 * error, 3000, 0});
+		forecast_add_look(&h, &(struct forecast_look){work, work, work, slow, 1.05 * slow, 3000, 0});
+	}
+	struct forecast_cost c, sure;
+	assert_true(forecast_target(&h, &p, 0.2, FORECAST_NEW, &c));
+	assert_true(forecast_target(&regular, &p, 0.2, FORECAST_NEW, &sure));
+	assert_true(c.work.low == sure.work.low && c.work.high == sure.work.high);
+}
+
 static void what_is_no_look_is_passed_over(void **state)
 {
 	(void)state;
@@ -321,10 +359,16 @@ static void looks_travel_as_json(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(intervals_hold),	   cmocka_unit_test(own_looks_tell_more),
-		cmocka_unit_test(stops_are_on_the_ladder), cmocka_unit_test(halving_costs_three_times_what_was_paid),
-		cmocka_unit_test(a_trend_is_seen),	   cmocka_unit_test(what_is_no_look_is_passed_over),
-		cmocka_unit_test(looks_travel_as_json),	   cmocka_unit_test(doubt_is_waited_for),
+		cmocka_unit_test(intervals_hold),
+		cmocka_unit_test(own_looks_tell_more),
+		cmocka_unit_test(stops_are_on_the_ladder),
+		cmocka_unit_test(halving_costs_three_times_what_was_paid),
+		cmocka_unit_test(a_trend_is_seen),
+		cmocka_unit_test(what_is_no_look_is_passed_over),
+		cmocka_unit_test(looks_travel_as_json),
+		cmocka_unit_test(doubt_is_waited_for),
+		cmocka_unit_test(doubt_of_the_past_is_counted),
+		cmocka_unit_test(the_far_side_of_the_target_does_not_count),
 		cmocka_unit_test(doubt_is_counted),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

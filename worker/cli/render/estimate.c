@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Prints what a pilot predicts (common/estimate/forecast.h) as a table of errors and their costs, as JSON and as a
- * plot. A row that the pilot cannot predict says so instead of giving a number. Fails if the pilot has too few
- * estimates, or if the plot or stdout cannot be written.
+ * plot. Each row has the plan of a render with that target, whose rounds are as long as the target makes them. A row
+ * that the pilot cannot predict says so instead of giving a number. Fails if the pilot has too few estimates, or if the
+ * plot or stdout cannot be written.
  */
 #include "worker/cli/render/estimate.h"
 
@@ -22,13 +23,21 @@ static const double usual[] = {0.1, 0.05, 0.02, 0.01};
 /* One error, and what the render needs for it. */
 struct row {
 	double target;
+	struct plan plan;		     /* of a render with this target: the length of its rounds depends on it */
 	const struct forecast_look *reached; /* the estimate of the pilot that has reached it; NULL: none */
 	struct forecast_cost cost;	     /* of the render, including its bootstrap */
 };
 
-static double bootstrap_ratio(const struct estimate *s)
+/* The rows of the table. */
+struct rows {
+	struct row row[TARGETS_MOST];
+	size_t count;
+};
+
+/* Returns the ratio of the bootstrap samples of a render to those of the pilot. */
+static double bootstrap_ratio(const struct estimate *s, const struct plan *render)
 {
-	return (double)s->plan->bootstrap / (double)s->pilot->bootstrap;
+	return (double)render->bootstrap / (double)s->pilot->bootstrap;
 }
 
 static void shift_range(struct forecast_range *r, double more)
@@ -38,26 +47,47 @@ static void shift_range(struct forecast_range *r, double more)
 	r->high += more;
 }
 
-static size_t rows_of(const struct estimate *s, struct row row[TARGETS_MOST])
+/* Makes the plan that a render with the row's target gets. */
+static int plan_row(const struct estimate *s, struct row *r, struct error *e)
 {
-	size_t count = 0;
+	struct plan_request request = *s->request;
+	request.target_error = r->target;
+	int rc = plan_make(&request, &r->plan, e);
+	if (rc || !(s->speed > 0) || !plan_wants_speed(&request, &r->plan))
+		return rc;
+	request.speed = s->speed;
+	return plan_make(&request, &r->plan, e);
+}
+
+static int fill_row(const struct estimate *s, struct row *r, struct error *e)
+{
+	int rc = plan_row(s, r, e);
+	if (rc)
+		return rc;
+	double ratio = bootstrap_ratio(s, &r->plan);
+	r->reached = forecast_reached(s->looks, r->target);
+	forecast_target(s->looks, &r->plan, r->target, FORECAST_NEW, &r->cost);
+	shift_range(&r->cost.cpu_seconds, s->bootstrap_cpu * ratio);
+	shift_range(&r->cost.seconds, s->bootstrap_seconds * ratio);
+	return 0;
+}
+
+static int rows_of(const struct estimate *s, struct rows *rows, struct error *e)
+{
 	bool given = s->target > 0;
+	rows->count = 0;
 	for (size_t i = 0; i < sizeof usual / sizeof *usual; i++) {
 		if (given && s->target > usual[i])
-			row[count++].target = s->target;
+			rows->row[rows->count++].target = s->target;
 		given = given && s->target < usual[i];
-		row[count++].target = usual[i];
+		rows->row[rows->count++].target = usual[i];
 	}
 	if (given)
-		row[count++].target = s->target;
-	for (size_t i = 0; i < count; i++) {
-		struct row *r = &row[i];
-		r->reached = forecast_reached(s->looks, r->target);
-		forecast_target(s->looks, s->plan, r->target, FORECAST_NEW, &r->cost);
-		shift_range(&r->cost.cpu_seconds, s->bootstrap_cpu * bootstrap_ratio(s));
-		shift_range(&r->cost.seconds, s->bootstrap_seconds * bootstrap_ratio(s));
-	}
-	return count;
+		rows->row[rows->count++].target = s->target;
+	int rc = 0;
+	for (size_t i = 0; !rc && i < rows->count; i++)
+		rc = fill_row(s, &rows->row[i], e);
+	return rc;
 }
 
 static int check(const struct estimate *s, struct error *e)
@@ -82,10 +112,9 @@ static void print_range(FILE *f, const struct forecast_range *r)
 	fprintf(f, "  %9s  %-20s", middle, between);
 }
 
-static void print_table(const struct estimate *s, FILE *f)
+static void print_table(const struct estimate *s, const struct rows *rows, FILE *f)
 {
-	struct row row[TARGETS_MOST];
-	size_t count = rows_of(s, row);
+	const struct row *row = rows->row;
 	char text[64], cpu[64];
 	struct forecast_range now;
 	forecast_error(s->looks, &now);
@@ -95,12 +124,12 @@ static void print_table(const struct estimate *s, FILE *f)
 		cpu, 100 * now.middle, 100 * now.low, 100 * now.high);
 	fprintf(f, "each with its 90 %% interval; wall-clock time on %s\n", s->where);
 	fprintf(f, "%-8s  %-31s  %-31s\n", "error", "CPU time", "wall clock");
-	for (size_t i = 0; i < count; i++) {
+	for (size_t i = 0; i < rows->count; i++) {
 		snprintf(text, sizeof text, "%.3g %%", 100 * row[i].target);
 		fprintf(f, "%-8s", text);
 		print_range(f, &row[i].cost.cpu_seconds);
 		print_range(f, &row[i].cost.seconds);
-		double doubt = forecast_stop_in_doubt(s->looks, s->plan, row[i].target);
+		double doubt = forecast_stop_in_doubt(s->looks, &row[i].plan, row[i].target);
 		if (doubt > 0)
 			fprintf(f, "  in doubt: stops at %.2g %%", 100 * doubt);
 		if (row[i].reached) {
@@ -121,13 +150,12 @@ static json_t *reached_json(const struct estimate *s, const struct forecast_look
 			 "wallSeconds", l->seconds + s->bootstrap_seconds);
 }
 
-static json_t *targets_json(const struct estimate *s)
+static json_t *targets_json(const struct estimate *s, const struct rows *rows)
 {
-	struct row row[TARGETS_MOST];
-	size_t count = rows_of(s, row);
+	const struct row *row = rows->row;
 	json_t *list = json_array();
-	for (size_t i = 0; i < count; i++) {
-		double doubt = forecast_stop_in_doubt(s->looks, s->plan, row[i].target);
+	for (size_t i = 0; i < rows->count; i++) {
+		double doubt = forecast_stop_in_doubt(s->looks, &row[i].plan, row[i].target);
 		json_array_append_new(list, json_pack("{s:f s:o s:o s:o s:o s:o}", "error", row[i].target, "mutations",
 						      forecast_range_to_json(&row[i].cost.work), "cpuSeconds",
 						      forecast_range_to_json(&row[i].cost.cpu_seconds), "wallSeconds",
@@ -138,7 +166,7 @@ static json_t *targets_json(const struct estimate *s)
 	return list;
 }
 
-static int print_json(const struct estimate *s, FILE *f, struct error *e)
+static int print_json(const struct estimate *s, const struct rows *rows, FILE *f, struct error *e)
 {
 	char plan[PLAN_TEXT];
 	struct forecast_range now;
@@ -149,7 +177,7 @@ static int print_json(const struct estimate *s, FILE *f, struct error *e)
 			  "scene", s->scene, "plan", plan, "where", s->where, "errorNow", forecast_range_to_json(&now),
 			  "pilot", "wallSeconds", s->seconds, "cpuSeconds", s->cpu_seconds, "bootstrapCpuSeconds",
 			  s->bootstrap_cpu, "bootstrapWallSeconds", s->bootstrap_seconds, "looks",
-			  forecast_looks_to_json(s->looks), "targets", targets_json(s));
+			  forecast_looks_to_json(s->looks), "targets", targets_json(s, rows));
 	if (!o)
 		return error_set(e, ENOMEM, "no memory for the estimate");
 	json_dumpf(o, f, JSON_COMPACT);
@@ -189,7 +217,7 @@ static void draw_looks(const struct estimate *s, struct drawing *d)
 static void draw_band(const struct estimate *s, struct drawing *d, double most)
 {
 	const struct forecast_look *l = &s->looks->looks[s->looks->count - 1];
-	double growth = log(fmax(most / l->work, 2)), bootstrap = s->bootstrap_cpu * bootstrap_ratio(s);
+	double growth = log(fmax(most / l->work, 2)), bootstrap = s->bootstrap_cpu * bootstrap_ratio(s, s->plan);
 	for (int i = 0; i < BAND_POINTS; i++) {
 		struct forecast_range r = {0};
 		double work = l->work * exp(growth * i / (BAND_POINTS - 1));
@@ -215,11 +243,11 @@ static void draw_goal(const struct row *r, struct drawing *d, size_t i)
 	}
 }
 
-static int draw(const struct estimate *s, const char *path, struct error *e)
+static int draw(const struct estimate *s, const struct rows *rows, const char *path, struct error *e)
 {
 	static struct drawing d;
-	struct row row[TARGETS_MOST];
-	size_t count = rows_of(s, row), series = 3;
+	const struct row *row = rows->row;
+	size_t series = 3;
 	double most = 0;
 	struct plot_series list[3 + TARGETS_MOST] = {
 		{.name = "expected (90 %)",
@@ -237,7 +265,7 @@ static int draw(const struct estimate *s, const char *path, struct error *e)
 		 .low = d.low,
 		 .high = d.high},
 	};
-	for (size_t i = 0; i < count; i++) {
+	for (size_t i = 0; i < rows->count; i++) {
 		if (!isfinite(row[i].cost.cpu_seconds.high))
 			continue;
 		most = fmax(most, row[i].cost.work.high);
@@ -263,10 +291,13 @@ static int draw(const struct estimate *s, const char *path, struct error *e)
 
 int estimate_report(const struct estimate *s, bool json, const char *plot, struct error *e)
 {
+	struct rows rows;
 	int rc = check(s, e);
+	if (!rc)
+		rc = rows_of(s, &rows, e);
 	if (!rc && json)
-		rc = print_json(s, stdout, e);
+		rc = print_json(s, &rows, stdout, e);
 	else if (!rc)
-		print_table(s, stdout);
-	return !rc && plot ? draw(s, plot, e) : rc;
+		print_table(s, &rows, stdout);
+	return !rc && plot ? draw(s, &rows, plot, e) : rc;
 }

@@ -20,12 +20,14 @@
 
 struct estimate {
 	const char *scene, *where;	      /* name of the file; where it is rendered, as "this machine, 2 threads" */
-	const struct plan *plan;	      /* the plan of the render being predicted */
+	const struct plan_request *request;   /* of the render being predicted; each row sets its own target error */
+	const struct plan *plan;	      /* its plan for its own target error, or the one that pilot.h chose */
 	const struct plan *pilot;	      /* the plan of the pilot */
 	const struct forecast_history *looks; /* the pilot's estimates of its error */
 	double cpu_seconds, seconds;	      /* CPU and wall-clock time of the pilot, its bootstrap included */
 	double bootstrap_cpu, bootstrap_seconds; /* the same for its bootstrap; scaled to the samples of the render's */
 	double target;				 /* an error that is predicted in addition to the usual ones; 0: none */
+	double speed; /* mutations or samples a second of one thread, for plans that depend on it; 0: none does */
 };
 
 /* Prints the table or JSON to stdout, and draws a plot if a path is given. Returns -EAGAIN if the pilot has too few

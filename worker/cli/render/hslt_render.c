@@ -389,6 +389,7 @@ static int report(const struct session *s, const struct local_pilot *p, struct e
 	snprintf(where, sizeof where, "this machine, %u thread%s", s->a->threads, s->a->threads == 1 ? "" : "s");
 	struct estimate m = {.scene = s->name,
 			     .where = where,
+			     .request = p->request,
 			     .plan = &p->render,
 			     .pilot = &p->plan,
 			     .looks = &p->looks,

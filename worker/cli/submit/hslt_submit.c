@@ -202,17 +202,19 @@ static int estimate(const struct arguments *a, struct client *cl, const struct s
 	if (rc)
 		return rc;
 	const struct forecast_history *looks = &p.end.looks;
+	const struct forecast_look *last = looks->count ? &looks->looks[looks->count - 1] : NULL;
 	struct estimate m = {.scene = a->request.name,
 			     .where = "the farm in its current state",
+			     .request = &a->render.plan,
 			     .plan = &p.render,
 			     .pilot = &p.plan,
 			     .looks = looks,
 			     .cpu_seconds = p.end.cpu_seconds,
-			     .seconds = p.end.bootstrap_seconds +
-					(looks->count ? looks->looks[looks->count - 1].seconds : 0),
+			     .seconds = p.end.bootstrap_seconds + (last ? last->seconds : 0),
 			     .bootstrap_cpu = p.end.bootstrap_cpu_seconds,
 			     .bootstrap_seconds = p.end.bootstrap_seconds,
-			     .target = a->render.plan.target_error};
+			     .target = a->render.plan.target_error,
+			     .speed = last && last->cpu_seconds > 0 ? last->work / last->cpu_seconds : 0};
 	return client_local(estimate_report(&m, a->json, a->plot, e));
 }
 
