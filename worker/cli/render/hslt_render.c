@@ -21,6 +21,7 @@
 #include "common/plan/plan_text.h"
 #include "worker/cli/render/choice.h"
 #include "worker/cli/render/estimate.h"
+#include "worker/cli/render/eta.h"
 #include "worker/cli/render/explain.h"
 #include "worker/cli/render/kept_bootstrap.h"
 #include "worker/cli/render/local_pilot.h"
@@ -227,8 +228,9 @@ static void show(void *user, const struct local_progress *p)
 		fraction = fmax(fraction, fmin(p->seconds / s->forecast_seconds, 0.99));
 	if (s->plan.seconds > 0)
 		fraction = fmax(fraction, fraction_of_time(&s->plan, p));
-	progress_time(fraction > 0 ? p->seconds * (1 / fraction - 1) : 0, eta, sizeof eta);
-	snprintf(detail, sizeof detail, "%s%s%s", fraction > 0 ? eta : "", fraction > 0 ? " left" : "", s->forecast);
+	double left = eta_seconds(&s->plan, p, s->forecast_seconds);
+	progress_time(isnan(left) ? 0 : left, eta, sizeof eta);
+	snprintf(detail, sizeof detail, "%s%s%s", isnan(left) ? "" : eta, isnan(left) ? "" : " left", s->forecast);
 	progress_show(&s->progress, progress_kept(&s->progress, fraction, p->state), p->state, detail);
 }
 

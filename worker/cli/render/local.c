@@ -13,6 +13,7 @@
 #include "common/base/crash.h"
 #include "common/base/mem.h"
 
+#include <math.h>
 #include <pthread.h>
 #include <time.h>
 
@@ -78,6 +79,7 @@ static void show(struct thread_pool *c)
 		p.rounds = (double)c->finished / (double)per_round - 1;
 		p.round_seconds = p.seconds - r->bootstrap_seconds;
 	}
+	p.rounds_left = r->plan->rounds == UINT64_MAX ? INFINITY : (double)r->plan->rounds - p.rounds;
 	r->progress(r->user, &p);
 }
 

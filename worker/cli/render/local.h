@@ -16,6 +16,7 @@ struct local_progress {
 	uint64_t done, total;	      /* leases of the whole job; total UINT64_MAX: not known */
 	double seconds;		      /* wall-clock time since the first bootstrap sample */
 	double rounds, round_seconds; /* rounds done, with a fraction, and the time for them; 0: still the bootstrap */
+	double rounds_left; /* rounds up to the plan's bound on them, with a fraction; INFINITY: it has none */
 };
 
 /* The state after a complete round. */
