@@ -146,6 +146,26 @@ double stated_error_upper(const struct canvas_image *img, bool *doubtful)
 	return upper;
 }
 
+void stated_error_rule(double target, bool chains, char *text, size_t size)
+{
+	struct text t = {text, size};
+	double rare = rare_rules[RARE_RULES - 1].factor, single = rare_rules[0].factor;
+	if (size)
+		text[0] = 0;
+	if (!(target > 0))
+		return;
+	text_put(&t, "it stops once the upper end of the error's 90 %% interval is at most %.3g %%; ", 100 * target);
+	if (chains)
+		text_put(&t, "an error in doubt does not stop it");
+	else
+		text_put(
+			&t,
+			"if the error stays in doubt, once the estimate is at most %.3g %% (1/%g, infinite variance) or "
+			"%.3g %% (1/%g, fireflies)",
+			100 * stated_error_rare_stop(target, rare), rare, 100 * stated_error_rare_stop(target, single),
+			single);
+}
+
 double stated_error_rare_factor(double error, double upper)
 {
 	for (size_t i = 0; i < RARE_RULES; i++)

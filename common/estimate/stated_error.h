@@ -41,6 +41,9 @@ void stated_error(const struct canvas_image *img, char *text, size_t size);
 double stated_error_upper(const struct canvas_image *img, bool *doubtful);
 /* Returns whether the image's error meets the target, which ends a render. */
 bool stated_error_meets(const struct canvas_image *img, double target);
+/* Prints the rule by which a render with this target error stops, with its factors: "it stops once the upper end of the
+ * error's 90 % interval is at most 2 %; ...". Empty if the target is 0. chains: the render is made of chains. */
+void stated_error_rule(double target, bool chains, char *text, size_t size);
 /* Returns the factor of the rule for rare light by which stated_error_upper got `upper` from this error; 0 if `upper`
  * is the end of an interval. */
 double stated_error_rare_factor(double error, double upper);

@@ -56,6 +56,11 @@ awk -v n="$samples" -v low="$1" -v high="$3" 'BEGIN { exit !(low > 0 && high < 8
 echo "3 %: $samples samples, predicted $2 ($1 - $3)"
 grep -q '"end": *"target-error"' "$DIR/stats.json" || fail "the statistics do not say what ended it"
 
+# The rule by which a target stops is printed first, with its factors.
+code 0 "$BIN/hslt-render" $how -o "$DIR/a.exr"
+grep -q 'at most 3 %; if the error stays in doubt, once the estimate is at most 1.2 % (1/2.5' "$DIR/err.log" ||
+	fail "the rule is not printed: $(cat "$DIR/err.log")"
+
 # Without --epoch the length of a round depends on the target. Rows that the pilot has passed cost no more than they do.
 free="$BOX --integrator path --size 40x40 --threads 1"
 estimates 2 "$BIN/hslt-render" --estimate $free --seed 11 --quiet --json
@@ -110,6 +115,7 @@ until_true 20 knows || fail "the status does not say what the next halving costs
 code 0 "$BIN/hslt-job" cancel "$id"
 code 4 "$BIN/hslt-submit" "$BOX" -o "$DIR/c.exr" --integrator path --size 40x40 --epoch 2 --spp 64 --target-error 0.5% --wait
 code 0 "$BIN/hslt-submit" "$BOX" -o "$DIR/d.exr" --integrator path --size 40x40 --epoch 2 --target-error 100% --wait
+grep -q 'interval is at most 100 %; if' "$DIR/err.log" || fail "hslt-submit does not print the rule: $(cat "$DIR/err.log")"
 "$BIN/hslt-job" list >"$DIR/jobs"
 grep -q 'ended by mutations' "$DIR/jobs" && grep -q 'target error reached' "$DIR/jobs" || fail "hslt-job list does not say what ended it"
 grep -aq 'hslt:end' "$DIR/c.exr" || fail "the image does not say what ended it"

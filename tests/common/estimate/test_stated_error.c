@@ -534,6 +534,24 @@ static void black_is_divided_by_the_floor(void **state)
 	canvas_image_fini(&img);
 }
 
+static void the_rule_names_its_factors(void **state)
+{
+	(void)state;
+	char text[STATED_ERROR_TEXT];
+	stated_error_rule(0.02, false, text, sizeof text);
+	assert_string_equal(
+		text, "it stops once the upper end of the error's 90 % interval is at most 2 %; if the error stays in "
+		      "doubt, once the estimate is at most 0.8 % (1/2.5, infinite variance) or 0.4 % (1/5, fireflies)");
+	stated_error_rule(0.02, true, text, sizeof text);
+	assert_string_equal(text,
+			    "it stops once the upper end of the error's 90 % interval is at most 2 %; an error in "
+			    "doubt does not stop it");
+	stated_error_rule(0.9, false, text, sizeof text);
+	assert_non_null(strstr(text, "at most 20 %")); /* above it rare light has not been found */
+	stated_error_rule(0, false, text, sizeof text);
+	assert_string_equal(text, "");
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -546,6 +564,7 @@ int main(void)
 		cmocka_unit_test(chains_find_by_independent_samples),
 		cmocka_unit_test(fireflies_are_divided_by_what_others_found),
 		cmocka_unit_test(what_is_said_about_the_error),
+		cmocka_unit_test(the_rule_names_its_factors),
 		cmocka_unit_test(black_is_divided_by_the_floor),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -198,6 +198,9 @@ static int make_plan(struct session *s, struct error *e)
 	plan_describe_changes(p, &s->plan, text, sizeof text);
 	if (*text)
 		fprintf(stderr, "%s\n", text);
+	stated_error_rule(s->plan.target_error, s->plan.kind == PLAN_CHAINS, text, sizeof text);
+	if (*text)
+		fprintf(stderr, "%s\n", text);
 	option_depth_note(s->plan.integrator, s->plan.max_depth, text, sizeof text);
 	if (*text)
 		fprintf(stderr, "hslt-render: note: %s\n", text);

@@ -12,6 +12,7 @@
 #include "common/base/program.h"
 #include "common/base/target.h"
 #include "common/base/text.h"
+#include "common/estimate/stated_error.h"
 #include "worker/cli/base/interrupt.h"
 #include "worker/cli/render/choice.h"
 #include "worker/cli/render/estimate.h"
@@ -168,12 +169,15 @@ static int submit_scene(struct arguments *a, struct client **cl, const struct sc
 {
 	struct submitted job;
 	struct submit_end end = {0};
-	char plan[PLAN_TEXT] = "";
+	char plan[PLAN_TEXT] = "", rule[STATED_ERROR_TEXT];
 	struct reconnect o = {a->coordinator, a->tls, a->insecure, a->patience};
 	int rc = submit_send(*cl, &a->request, files, &job, plan, sizeof plan, e);
 	if (rc)
 		return rc;
 	fprintf(stderr, "%s\n", plan);
+	stated_error_rule(a->render.plan.target_error, a->render.plan.kind == PLAN_CHAINS, rule, sizeof rule);
+	if (*rule)
+		fprintf(stderr, "%s\n", rule);
 	if (a->wait)
 		say_at_the_end(a, job.job);
 	if (!a->wait || !a->json)
