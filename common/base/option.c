@@ -62,18 +62,20 @@ const struct option_row *option_at(const struct program *p, size_t i, const stru
 /* ---- arguments ---- */
 
 /* Sets the error "--NAME takes WHAT RANGE MORE, not 'ARG'", where RANGE is such as "of at least 0 and below 1" or "from
- * 1 to 1024". */
+ * 1 to 1024". A count without an upper bound of its own must still fit into 64 bits. */
 static int out_of_range(const struct option_row *r, const char *what, const char *more, const char *arg,
 			struct error *e)
 {
 	char range[80];
 	if (r->most >= DBL_MAX)
-		text_print(range, sizeof range, "%s %.10g", r->above ? "above" : "of at least", r->least);
+		text_print(range, sizeof range, "%s %.10g%s", r->above ? "above" : "of at least", r->least,
+			   r->kind == OPTION_IS_COUNT ? " and below 2^64" : "");
 	else if (r->above || r->below)
 		text_print(range, sizeof range, "%s %.10g and %s %.10g", r->above ? "above" : "of at least", r->least,
 			   r->below ? "below" : "at most", r->most);
 	else
-		text_print(range, sizeof range, "from %.10g to %.10g", r->least, r->most);
+		text_print(range, sizeof range, r->most >= 1e10 ? "from %.0f to %.0f" : "from %.10g to %.10g", r->least,
+			   r->most);
 	return error_set(e, EINVAL, "--%s takes %s %s%s, not '%s'", r->name, what, range, more, arg);
 }
 

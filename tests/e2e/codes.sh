@@ -94,7 +94,22 @@ for p in render submit; do
 	done
 	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" -i path --groups 1 --target-error 5% # it would never end
 	grep -q 'a single group of samples gives no error' "$DIR/err.log" || fail "hslt-$p --groups 1: $(cat "$DIR/err.log")"
-	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --chains 2M
+	# Zero is no request for the default, and a number above the bound is refused with that bound.
+	for wrong in "min-depth 0" "max-depth 0" "max-depth 129" "chains 0" "chains 2M" "groups 0" "parts 0" "bootstrap 0" "bootstrap 34M" \
+		"epoch 0" "seed 18446744073709551616"; do
+		code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --$wrong
+		case $wrong in
+		*depth*) bounds="from 1 to 128" ;;
+		chains*) bounds="from 1 to 1048576" ;;
+		bootstrap*) bounds="from 1 to 33554432" ;;
+		epoch*) bounds="of at least 1 and below 2^64" ;;
+		seed*) bounds="of at least 0 and below 2^64" ;;
+		*) bounds="from 1 to 64" ;;
+		esac
+		grep -q -F -- "--${wrong% *} takes a whole number $bounds, not '${wrong#* }'" "$DIR/err.log" ||
+			fail "hslt-$p --$wrong: $(cat "$DIR/err.log")"
+	done
+	code 0 "$BIN/hslt-$p" --seed 18446744073709551615 --max-depth 128 --version
 	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" -i path --chains 10
 	grep -q -- '--chains 10: the integrator path has no chains' "$DIR/err.log" || fail "hslt-$p: $(cat "$DIR/err.log")"
 	code 2 "$BIN/hslt-$p" "$BOX" -o ''

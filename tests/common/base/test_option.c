@@ -2,7 +2,9 @@
 /* Reads command lines by a table that has every kind of option, and checks what is printed of the table. */
 #include "common/base/option.h"
 #include "common/base/option_print.h"
+#include "common/base/text.h"
 
+#include <float.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -190,6 +192,31 @@ static void test_bounds(void **state)
 	refused("list -o x --threads +3", "--threads takes a whole number from 1 to 1024, not '+3'");
 }
 
+/* Counts with the largest bounds, which are printed in full. */
+static void test_wide_bounds(void **state)
+{
+	(void)state;
+	static const struct option_row wide_rows[] = {
+		{"seed", 0, "N", "Seed", OPTION_COUNT(struct part, spp, 0, DBL_MAX)},
+		{"work", 0, "N", "Work", OPTION_COUNT(struct part, spp, 1, 1e18)},
+		{0},
+	};
+	static const struct option_group wide_groups[] = {{NULL, wide_rows}, {0}};
+	static const struct program wide = {.name = "hslt-test", .own = {wide_groups, NULL}};
+	static const char *const cases[][3] = {
+		{"--seed", "-1", "--seed takes a whole number of at least 0 and below 2^64, not '-1'"},
+		{"--seed", "18446744073709551616",
+		 "--seed takes a whole number of at least 0 and below 2^64, not '18446744073709551616'"},
+		{"--work", "0", "--work takes a whole number from 1 to 1000000000000000000, not '0'"},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		struct part p = {0};
+		char *argv[] = {text_borrow("hslt-test"), text_borrow(cases[i][0]), text_borrow(cases[i][1]), NULL};
+		assert_int_equal(options_parse(&wide, 3, argv, &p, &asked, &e), -EINVAL);
+		assert_string_equal(e.text, cases[i][2]);
+	}
+}
+
 static void test_defaults_and_environment(void **state)
 {
 	(void)state;
@@ -333,6 +360,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_kinds),
 		cmocka_unit_test(test_bounds),
+		cmocka_unit_test(test_wide_bounds),
 		cmocka_unit_test(test_defaults_and_environment),
 		cmocka_unit_test(test_order_and_forms),
 		cmocka_unit_test(test_mistyped),

@@ -301,9 +301,9 @@ static const struct option_row what_rows[] = {
 	{"crop", 0, "X,Y,W,H", "Render only this part of the film, in pixels", OPTION_TAKE(take_crop)},
 	{"seed", 0, "S", "Seed of all random numbers", OPTION_COUNT(RENDER, plan.seed, 0, DBL_MAX), .standard = "0"},
 	{"min-depth", 0, "K", "Length of the shortest paths, in edges (1: emitters seen directly)",
-	 OPTION_COUNT(RENDER, plan.min_depth, 0, UINT32_MAX)},
+	 OPTION_COUNT(RENDER, plan.min_depth, 1, PLAN_MAX_DEPTH)},
 	{"max-depth", 0, "K", "Length of the longest paths, in edges (the scene's)",
-	 OPTION_COUNT(RENDER, plan.max_depth, 0, UINT32_MAX)},
+	 OPTION_COUNT(RENDER, plan.max_depth, 1, PLAN_MAX_DEPTH)},
 	{"set", 0, "NAME=VALUE",
 	 "Settings that trade accuracy for time, separated by commas; may be repeated; --set help describes them",
 	 OPTION_TAKE(take_set), .more = more_settings},
@@ -339,16 +339,16 @@ static const struct option_row when_rows[] = {
 
 static const struct option_row plan_rows[] = {
 	{"chains", 0, "N", "Markov chains (1024, fewer for short jobs)",
-	 OPTION_COUNT(RENDER, plan.chains, 0, UINT32_MAX)},
+	 OPTION_COUNT(RENDER, plan.chains, 1, PLAN_MAX_CHAINS)},
 	{"groups", 0, "N", "Independent replicates; their spread gives the error (16)",
-	 OPTION_COUNT(RENDER, plan.groups, 0, UINT32_MAX)},
+	 OPTION_COUNT(RENDER, plan.groups, 1, PLAN_MAX_GROUPS)},
 	{"parts", 0, "N", "Leases of a group in a round: at most groups times parts threads work on the job (4)",
-	 OPTION_COUNT(RENDER, plan.parts, 0, UINT32_MAX)},
+	 OPTION_COUNT(RENDER, plan.parts, 1, PLAN_MAX_PARTS)},
 	{"bootstrap", 0, "N", "Bootstrap samples (1000000, fewer for short jobs)",
-	 OPTION_COUNT(RENDER, plan.bootstrap, 0, DBL_MAX)},
+	 OPTION_COUNT(RENDER, plan.bootstrap, 1, PLAN_MAX_BOOTSTRAP / 2)},
 	{"epoch", 0, "N",
 	 "Mutations per chain, or samples per pixel and group, in a round (on a farm: leases of at most 20 s)",
-	 OPTION_COUNT(RENDER, plan.epoch, 0, DBL_MAX)},
+	 OPTION_COUNT(RENDER, plan.epoch, 1, DBL_MAX)},
 	{0},
 };
 
