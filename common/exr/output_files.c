@@ -57,15 +57,15 @@ static bool is_statistics(const char *begin)
 }
 
 static const struct {
-	const char *noun;
+	const char *noun, *extension;
 	bool (*is)(const char *begin); /* BEGINNING bytes, zeros after the end of the file, and a final zero */
 } formats[] = {
-	[OUTPUT_EXR] = {"an OpenEXR file", is_exr},
-	[OUTPUT_PNG] = {"a PNG file", is_png},
-	[OUTPUT_SVG] = {"an SVG file", is_svg},
-	[OUTPUT_HTML] = {"an HTML file", is_html},
-	[OUTPUT_CSV] = {"a table of hslt-accuracy", is_csv},
-	[OUTPUT_JSON] = {"a file of statistics", is_statistics},
+	[OUTPUT_EXR] = {"an OpenEXR file", ".exr", is_exr},
+	[OUTPUT_PNG] = {"a PNG file", ".png", is_png},
+	[OUTPUT_SVG] = {"an SVG file", ".svg", is_svg},
+	[OUTPUT_HTML] = {"an HTML file", ".html", is_html},
+	[OUTPUT_CSV] = {"a table of hslt-accuracy", ".csv", is_csv},
+	[OUTPUT_JSON] = {"a file of statistics", ".json", is_statistics},
 };
 
 /* Identifies a file: by device and inode if it exists, otherwise by its path without links. */
@@ -156,13 +156,20 @@ static int check_name(const struct output_file *f, struct error *e)
 {
 	if (f->format == OUTPUT_SVG)
 		return check_plot(f->option, f->path, e);
-	const char *promised = picture_name_format(f->path), *own = f->format == OUTPUT_EXR   ? ".exr"
-								    : f->format == OUTPUT_PNG ? ".png"
-											      : NULL;
-	if (!promised || (own && strcmp(promised, own) == 0))
+	const char *promised = picture_name_format(f->path), *own = formats[f->format].extension;
+	if (!promised || strcmp(promised, own) == 0)
 		return 0;
-	return error_set(e, EINVAL, "%s %s: %s is written, which the name does not say%s", f->option, f->path,
-			 formats[f->format].noun, f->format == OUTPUT_EXR ? "; hslt-tonemap converts one to PNG" : "");
+	return error_set(e, EINVAL, "%s %s: %s is written, so the name should end in %s%s", f->option, f->path,
+			 formats[f->format].noun, own,
+			 f->format == OUTPUT_EXR ? "; hslt-tonemap converts it to PNG" : "");
+}
+
+int output_files_check_names(const struct output_files *o, struct error *e)
+{
+	int rc = 0;
+	for (size_t i = 0; !rc && i < OUTPUT_FILES_MOST; i++)
+		rc = o->files[i].path ? check_name(&o->files[i], e) : 0;
+	return rc;
 }
 
 /* Refuses an existing file of another format. A file that cannot be read passes: its format is not known. */

@@ -32,6 +32,10 @@ struct output_files {
  * file cannot be created. */
 int output_files_check(const struct output_files *o, const char *const *inputs, size_t input_count, struct error *e);
 
+/* Checks the names alone, for the check of a program's options: -EINVAL if an extension stands for another picture
+ * format, or if a plot's is not known. */
+int output_files_check_names(const struct output_files *o, struct error *e);
+
 /* Checks that a file that is read later, while the command runs, is none of the outputs: 0 or -EINVAL. */
 int output_files_check_read(const struct output_files *o, uint64_t device, uint64_t inode, const char *name,
 			    struct error *e);

@@ -11,6 +11,7 @@
 #include "coordinator/ctl/job_options.h"
 
 #include "common/base/program.h"
+#include "common/exr/output_files.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -126,7 +127,8 @@ static int check(void *target, struct error *e)
 		return error_set(e, EINVAL, "--json is only for list and workers");
 	if (o->verb != JOB_LIST && o->state)
 		return error_set(e, EINVAL, "--state is only for list");
-	return 0;
+	const struct output_files outputs = {{{"-o", o->output, OUTPUT_EXR}}};
+	return output_files_check_names(&outputs, e);
 }
 
 static const struct program program = {

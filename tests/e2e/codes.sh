@@ -63,11 +63,17 @@ code 1 "$BIN/hslt-render" "$BOX" -o "$DIR/no/such/folder.exr" # refused before r
 code 1 "$BIN/hslt-submit" "$BOX" -o "$DIR/no/such/folder.exr" --wait
 code 1 "$BIN/hslt-submit" "$DIR/none.xml" -o "$DIR/a.exr"
 code 2 "$BIN/hslt-submit" "$BOX" -o "$DIR/a.exr" --crop 0,0,0,0,0
-code 1 "$BIN/hslt-assemble" -o "$DIR/a.png" "$DIR/a.exr"
+code 2 "$BIN/hslt-assemble" -o "$DIR/a.png" "$DIR/a.exr"
 grep -q "hslt-tonemap" "$DIR/err.log" || fail "hslt-assemble -o a.png says: $(cat "$DIR/err.log")"
-code 1 "$BIN/hslt-job" --coordinator "$COORDINATOR" fetch j1 -o "$DIR/a.png"
+code 2 "$BIN/hslt-job" --coordinator "$COORDINATOR" fetch j1 -o "$DIR/a.png"
 grep -q "hslt-tonemap" "$DIR/err.log" || fail "hslt-job fetch -o a.png says: $(cat "$DIR/err.log")"
+code 2 "$BIN/hslt-accuracy" "$BOX" -o "$DIR/a.png"
+code 2 "$BIN/hslt-compare" "$DIR/a.exr" "$DIR/b.exr" --heatmap "$DIR/h.exr"
+grep -q 'a PNG file is written, so the name should end in .png$' "$DIR/err.log" || fail "hslt-compare --heatmap h.exr says: $(cat "$DIR/err.log")"
+code 2 "$BIN/hslt-tonemap" "$DIR/a.exr" "$DIR/a.jpg"
+code 2 "$BIN/hslt-render" "$BOX" -o "$DIR/a.exr" --stats "$DIR/s.png"
 for p in render submit; do
+	code 2 "$BIN/hslt-$p" "$BOX" --estimate --plot "$DIR/cost.jpg"
 	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.png"
 	grep -q "hslt-tonemap" "$DIR/err.log" || fail "hslt-$p -o a.png says: $(cat "$DIR/err.log")"
 	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" -i hsl

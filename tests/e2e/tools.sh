@@ -51,7 +51,7 @@ code 0 "$BIN/hslt-tonemap" a.exr a.png --exposure -1
 code 2 "$BIN/hslt-tonemap" a.exr a.png --exposure bright
 code 2 "$BIN/hslt-tonemap" a.exr a.JPG && [ ! -e a.JPG ] || fail "a PNG has the name of another format"
 code 2 "$BIN/hslt-tonemap" a.exr a.svg && [ ! -e a.svg ] || fail "a PNG has the name of an SVG"
-grep -q 'writes PNG only' err.log || fail "a.JPG: $(cat err.log)"
+grep -q 'a PNG file is written, so the name should end in .png' err.log || fail "a.JPG: $(cat err.log)"
 # - means stdin or stdout, everywhere
 code 0 "$BIN/hslt-tonemap" a.exr dash.png
 "$BIN/hslt-tonemap" - - <a.exr 2>err.log | cmp - dash.png || fail "tonemap - -: $(cat err.log)"
@@ -112,19 +112,20 @@ kept() {
 }
 ln -s scene.xml link.xml
 ln -s a.exr link.png
+ln -s again.exr again.png
 kept scene.xml 'which is an input' "$BIN/hslt-render" scene.xml -o scene.xml
 kept scene.xml 'which is an input' "$BIN/hslt-render" link.xml -o link.xml
 kept scene.xml 'scene.xml exists and is not an OpenEXR file' "$BIN/hslt-render" box.xml -o scene.xml
 kept scene.xml 'not a file of statistics' "$BIN/hslt-render" box.xml -o new.exr --stats scene.xml
-kept scene.xml 'are the same file' "$BIN/hslt-render" scene.xml -o new.exr --stats ./new.exr
-kept a.exr 'which is an input' "$BIN/hslt-compare" a.exr other.exr --heatmap a.exr
-kept again.exr 'not a PNG file' "$BIN/hslt-compare" a.exr other.exr --heatmap again.exr
+kept scene.xml 'are the same file' "$BIN/hslt-render" scene.xml -o new --stats ./new
+kept a.exr 'which is an input' "$BIN/hslt-compare" a.exr other.exr --heatmap link.png
+kept again.exr 'not a PNG file' "$BIN/hslt-compare" a.exr other.exr --heatmap again.png
 kept a.exr 'which is an input' "$BIN/hslt-assemble" a.exr -o ./a.exr
 kept scene.xml 'not an OpenEXR file' "$BIN/hslt-assemble" a.exr -o scene.xml
 kept link.png "which is an input" "$BIN/hslt-tonemap" a.exr link.png
 kept scene.xml 'not a PNG file' "$BIN/hslt-tonemap" a.exr scene.xml
 kept scene.xml 'not an HTML file' "$BIN/hslt-accuracy" box.xml -o scene.xml
-kept scene.xml 'are the same file' "$BIN/hslt-accuracy" scene.xml -o r.html --csv r.html
+kept scene.xml 'are the same file' "$BIN/hslt-accuracy" scene.xml -o r --csv r
 kept scene.xml 'which is an input' "$BIN/hslt-submit" -c 127.0.0.1:1 scene.xml -o scene.xml --wait
 # a file that the scene names counts as an input, too
 cp other.exr sky.exr

@@ -168,9 +168,9 @@ static void test_formats(void **state)
 		refuses(&(struct output_files){{{"--plot", plots[i][0], output_format_of_plot(plots[i][0])}}}, NULL,
 			plots[i][1]);
 	refuses(&(struct output_files){{{"-o", "report.PNG", OUTPUT_HTML}}}, NULL,
-		"-o report.PNG: an HTML file is written, which the name does not say");
+		"-o report.PNG: an HTML file is written, so the name should end in .html");
 	refuses(&(struct output_files){{{"--stats", "room.exr", OUTPUT_JSON}}}, NULL,
-		"a file of statistics is written, which the name does not say");
+		"a file of statistics is written, so the name should end in .json");
 	refuses(&(struct output_files){{{"-o", "/dev/stdout", OUTPUT_EXR}, {"--stats", "/dev/stdout", OUTPUT_JSON}}},
 		NULL, "are the same file, stdout");
 }
@@ -179,9 +179,11 @@ static void test_formats(void **state)
 static void test_names(void **state)
 {
 	(void)state;
-	refuses(&(struct output_files){{{"-o", "x.png", OUTPUT_EXR}}}, NULL, "an OpenEXR file is written");
+	refuses(&(struct output_files){{{"-o", "x.png", OUTPUT_EXR}}}, NULL,
+		"an OpenEXR file is written, so the name should end in .exr");
 	refuses(&(struct output_files){{{"-o", "x.JPG", OUTPUT_EXR}}}, NULL, "hslt-tonemap");
-	refuses(&(struct output_files){{{"OUT", "x.svg", OUTPUT_PNG}}}, NULL, "a PNG file is written");
+	refuses(&(struct output_files){{{"OUT", "x.svg", OUTPUT_PNG}}}, NULL,
+		"OUT x.svg: a PNG file is written, so the name should end in .png");
 	refuses(&(struct output_files){{{"--heatmap", "x.exr", OUTPUT_PNG}}}, NULL, "a PNG file is written");
 	accepts(&(struct output_files){{{"-o", "x.EXR", OUTPUT_EXR}, {"--heatmap", "x.PNG", OUTPUT_PNG}}}, NULL);
 	accepts(&(struct output_files){{{"-o", "x.2", OUTPUT_EXR}, {"--plot", "x.svg", OUTPUT_SVG}}}, NULL);

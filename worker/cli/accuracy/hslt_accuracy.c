@@ -52,6 +52,11 @@ static const struct option_row rows[] = {
 	{0},
 };
 
+static struct output_files outputs_of(const struct arguments *a)
+{
+	return (struct output_files){{{"-o", a->render.output, OUTPUT_HTML}, {"--csv", a->csv, OUTPUT_CSV}}};
+}
+
 static int check(void *target, struct error *e)
 {
 	const struct arguments *a = target;
@@ -60,7 +65,8 @@ static int check(void *target, struct error *e)
 	if (plan_request_is_bounded(&a->render.plan))
 		return error_set(e, EINVAL,
 				 "use --budget or --seconds instead of --spp, --mutations N, --time or --target-error");
-	return 0;
+	struct output_files outputs = outputs_of(a);
+	return output_files_check_names(&outputs, e);
 }
 
 static const struct program program = {
@@ -216,8 +222,7 @@ static void print_summary(const struct session *s)
 static int run_session(struct session *s, struct error *e)
 {
 	const char *inputs[] = {s->a->render.scene, s->a->reference};
-	s->outputs =
-		(struct output_files){{{"-o", s->a->render.output, OUTPUT_HTML}, {"--csv", s->a->csv, OUTPUT_CSV}}};
+	s->outputs = outputs_of(s->a);
 	int rc = output_files_check(&s->outputs, inputs, 2, e);
 	if (!rc && s->a->reference)
 		rc = picture_read(&s->reference, s->a->reference, e);

@@ -45,9 +45,10 @@ int option_image(void *target, char *arg, struct error *e)
 	((struct render_arguments *)target)->output = target_of(arg);
 	if (!format || strcmp(format, ".exr") == 0)
 		return 0;
-	return error_set(e, EINVAL,
-			 "images are written as OpenEXR, which '%s' does not say; hslt-tonemap converts one to PNG",
-			 arg);
+	return error_set(
+		e, EINVAL,
+		"-o %s: an OpenEXR file is written, so the name should end in .exr; hslt-tonemap converts it to PNG",
+		arg);
 }
 
 int option_path(void *target, char *arg, struct error *e)

@@ -29,10 +29,18 @@ static int take_word(void *target, size_t index, char *word, struct error *e)
 	return 0;
 }
 
+static struct output_files outputs_of(const struct arguments *a)
+{
+	return (struct output_files){{{"-o", a->out, OUTPUT_EXR}}};
+}
+
 static int check(void *target, struct error *e)
 {
 	const struct arguments *a = target;
-	return a->count && a->out ? 0 : error_set(e, EINVAL, "crops and -o FILE are needed");
+	struct output_files outputs = outputs_of(a);
+	if (!a->count || !a->out)
+		return error_set(e, EINVAL, "crops and -o FILE are needed");
+	return output_files_check_names(&outputs, e);
 }
 
 static const struct program program = {
@@ -58,7 +66,7 @@ int main(int argc, char **argv)
 	size_t size;
 	bool disagree = false;
 	program_options(&program, argc, argv, &a);
-	struct output_files outputs = {{{"-o", a.out, OUTPUT_EXR}}};
+	struct output_files outputs = outputs_of(&a);
 	int rc = output_files_check(&outputs, a.crops, a.count, &e);
 	if (!rc)
 		rc = assemble(a.crops, a.count, &bytes, &size, &disagree, &e);

@@ -63,6 +63,11 @@ static int take_word(void *target, size_t index, char *word, struct error *e)
 	return a->dashes < 2 ? 0 : error_set(e, EINVAL, "only one image can come from stdin");
 }
 
+static struct output_files outputs_of(const struct arguments *a)
+{
+	return (struct output_files){{{"--heatmap", a->heatmap, OUTPUT_PNG}}};
+}
+
 static int check(void *target, struct error *e)
 {
 	const struct arguments *a = target;
@@ -72,7 +77,8 @@ static int check(void *target, struct error *e)
 		return error_set(e, EINVAL, "--heatmap takes the name of a file: the figures go to stdout");
 	if (a->exact && (a->trim > 0 || a->width || a->heatmap || a->most >= 0))
 		return error_set(e, EINVAL, "--exact can only be combined with --json");
-	return 0;
+	struct output_files outputs = outputs_of(a);
+	return output_files_check_names(&outputs, e);
 }
 
 static const struct program program = {
@@ -198,7 +204,7 @@ int main(int argc, char **argv)
 	struct error e;
 	int code = 0;
 	program_options(&program, argc, argv, &a);
-	struct output_files outputs = {{{"--heatmap", a.heatmap, OUTPUT_PNG}}};
+	struct output_files outputs = outputs_of(&a);
 	int rc = output_files_check(&outputs, a.path, 2, &e);
 	if (rc == 0)
 		rc = picture_read(&p[0], a.path[0], &e);

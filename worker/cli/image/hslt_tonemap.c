@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/base/mem.h"
-#include "common/base/picture_name.h"
 #include "common/base/program.h"
 #include "common/base/target.h"
 #include "common/exr/output_files.h"
@@ -34,15 +33,18 @@ static int take_word(void *target, size_t index, char *word, struct error *e)
 	return 0;
 }
 
+static struct output_files outputs_of(const struct arguments *a)
+{
+	return (struct output_files){{{"the output", a->out, OUTPUT_PNG}}};
+}
+
 static int check(void *target, struct error *e)
 {
 	const struct arguments *a = target;
-	const char *format = a->out ? picture_name_format(a->out) : NULL;
+	struct output_files outputs = outputs_of(a);
 	if (!a->out)
 		return error_set(e, EINVAL, "IN.exr and OUT.png are needed");
-	if (!format || strcmp(format, ".png") == 0)
-		return 0;
-	return error_set(e, EINVAL, "writes PNG only, not '%s': name the output *.png", a->out);
+	return output_files_check_names(&outputs, e);
 }
 
 static const struct program program = {
@@ -62,7 +64,7 @@ static const struct program program = {
 static int tonemap_file(const struct arguments *a, struct error *e)
 {
 	struct picture p;
-	struct output_files outputs = {{{"the output", a->out, OUTPUT_PNG}}};
+	struct output_files outputs = outputs_of(a);
 	int rc = output_files_check(&outputs, &a->in, 1, e);
 	if (!rc)
 		rc = picture_read(&p, a->in, e);

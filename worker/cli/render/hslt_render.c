@@ -61,6 +61,15 @@ static const struct option_row rows[] = {
 	{0},
 };
 
+static struct output_files outputs_of(const struct arguments *a)
+{
+	return (struct output_files){{
+		{"-o", a->render.output, OUTPUT_EXR},
+		{"--stats", a->stats, OUTPUT_JSON},
+		{"--plot", a->plot, output_format_of_plot(a->plot ? a->plot : "")},
+	}};
+}
+
 static int check(void *target, struct error *e)
 {
 	const struct arguments *a = target;
@@ -75,7 +84,8 @@ static int check(void *target, struct error *e)
 		return error_set(e, EINVAL, "--pilot and --plot require --estimate");
 	if (a->json && !a->estimate && !a->explain)
 		return error_set(e, EINVAL, "--json requires --estimate or --explain");
-	return 0;
+	struct output_files outputs = outputs_of(a);
+	return output_files_check_names(&outputs, e);
 }
 
 static const struct program program = {
@@ -438,13 +448,8 @@ static int estimate(struct session *s, struct error *e)
 
 static int check_outputs(struct session *s, struct error *e)
 {
-	const struct arguments *a = s->a;
-	s->outputs = (struct output_files){{
-		{"-o", a->render.output, OUTPUT_EXR},
-		{"--stats", a->stats, OUTPUT_JSON},
-		{"--plot", a->plot, output_format_of_plot(a->plot ? a->plot : "")},
-	}};
-	return output_files_check(&s->outputs, &a->render.scene, 1, e);
+	s->outputs = outputs_of(s->a);
+	return output_files_check(&s->outputs, &s->a->render.scene, 1, e);
 }
 
 static int run_session(struct session *s, struct error *e)

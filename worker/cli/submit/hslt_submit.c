@@ -80,6 +80,12 @@ static const struct option_row rows[] = {
 	{0},
 };
 
+static struct output_files outputs_of(const struct arguments *a)
+{
+	return (struct output_files){{{"-o", a->wait ? a->render.output : NULL, OUTPUT_EXR},
+				      {"--plot", a->plot, output_format_of_plot(a->plot ? a->plot : "")}}};
+}
+
 static int check(void *target, struct error *e)
 {
 	const struct arguments *a = target;
@@ -93,7 +99,8 @@ static int check(void *target, struct error *e)
 		return error_set(e, EINVAL, "--pilot and --plot require --estimate");
 	if (to_stdout(a) && (!a->wait || a->json))
 		return error_set(e, EINVAL, "-o - writes the image to stdout: it requires --wait and excludes --json");
-	return 0;
+	struct output_files outputs = outputs_of(a);
+	return output_files_check_names(&outputs, e);
 }
 
 static const struct program program = {
@@ -277,8 +284,7 @@ int main(int argc, char **argv)
 	a.request.args = &a.render;
 	crash_exit("hslt-submit");
 	program_options(&program, argc, argv, &a);
-	struct output_files outputs = {{{"-o", a.wait ? a.render.output : NULL, OUTPUT_EXR},
-					{"--plot", a.plot, output_format_of_plot(a.plot ? a.plot : "")}}};
+	struct output_files outputs = outputs_of(&a);
 	int rc = output_files_check(&outputs, &a.render.scene, 1, &e);
 	if (!rc)
 		rc = scene_files_read(&files, a.render.scene, &a.render, &outputs, &e);
