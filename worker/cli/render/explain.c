@@ -27,14 +27,14 @@ static void print_lines(const char *name, const struct render_summary *m, const 
 			const struct choice *c)
 {
 	char note[512];
-	printf("%s: %llu shapes, %llu triangles\n\n", name, (unsigned long long)m->shapes,
-	       (unsigned long long)m->triangles);
+	printf("%s: %llu shape%s, %llu triangle%s\n\n", name, (unsigned long long)m->shapes, m->shapes == 1 ? "" : "s",
+	       (unsigned long long)m->triangles, m->triangles == 1 ? "" : "s");
 	for (size_t i = 0; i < m->line_count; i++) {
 		const struct effect_line *l = &m->lines[i];
 		printf("%-13s %-12s  %s\n%27s %s: %s\n", l->name, state_of(l), l->why, "",
 		       l->on ? "omitting it would save" : "saves", l->saves);
 	}
-	printf("\n%s, paths of at most %u edges", p->integrator, p->max_depth);
+	printf("\n%s, paths of at most %u edge%s", p->integrator, p->max_depth, p->max_depth == 1 ? "" : "s");
 	if (held_depth(p) < p->max_depth)
 		printf(" requested, at most %u simulated (longer ones are missing in the image; its note says how much)",
 		       held_depth(p));

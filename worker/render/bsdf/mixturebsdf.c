@@ -10,7 +10,8 @@ static int read_weights(struct blend *m, const struct scene_node *n, struct erro
 	const char *text = node_string(n, "weights", "");
 	double sum = 0;
 	if (number_weights(text, m->fixed, BLEND_PARTS_MAX) != (int)m->count)
-		return node_error(n, e, EINVAL, "weights=\"%s\": needs %u weights, one for each BSDF", text, m->count);
+		return node_error(n, e, EINVAL, "weights=\"%s\": needs %u weight%s, one for each BSDF", text, m->count,
+				  m->count == 1 ? "" : "s");
 	for (uint32_t k = 0; k < m->count; k++) {
 		if (!(m->fixed[k] >= 0 && m->fixed[k] <= 1e6))
 			return node_error(n, e, ERANGE, "weights=\"%s\": must be within [0, 1e6]", text);

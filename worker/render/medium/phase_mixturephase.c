@@ -19,8 +19,8 @@ static int create(struct phase *p, const struct scene_node *n, const struct volu
 	const char *text = node_string(n, "weights", "");
 	double sum = 0;
 	if (number_weights(text, m->weight, PHASE_PARTS_MAX) != (int)m->count)
-		return node_error(n, e, EINVAL, "weights=\"%s\": needs %u weights, one for each phase function", text,
-				  m->count);
+		return node_error(n, e, EINVAL, "weights=\"%s\": needs %u weight%s, one for each phase function", text,
+				  m->count, m->count == 1 ? "" : "s");
 	for (uint32_t k = 0; k < m->count; k++) {
 		if (!(m->weight[k] >= 0 && m->weight[k] <= 1e6))
 			return node_error(n, e, ERANGE, "weights=\"%s\": must be within [0, 1e6]", text);

@@ -165,8 +165,8 @@ static int build_mesh(const struct scene_node *n, const struct obj_file *o, cons
 	const char *name = node_string(n, "filename", "");
 	size_t index = (size_t)node_int(n, "shape_index", 0);
 	if (index >= o->meshes.count)
-		return node_error(n, e, ERANGE, "%s: shape_index=%zu, but it holds %zu mesh%s, counted from 0", name,
-				  index, o->meshes.count, o->meshes.count == 1 ? "" : "es");
+		return node_error(n, e, ERANGE, "%s: shape_index=%zu, but the file has %zu mesh%s, counted from 0",
+				  name, index, o->meshes.count, o->meshes.count == 1 ? "" : "es");
 	if (material && !is_of(o, ((const struct obj_mesh *)o->meshes.items)[index].run, material))
 		return node_error(n, e, EINVAL, "%s: mesh %zu has no faces of the material `%.64s`", name, index,
 				  material);

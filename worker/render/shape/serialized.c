@@ -341,8 +341,8 @@ static int find_mesh(const struct stream *s, const struct asset *a, uint64_t ind
 		return file_error(s, "the table of meshes at its end is damaged");
 	if (index >= count)
 		return node_error(s->node, s->error, ERANGE,
-				  "%s: shape_index=%llu, but it holds %llu meshes, counted from 0", s->name,
-				  (unsigned long long)index, (unsigned long long)count);
+				  "%s: shape_index=%llu, but the file has %llu mesh%s, counted from 0", s->name,
+				  (unsigned long long)index, (unsigned long long)count, count == 1 ? "" : "es");
 	size_t table = a->size - 4 - (size_t)count * (size_t)width;
 	uint64_t from = get_bytes(a->bytes + table + index * (size_t)width, width);
 	uint64_t to = index + 1 < count ? get_bytes(a->bytes + table + (index + 1) * (size_t)width, width) : table;

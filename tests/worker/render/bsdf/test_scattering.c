@@ -437,7 +437,7 @@ static void test_refusals_say_why(void **state)
 		{"roughcoating alpha_u=0.1 alpha_v=0.2 | diffuse", "isotropic"},
 		{"coating sigma_a=-1 | diffuse", "must be within [0, 1e+09]"},
 		{"mixturebsdf weights=1", "needs BSDFs"},
-		{"mixturebsdf | diffuse", "needs 1 weights"},
+		{"mixturebsdf | diffuse", "needs 1 weight,"},
 		{"mixturebsdf weights=0.5 | diffuse | phong", "needs 2 weights"},
 		{"mixturebsdf weights=0.5,-1 | diffuse | phong", "within"},
 		{"mixturebsdf weights=0.5,nan | diffuse | phong", "2 weights"},

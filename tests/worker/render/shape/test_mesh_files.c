@@ -320,7 +320,10 @@ static void test_bad_serialized(void **state)
 	refuses("serialized", "", "", 0, "m: this is not a serialized mesh");
 	refuses("serialized", "", "plyplyply", 9, "this is not a serialized mesh");
 	refuses("serialized", "<integer name='shape_index' value='2'/>", f.bytes, f.size,
-		"m: shape_index=2, but it holds 2 meshes, counted from 0");
+		"m: shape_index=2, but the file has 2 meshes, counted from 0");
+	mesh_file_serialized(&g, 4, 0, 3, 1);
+	refuses("serialized", "<integer name='shape_index' value='7'/>", g.bytes, g.size,
+		"m: shape_index=7, but the file has 1 mesh, counted from 0");
 	g = f;
 	g.bytes[2] = 9;
 	refuses("serialized", "", g.bytes, g.size, "m: version 9 is not supported (supported: 3, 4, 5)");
@@ -373,13 +376,14 @@ static void test_obj_meshes(void **state)
 	assert_obj_mesh("<string name='material' value='a'/>", -1, 6);
 	assert_obj_mesh("<integer name='shape_index' value='2'/><string name='material' value='a'/>", 2, 1);
 	refuses("obj", "<integer name='shape_index' value='4'/>", obj_meshes, sizeof obj_meshes - 1,
-		"m: shape_index=4, but it holds 4 meshes, counted from 0");
+		"m: shape_index=4, but the file has 4 meshes, counted from 0");
 	refuses("obj", "<integer name='shape_index' value='3'/><string name='material' value='a'/>", obj_meshes,
 		sizeof obj_meshes - 1, "m: mesh 3 has no faces of the material `a`");
 	static const char one[] = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 	refuses("obj", "<integer name='shape_index' value='1'/>", one, sizeof one - 1,
-		"m: shape_index=1, but it holds 1 mesh, counted from 0");
-	refuses("obj", "<integer name='shape_index' value='0'/>", one, 24, "m: shape_index=0, but it holds 0 meshes");
+		"m: shape_index=1, but the file has 1 mesh, counted from 0");
+	refuses("obj", "<integer name='shape_index' value='0'/>", one, 24,
+		"m: shape_index=0, but the file has 0 meshes");
 }
 
 /* Returns whether a file gives a mesh, whose indices must be in range, rather than an error. */
