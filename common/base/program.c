@@ -19,8 +19,7 @@ static void check_output(int code, void *user)
 	errno = 0;
 	if (fflush(stdout) == 0 && !ferror(stdout))
 		return;
-	fprintf(stderr, "%s: stdout: %s\n", program_invocation_short_name,
-		errno ? strerror(errno) : "it could not take everything");
+	fprintf(stderr, "%s: stdout: %s\n", program_invocation_short_name, errno ? strerror(errno) : "a write failed");
 	_exit(code ? code : 1);
 }
 

@@ -18,7 +18,8 @@ static const struct rare_rule {
 } rare_rules[] = {{ERROR_ONE_GROUP, 0.1, 5, false}, {ERROR_FEW_GROUPS, 0.1, 5, true}, {ERROR_TAIL, 0.2, 2.5, false}};
 enum { RARE_RULES = sizeof rare_rules / sizeof *rare_rules };
 
-static const char no_spread[] = "a single group of samples gives no error; use --spp 2 or more, and not --groups 1";
+static const char no_spread[] =
+	"a single group of samples gives no error; it takes at least 2 samples per pixel and 2 groups";
 
 /* Appends the error that the image has if the pixels that came out bright really are bright, if that is less than half
  * of the stated error. A lamp smaller than a pixel looks like a firefly in short renders: 395 % was stated where 22 %
@@ -47,7 +48,8 @@ void stated_error_doubt(const struct canvas_image *img, char *text, size_t size)
 		add_own(img, &t);
 		break;
 	case ERROR_DARK:
-		text_put(&t, "%.0f %% of the estimate comes from pixels whose brightness is not known well enough",
+		text_put(&t,
+			 "%.0f %% of the estimate comes from pixels with too few samples to estimate their brightness",
 			 share);
 		add_own(img, &t);
 		break;
@@ -57,12 +59,14 @@ void stated_error_doubt(const struct canvas_image *img, char *text, size_t size)
 	case ERROR_TAIL:
 		text_put(
 			&t,
-			"too few pixels have met the rare light: the tail index of their errors is %.2f, and up to %.2f "
-			"their variance may be infinite",
+			"few pixels hold most of the error, and larger errors may still come: their tail index is %.2f, "
+			"not above %.2f",
 			img->error_tail, img->error_tail_least);
 		break;
 	case ERROR_FEW_GROUPS:
-		text_put(&t, "so few groups of samples in so few pixels do not show whether the rarest light has come");
+		text_put(
+			&t,
+			"with so few groups of samples in so few pixels, rare bright paths may not have been found yet");
 		break;
 	case ERROR_NO_SPREAD:
 		text_put(&t, "%s", no_spread);

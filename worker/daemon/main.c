@@ -70,6 +70,7 @@ int main(int argc, char **argv)
 	struct agent_config c = {.name = name, .threads = cores > 0 && cores <= 1024 ? (unsigned)cores : 1};
 	program_options(&program, argc, argv, &c);
 	if (geteuid() == 0)
-		log_event(LOG_ROOT, "text=\"a worker needs no privileges: scenes from others are read as root\"");
+		log_event(LOG_ROOT,
+			  "text=\"running as root, which a worker does not need: it reads other people's scenes\"");
 	return supervise(c.threads, run_worker, &c);
 }

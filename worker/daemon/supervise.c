@@ -120,8 +120,7 @@ static bool is_lost(struct supervisor *s, int *code)
 		return false;
 	}
 	if (unable)
-		log_event(LOG_PROCESS_LOST, "code=%d text=\"the rendering process cannot start: it is tried again\"",
-			  *code);
+		log_event(LOG_PROCESS_LOST, "code=%d text=\"the rendering process cannot start; retrying\"", *code);
 	else
 		log_event(LOG_PROCESS_LOST, "signal=%d text=\"the rendering process was ended by %s\" leases=%u",
 			  number, crash_signal_name(number), lost);

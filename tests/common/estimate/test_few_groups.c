@@ -121,7 +121,7 @@ static void four_groups_need_many_pixels(void **state)
 	assert_int_equal(stated_of("grain", grain, plan_of(4, 8, 8), &doubt), 0);
 	assert_int_equal(doubt, ERROR_FEW_GROUPS);
 	stated_error(&(struct canvas_image){.rel_mse = 0.01, .rel_mse_doubt = doubt}, text, sizeof text);
-	assert_non_null(strstr(text, "relative error about 10 %, its interval is not known: so few groups"));
+	assert_non_null(strstr(text, "relative error about 10 %, its interval is not known: with so few groups"));
 	assert_int_equal(stated_of("grain", grain, plan_of(8, 8, 8), &doubt), 50);
 	assert_int_equal(stated_of("grain", grain, plan_of(4, 64, 32), &doubt), 50);
 	assert_true(stated_of("index 1.5", unequal_light, plan_of(4, 64, 32), &doubt) <= 10);

@@ -342,8 +342,7 @@ static int doubtful_of(const char *name, group_image_value *of, enum error_doubt
 		mean += img.error_tail / TIMES;
 		stated_error(&img, text, sizeof text);
 		if (img.rel_mse_doubt == ERROR_TAIL)
-			assert_non_null(
-				strstr(text, "its interval is not known: too few pixels have met the rare light"));
+			assert_non_null(strstr(text, "its interval is not known: few pixels hold most of the error"));
 		canvas_image_fini(&img);
 	}
 	print_message("%s: %d of %d doubtful by this, %d stated, mean tail index %.2f of %.1f\n", name, count, TIMES,
@@ -441,9 +440,8 @@ static void what_is_said_about_the_error(void **state)
 	img.doubtful_share = 0.66;
 	stated_error(&img, text, sizeof text);
 	assert_string_equal(
-		text,
-		"relative error about 10 %, its interval is not known: 66 % of the estimate comes from pixels whose "
-		"brightness is not known well enough; no chain reached 7 of 100 pixels");
+		text, "relative error about 10 %, its interval is not known: 66 % of the estimate comes from pixels "
+		      "with too few samples to estimate their brightness; no chain reached 7 of 100 pixels");
 	assert_false(stated_error_meets(&img, 0.5));
 	img.unvisited = 0;
 	/* Rare light may leave the interval unknown for ever: once the estimate is small, a multiple of it is compared
@@ -503,7 +501,7 @@ static void what_is_said_about_the_error(void **state)
 	stated_error(&img, text, sizeof text);
 	assert_string_equal(
 		text,
-		"relative error not known: a single group of samples gives no error; use --spp 2 or more, and not --groups 1");
+		"relative error not known: a single group of samples gives no error; it takes at least 2 samples per pixel and 2 groups");
 	assert_false(stated_error_meets(&img, 10));
 	stated_b_doubt(&img, text, sizeof text);
 	assert_true(strncmp(text, "a single group of samples gives no error;", 41) == 0);

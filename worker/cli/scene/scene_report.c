@@ -354,14 +354,15 @@ static void print_text(json_t *all)
 	       width, height, fov, axis);
 	if (spp)
 		printf("%lld sample%s per pixel, ", spp, spp == 1 ? "" : "s");
-	printf("paths of at most %d edges\n%lld shape%s", depth, shapes, shapes == 1 ? "" : "s");
+	printf("paths of at most %d edge%s\n%lld shape%s", depth, depth == 1 ? "" : "s", shapes,
+	       shapes == 1 ? "" : "s");
 	if (instances || sharing)
 		print_instances(instances, sharing, meshes);
 	printf(", %lld triangle%s", triangles, triangles == 1 ? "" : "s");
 	if (sharing)
 		printf(" (%lld in memory)", stored);
 	printf("%s", segments_text((uint64_t)segments, text_of_segments, sizeof text_of_segments));
-	printf(", about %.0f MB; calls for", ceil((double)memory * 0x1p-20));
+	printf(", about %.0f MB; effects needed:", ceil((double)memory * 0x1p-20));
 	json_array_foreach(json_object_get(all, "effects"), i, one)
 		printf("%s %s", i ? "," : "", json_string_value(one));
 	printf("\n");

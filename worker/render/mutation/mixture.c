@@ -98,8 +98,10 @@ int mixture_parse(const char *text, struct mixture *out, struct error *e)
 	if (out->independent < out->count)
 		return 0;
 	if (out->count == BATCH_STRATEGIES)
-		return error_set(e, EINVAL, "'%s': no room for independent proposals among %d mutations", text,
-				 BATCH_STRATEGIES);
+		return error_set(
+			e, EINVAL,
+			"'%s': independent proposals are missing and there are %d mutations already: leave one out",
+			text, BATCH_STRATEGIES);
 	out->entry[out->count++] =
 		(struct mixture_entry){mutation_find("bidirectional", 13), {-1, -1}, INDEPENDENT_SHARE * out->total};
 	finish(out);

@@ -42,8 +42,8 @@ static int check_range(const struct xml_element *el, const struct param *p, cons
 			return xml_error(el, e, ERANGE, "%s=%g must be positive", p->name, x[i]);
 	for (uint32_t i = 0; i < count; i++)
 		if (!(x[i] >= p->min && x[i] <= p->max))
-			return xml_error(el, e, ERANGE, "%s=%.9g is outside [%g, %g]", element_spelling(el, p->name),
-					 x[i], p->min, p->max);
+			return xml_error(el, e, ERANGE, "%s=%.9g is outside [%.10g, %.10g]",
+					 element_spelling(el, p->name), x[i], p->min, p->max);
 	return 0;
 }
 
@@ -108,8 +108,8 @@ int clip_value(const struct notes *t, const struct xml_element *owner, const str
 		return 0;
 	const char *type = xml_attribute(owner, "type");
 	return note(t, owner, type, p->name,
-		    "%s:%d: <%.64s type=\"%.64s\">: %s=%g is outside [%g, %g] and counts as %g", el->file, el->line,
-		    owner->name, type, element_spelling(el, p->name), outside, p->min, p->max, end);
+		    "%s:%d: <%.64s type=\"%.64s\">: %s=%.9g is outside [%.10g, %.10g] and counts as %.10g", el->file,
+		    el->line, owner->name, type, element_spelling(el, p->name), outside, p->min, p->max, end);
 }
 
 /* ---- given a second time */

@@ -54,7 +54,7 @@ static int on_integrator(struct report *r, const struct scene_node *n, struct er
 			    "the `%s` inside it is not known: the image shows all light, on surfaces and in media%s%s",
 			    inner->type, how, hint);
 	else if (integrators_show_other(n) && inner)
-		rc = remark(r, n, e, "the image shows the light that the `%s` inside it asks for%s", inner->type, how);
+		rc = remark(r, n, e, "rendered as the `%s` inside it%s", inner->type, how);
 	else if (integrators_show_other(n))
 		rc = remark(r, n, e, "the image shows all light, on surfaces and in media%s", how);
 	else if (!integrators_are_known(n))

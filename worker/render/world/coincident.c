@@ -69,8 +69,7 @@ static void describe_pair(struct render_coincident *out, const struct coincide_s
 		bool shine = s[c->hidden].rank == SURFACE_SHINES && s[c->by].rank == SURFACE_SHINES;
 		bool refract = s[c->hidden].rank == SURFACE_TRANSMITS && s[c->by].rank == SURFACE_TRANSMITS;
 		snprintf(
-			text, sizeof out->text[0],
-			"%s and %s coincide: where they overlap, only the latter is present, because it %s%s",
+			text, sizeof out->text[0], "%s coincides with %s, which %s and hides it where they overlap%s",
 			node_title(nodes[c->hidden], hidden), node_title(nodes[c->by], by),
 			reason(s[c->hidden].rank, s[c->by].rank),
 			shine && !c->same_side

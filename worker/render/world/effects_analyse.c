@@ -381,9 +381,8 @@ static void surfaces(struct report *r, const struct census *c, const struct worl
 		line(r, EFFECT_INSTANCING, true, "%u shapes are instances of %u meshes", w->sharing_count,
 		     w->shared_mesh_count);
 	else if (w->instance_count)
-		line(r, EFFECT_INSTANCING, false,
-		     "no mesh is shared: copies of what the %u instance%s show%s are as fast", w->instance_count,
-		     w->instance_count == 1 ? "" : "s", w->instance_count == 1 ? "s" : "");
+		line(r, EFFECT_INSTANCING, false, "no mesh is used twice, so what the %u instance%s show%s is copied",
+		     w->instance_count, w->instance_count == 1 ? "" : "s", w->instance_count == 1 ? "s" : "");
 	else
 		line(r, EFFECT_INSTANCING, false, "no mesh is used in several places");
 	struct tally moving = {0};

@@ -263,13 +263,13 @@ static void test_notes_on_the_whole(void **state)
 		 "s.xml:1: <shape type=\"sphere\">: without a BSDF it is grey and opaque, as in Mitsuba 3"},
 		{"<integrator type='moment'><integrator type='path'><integer name='max_depth' value='2'/></integrator>"
 		 "</integrator>",
-		 "s.xml:1: <integrator type=\"moment\">: the image shows the light that the `path` inside it asks for"},
+		 "s.xml:1: <integrator type=\"moment\">: rendered as the `path` inside it"},
 		{"<integrator type='moment'><integrator type='aov'><integrator type='direct'/></integrator></integrator>",
-		 "s.xml:1: <integrator type=\"moment\">: the image shows the light that the `direct` inside it asks for"},
+		 "s.xml:1: <integrator type=\"moment\">: rendered as the `direct` inside it"},
 		{"<integrator type='stokes'><integrator type='aov'/></integrator>",
 		 "<integrator type=\"stokes\">: the image shows all light, on surfaces and in media, without its polarization"},
 		{"<integrator type='stokes'><integrator type='path'/></integrator>",
-		 "the image shows the light that the `path` inside it asks for, without its polarization"},
+		 "rendered as the `path` inside it, without its polarization"},
 		{"<integrator type='multichannel'/>", "the image shows all light, on surfaces and"},
 		{"<integrator type='volprim_rf_basic'/>", "the image shows all light, on surfaces and"},
 	};

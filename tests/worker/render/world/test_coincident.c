@@ -57,49 +57,48 @@ static void test_notes(void **state)
 	(void)state;
 	expect(VIEW FLOOR(GREY) CUBE("block", "2", "0.6", GREY) LAMP, NULL, NULL, false);
 	expect(VIEW CUBE("glass", "0", "0.5", GLASS) LAMP,
-	       "`glass` (test.xml:2) and `lamp` (test.xml:3) coincide: where they overlap, only the latter is present, because it shines",
+	       "`glass` (test.xml:2) coincides with `lamp` (test.xml:3), which shines and hides it where they "
+	       "overlap",
 	       NULL, true);
 	expect(VIEW CUBE("glass", "0", "0.5", GLASS) FLOOR(GREY),
-	       "`glass` (test.xml:2) and `floor` (test.xml:3) coincide: where they overlap, only the latter is present, "
-	       "because it is opaque",
+	       "`glass` (test.xml:2) coincides with `floor` (test.xml:3), which is opaque and hides it where they "
+	       "overlap",
 	       NULL, true);
 	expect(VIEW CUBE("glass", "0", "0.5", GLASS) CUBE("ice", "1", "0.5", GLASS)
 		       CUBE("hole", "-1", "0.5", "<bsdf type='null'/>"),
-	       "`ice` (test.xml:3) and `glass` (test.xml:2) coincide: where they overlap, only the latter is present, "
-	       "because it comes first in the file; where two media touch, use one surface with the int_ior and ext_ior "
-	       "of both",
-	       "`hole` (test.xml:4) and `glass` (test.xml:2) coincide: where they overlap, only the latter is present, "
-	       "because it refracts or scatters",
+	       "`ice` (test.xml:3) coincides with `glass` (test.xml:2), which comes first in the file and hides it "
+	       "where they overlap; where two media touch, use one surface with the int_ior and ext_ior of both",
+	       "`hole` (test.xml:4) coincides with `glass` (test.xml:2), which refracts or scatters and hides it "
+	       "where they overlap",
 	       true);
 	/* Glass with holes counts as glass; an opaque sheet with holes does not. */
 	expect(VIEW CUBE("lace", "0", "0.5", HOLES(GLASS)) CUBE("glass", "1", "0.5", GLASS)
 		       CUBE("net", "-1", "0.5", HOLES(GREY)),
-	       "`glass` (test.xml:3) and `lace` (test.xml:2) coincide: where they overlap, only the latter is present, "
-	       "because it comes first in the file; where two media touch, use one surface with the int_ior and ext_ior "
-	       "of both",
-	       "`net` (test.xml:4) and `lace` (test.xml:2) coincide: where they overlap, only the latter is present, "
-	       "because it refracts or scatters",
+	       "`glass` (test.xml:3) coincides with `lace` (test.xml:2), which comes first in the file and hides it "
+	       "where they overlap; where two media touch, use one surface with the int_ior and ext_ior of both",
+	       "`net` (test.xml:4) coincides with `lace` (test.xml:2), which refracts or scatters and hides it "
+	       "where they overlap",
 	       true);
 	/* Of two lamps back to back only one exists, which emits towards its own side; a lamp that is there twice
 	 * loses no light. */
 	expect(VIEW LAMP "<shape type='rectangle' id='back'>" AT(
 		       "<scale value='0.3'/><rotate y='1' angle='180'/><translate z='0.5' y='0.5'/>") SHINES
 	       "</shape>\n",
-	       "`back` (test.xml:3) and `lamp` (test.xml:2) coincide: where they overlap, only the latter is present, "
-	       "because it comes first in the file; light to the other side is lost: for a lamp with two sides use two "
-	       "surfaces, slightly apart",
+	       "`back` (test.xml:3) coincides with `lamp` (test.xml:2), which comes first in the file and hides it "
+	       "where they overlap; light to the other side is lost: for a lamp with two sides use two surfaces, "
+	       "slightly apart",
 	       NULL, true);
 	expect(VIEW LAMP "<shape type='rectangle' id='twin'>" AT("<scale value='0.3'/><translate z='0.5' y='0.5'/>")
 		       SHINES "</shape>\n",
-	       "`twin` (test.xml:3) and `lamp` (test.xml:2) coincide: where they overlap, only the latter is present, "
-	       "because it comes first in the file",
+	       "`twin` (test.xml:3) coincides with `lamp` (test.xml:2), which comes first in the file and hides it "
+	       "where they overlap",
 	       NULL, true);
 	/* A block on a floor hides the coinciding part of the floor, so there is no note; a picture in the plane of a
 	 * wall is visible, so there is one. */
 	expect(VIEW FLOOR(GREY) CUBE("block", "0", "0.5", RED), NULL, NULL, true);
 	expect(VIEW FLOOR(GREY) "<shape type='rectangle'>" AT("<rotate x='1' angle='-90'/>") RED "</shape>",
-	       "the rectangle in test.xml:3 and `floor` (test.xml:2) coincide: where they overlap, only the latter is "
-	       "present, because it comes first in the file",
+	       "the rectangle in test.xml:3 coincides with `floor` (test.xml:2), which comes first in the file and "
+	       "hides it where they overlap",
 	       NULL, true);
 }
 
