@@ -272,6 +272,12 @@ static int refuse_unknown(const struct reader *x, const char *dashes, const char
 	const struct option_row *r;
 	for (size_t i = 0; (r = option_at(x->program, i, NULL)) != NULL; i++)
 		spelling_offer(&s, r->name);
+	/* One program's --status-socket is another's --socket. */
+	for (size_t i = 0; !s.best && (r = option_at(x->program, i, NULL)) != NULL; i++) {
+		size_t n = strlen(name), m = strlen(r->name);
+		if (n > m && name[n - m - 1] == '-' && strcmp(name + n - m, r->name) == 0)
+			s.best = r->name;
+	}
 	return error_set(x->e, EINVAL, "unknown option '%s%s'%s%s%s", dashes, name, s.best ? "; did you mean '--" : "",
 			 s.best ? s.best : "", s.best ? "'?" : "");
 }

@@ -63,24 +63,29 @@ static int listen_at(struct server *s, struct net_addr *a)
 	return 0;
 }
 
-/* Listens at all addresses of the name, with the same port. Addresses that this machine does not have (::1 without
- * IPv6) are left out, provided that it has another one. */
-static int start_listening(struct server *s, struct error *e)
+/* Looks up the addresses of the name, and refuses those that need TLS or --insecure. */
+static int find_addresses(const struct server *s, struct net_addrs *l, struct error *e)
 {
 	const char *where = s->jobs.config.listen;
-	struct net_addrs l;
+	int rc = net_addrs_resolve(l, where, e);
+	for (unsigned i = 0; !rc && i < l->count; i++)
+		rc = net_addr_allow(&l->all[i], where, s->jobs.config.insecure || s->peers.tls, e);
+	return rc;
+}
+
+/* Listens at all these addresses, with the same port. Addresses that this machine does not have (::1 without IPv6) are
+ * left out, provided that it has another one. */
+static int start_listening(struct server *s, struct net_addrs *l, struct error *e)
+{
+	const char *where = s->jobs.config.listen;
 	unsigned port = 0;
-	int rc = net_addrs_resolve(&l, where, e), fault = UV_EADDRNOTAVAIL;
-	for (unsigned i = 0; !rc && i < l.count; i++)
-		rc = net_addr_allow(&l.all[i], where, s->jobs.config.insecure || s->peers.tls, e);
-	if (rc)
-		return rc;
-	for (unsigned i = 0; i < l.count; i++) {
+	int fault = UV_EADDRNOTAVAIL;
+	for (unsigned i = 0; i < l->count; i++) {
 		if (port)
-			net_addr_set_port(&l.all[i], port);
-		rc = listen_at(s, &l.all[i]);
+			net_addr_set_port(&l->all[i], port);
+		int rc = listen_at(s, &l->all[i]);
 		if (!rc)
-			port = net_addr_port(&l.all[i]);
+			port = net_addr_port(&l->all[i]);
 		else if (rc != UV_EADDRNOTAVAIL && rc != UV_EAFNOSUPPORT)
 			return error_set(e, -rc, "cannot listen at %s: %s", where, uv_strerror(rc));
 		else
@@ -224,6 +229,9 @@ int server_open(struct server **out, const struct server_config *c, struct error
 	init_handles(s);
 	if (!rc)
 		rc = s->jobs.config.tls && *s->jobs.config.tls ? open_tls(s, e) : 0;
+	struct net_addrs addresses;
+	if (!rc) /* before the spool is created */
+		rc = find_addresses(s, &addresses, e);
 	if (!rc)
 		rc = limits_connections(c->max_connections, &s->jobs.config.max_connections, e);
 	if (!rc)
@@ -232,7 +240,7 @@ int server_open(struct server **out, const struct server_config *c, struct error
 	if (!rc && (inherited >= 0 || c->status_socket))
 		rc = status_open(&s->status, &s->peers, inherited, c->status_socket, c->status_group, e);
 	if (!rc)
-		rc = start_listening(s, e);
+		rc = start_listening(s, &addresses, e);
 	if (rc)
 		server_close(s);
 	else

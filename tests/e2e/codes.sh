@@ -22,6 +22,7 @@ for p in "$BIN"/hslt-*; do
 done
 code 2 "$BIN/hslt-coordinator" --listen 0.0.0.0:0 --spool "$DIR/open"
 grep -q -- --insecure "$DIR/err.log" || fail "it does not say how"
+[ ! -e "$DIR/open" ] || fail "a spool was created for an address that is refused"
 code 2 "$BIN/hslt-worker" --coordinator 192.0.2.1:7700 --cache "$DIR/cache"
 code 2 "$BIN/hslt-submit" --coordinator 192.0.2.1:7700 "$BOX" -o "$DIR/a.exr"
 code 75 "$BIN/hslt-submit" --coordinator 127.0.0.1:1 "$BOX" -o "$DIR/a.exr"

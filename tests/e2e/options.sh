@@ -164,5 +164,6 @@ answered precision "$BIN/hslt-accuracy" "$BOX" -o "$DIR/a.html" --parameters pre
 answered box.xml "$BIN/hslt-scene" show "${BOX%box.xml}bxo.xml"
 HSLT_CA=$DIR/units.ca code 0 "$BIN/hslt-ca" worker node1
 HSLT_CA=$DIR/units.ca answered node1 "$BIN/hslt-ca" revoke ndoe1
+answered --socket "$BIN/hslt-status" --status-socket "$DIR/none"
 answered --stall "$BIN/hslt-worker" --stal1 5
 echo "options of $(echo $PROGRAMS | wc -w) programs: help, manual pages, completions"

@@ -260,6 +260,7 @@ static void test_mistyped(void **state)
 	(void)state;
 	refused("list --ouptut x", "unknown option '--ouptut'; did you mean '--output'?");
 	refused("list --tiem=5", "unknown option '--tiem'; did you mean '--time'?");
+	refused("list --wall-clock-time=5", "unknown option '--wall-clock-time'; did you mean '--time'?");
 	refused("list -x", "unknown option '-x'");
 	refused("list -spp 5", "unknown option '-spp'; did you mean '--spp'?");
 	refused("list --entirely-other", "unknown option '--entirely-other'");
