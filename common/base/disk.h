@@ -45,7 +45,7 @@
 	X(int, touch, (const char *path), (path))                                                                    \
 	X(int, flock, (int fd, int what), (fd, what))                                                                \
 	X(DIR *, opendir, (const char *path), (path))                                                                \
-	X(struct dirent *, readdir, (DIR * d), (d)) /* NULL: end; or an error if errno, set to 0 before, changed */  \
+	X(struct dirent *, readdir, (DIR * d), (d)) /* NULL: end of the folder, or errno is set (clear it first) */  \
 	X(uint64_t, capacity, (const char *path), (path))  /* size of the file system in bytes, or 0 if not known */ \
 	X(uint64_t, available, (const char *path), (path)) /* bytes that can still be written, or UINT64_MAX */
 

@@ -52,7 +52,7 @@ static void path_of(const struct blob_store *s, const char *name, char path[BLOB
 	snprintf(path, BLOB_PATH_MOST, "%s/%s", s->folder, name);
 }
 
-/* Returns the index of the first entry whose hash is not below h. */
+/* Returns the index of the first entry whose hash is h or above; s->count if there is none. */
 static size_t place_of(const struct blob_store *s, const struct blob_hash *h)
 {
 	size_t low = 0, high = s->count;

@@ -8,7 +8,7 @@
 #define KEY_PAIR_NEXT ".next"
 
 /* Uses the key and the certificate in these files or, if the key does not match the certificate, the next certificate.
- * Returns NULL, or the path of the file that cannot be used; OpenSSL's queue has the reason. */
+ * Returns NULL on success, otherwise the path of the bad file; the reason is in OpenSSL's error queue. */
 const char *key_pair_use(SSL_CTX *context, const char *key, const char *cert);
 
 #endif

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Bounds the memory of the bytes that wait to be sent on many connections at the same time. If more bytes would exceed
- * the limit, connections are closed ("give way") until they fit: among the connections that hold at least the average,
- * the one whose peer has taken nothing for the longest time. A peer that reads is therefore the last to be closed, and
- * one that holds little never is. A single amount above the limit may wait while nothing else does. The loop's thread.
+ * the limit, connections are closed ("give way") until they fit. Of the connections whose backlog is at least the
+ * average, the one whose peer has taken nothing for the longest time is closed first. A peer that reads is therefore
+ * the last to be closed, and one that holds little never is. A single amount above the limit may wait while nothing
+ * else does. The loop's thread.
  */
 #ifndef COMMON_NET_SEND_POOL_H
 #define COMMON_NET_SEND_POOL_H

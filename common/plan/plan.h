@@ -106,8 +106,8 @@ struct plan {
 	struct plan_unseen unseen; /* has no influence on the image, only on the error that is stated */
 };
 
-/* Lists of the numbers of a plan and a request (all but the kind): PLAN_GIVEN are copied from the request, PLAN_CHOSEN
- * may be chosen by plan_make. Messages have members of the same names. */
+/* Lists of the numeric fields of struct plan and struct plan_request, except `kind`: PLAN_GIVEN are copied from the
+ * request, PLAN_CHOSEN may be chosen by plan_make. Messages have fields of the same names. */
 /* clang-format off */
 #define PLAN_FILM(X) X(width) X(height) X(crop_x) X(crop_y) X(crop_width) X(crop_height) X(border)
 #define PLAN_GIVEN(X) PLAN_FILM(X) X(seed) X(min_depth) X(max_depth)

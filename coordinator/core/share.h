@@ -29,7 +29,7 @@ bool share_competes(const struct job *a, const struct job *b); /* whether both c
 
 /* Whether the job's owner is limited (owner.h) and nothing of the job was computed yet. */
 bool share_is_limited(const struct farm *f, const struct job *j);
-/* Number of leases out of the owner's jobs of which nothing was computed yet. */
+/* Returns how many leases of this owner's jobs that have no result yet are with workers. */
 uint32_t share_unproven(const struct farm *f, const struct owner *o);
 
 #endif

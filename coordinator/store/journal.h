@@ -84,8 +84,8 @@ void journal_release(struct journal *j); /* ends a reference; j may be NULL */
 int journal_reserve(struct journal *j, size_t body, struct error *e);
 /* Appends a record. lease: NULL: it belongs to none. The body is `a`, which is copied, followed by `b` (may be NULL),
  * which is taken over on success. Returns -ENOMEM, or -EFBIG if the body is too large. Records that are neither
- * results nor fingerprints (estimates, counters) are refused with -ENOSPC if the disk is full. A bad journal accepts
- * everything. */
+ * results nor fingerprints (estimates, counters) are refused with -ENOSPC if the disk is full. While the journal is
+ * bad, records are not written but kept in memory for journal_renew, so the disk's space does not matter. */
 int journal_append(struct journal *j, enum journal_kind kind, const struct lease_key *lease, double elapsed,
 		   const void *a, size_t a_size, struct buf *b, struct error *e);
 uint64_t journal_bytes(struct journal *j); /* size of the file including queued records */

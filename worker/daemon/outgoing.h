@@ -16,10 +16,10 @@ void send_failed(struct agent *a, const struct lease_key *k, const char *text, b
 /* Returns a lease because the scene of another job is in memory (LeaseFailed.later): the coordinator will offer it
  * again soon. */
 void send_later(struct agent *a, const struct lease_key *k, const char *text);
-/* Returns a lease because the chain states in its grant are invalid: the worker that made them is at fault. */
+/* Returns a lease because the chain states in its grant are invalid, and reports the worker that computed them. */
 void send_bad_states(struct agent *a, const struct grant *g, const char *text);
-/* Sends a result once per connection, and only after the coordinator has described the job on this connection: its
- * number may have been given to another job. */
+/* Sends a result, at most once per connection, and only after the coordinator has described the job on this connection,
+ * because a coordinator with another spool may have given the job's number to another job. */
 void send_result(struct agent *a, struct lease_task *l);
 
 #endif

@@ -183,7 +183,7 @@ static int run_chain(struct job *j, const struct lease_input *in, uint32_t k, ui
 		return error_set(j->e, EILSEQ,
 				 "chain %llu of group %u does not resume: its state is not one of this plan",
 				 (unsigned long long)id, j->key->group);
-	if (!ok) { /* the seed carries no light: the bootstrap's weights were not ours */
+	if (!ok) { /* the seed, chosen by weights computed elsewhere, carries no light here */
 		j->out->counters[COUNT_STATES_LOST]++;
 		ops->start(c, UINT64_MAX);
 	}

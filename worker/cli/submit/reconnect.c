@@ -28,9 +28,9 @@ static int try_once(struct client *cl, const struct submitted *job, const char *
 	return rc;
 }
 
-/* Connects again and again, with growing pauses, until a coordinator answers or the patience is over. A certificate
- * that has expired is no reason to give up: this client was accepted before, and may be again once the certificate is
- * renewed or a clock is corrected. */
+/* Connects again and again, with growing pauses, until a coordinator answers or the patience is over. A refusal is
+ * retried, too, because the coordinator accepted this client before: an expired certificate may be renewed, or a clock
+ * corrected. */
 static int call_again(struct client **cl, const struct reconnect *o, struct error *e)
 {
 	double gone = clock_seconds(), pause = first_pause;

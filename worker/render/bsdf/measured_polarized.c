@@ -34,8 +34,8 @@
 
 enum { AXES = 4, MUELLER = 16, TICK_INTERVAL = 1 << 16 };
 
-/* A value that was not measured: it outweighs all values around it, so that their interpolation is negative and counts
- * as 0. */
+/* Marks a missing measurement: so far below 0 that interpolating it with any values around it gives a negative value,
+ * which counts as 0. */
 static const float nothing = -FLT_MAX;
 
 struct axis {

@@ -19,8 +19,8 @@ struct film_sums {
 	double around[2];
 	enum filter_kind filter;
 	double radius;
-	double inverse, floor, scale; /* Gaussian: scale (exp(-inverse d^2) - floor) */
-	double b, c;		      /* cubic; Lanczos uses `scale` */
+	double inverse, floor, scale; /* Gaussian: scale (exp(-inverse d^2) - floor); Lanczos: `scale` alone */
+	double b, c;		      /* of the cubic filters; the others do not use them */
 	double *xyz;
 	uint8_t *touched; /* one per tile */
 	struct chain_moments moments;

@@ -35,7 +35,7 @@ struct relief {
  */
 struct relief_place {
 	const void *point;						  /* argument of `frame` */
-	struct frame (*frame)(const void *point, const struct relief *r); /* NULL: there is no surface */
+	struct frame (*frame)(const void *point, const struct relief *r); /* NULL: the point is on no surface */
 };
 
 #endif

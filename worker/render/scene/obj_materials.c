@@ -344,7 +344,7 @@ static int note_all(const struct spread *s, struct obj_shape *o)
 	return r;
 }
 
-/* ---- the walk */
+/* ---- walking the tree */
 
 /* Not if the file has no faces, or not as many meshes as the shape's index: an error when the shape is built. */
 static bool wants_any(const struct obj_shape *o)
