@@ -3,8 +3,10 @@
  * Snapshots of the farm for the status socket.
  *
  * snapshot_take copies numbers and texts: jobs as views, workers and their leases as the core and their sessions have
- * them. What is rare or short (TLS, quarantined workers) is made into JSON at once. If memory runs out for the
- * workers there is no snapshot; if it runs out for jobs or JSON, these are missing.
+ * them. What is rare or short (TLS, quarantined workers) is made into JSON at once.
+ *
+ * Failures: only of memory. Without room for the snapshot or its workers, snapshot_take returns NULL, and readers get
+ * the next snapshot. Without room for the jobs or the JSON, the snapshot is made without these.
  */
 #include "coordinator/status/snapshot.h"
 

@@ -4,8 +4,9 @@
  * images and combinations of values as a worker would; problems that may only follow from one that the reader has found
  * are not reported. `show` collects everything as JSON, from which the text is made.
  *
- * If the scene cannot be rendered, the exit code is 1, and there is one line per problem. If the file cannot be read at
- * all, that is the only line.
+ * Failures: if the scene cannot be rendered, `check` prints one line per problem, and the exit code is 1. If the file
+ * cannot be found or read at all, that is the only line. `show` stops at the first problem and returns its sentence,
+ * as it does if memory runs out or stdout cannot be written.
  */
 #include "worker/cli/scene/scene_report.h"
 
@@ -389,7 +390,7 @@ int scene_report_show(const struct render_arguments *a, bool lenient, bool json,
 		json_t *all = describe(&s, &o, e);
 		if (all && json)
 			rc = json_dumpf(all, stdout, JSON_COMPACT) || putchar('\n') == EOF
-				     ? error_set(e, EIO, "stdout could not take everything")
+				     ? error_set(e, EIO, "stdout: a write failed")
 				     : 0;
 		else if (all)
 			print_text(all);

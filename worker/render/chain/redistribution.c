@@ -6,8 +6,9 @@
  * by a local mutation, accepts it with probability min(1, h(y) T(y -> x) / (h(x) T(x -> y))), and splats both states
  * with their expected weights.
  *
- * One path in millions cannot be built again; it keeps its contribution. Proposals with a density that is not finite
- * are counted and rejected.
+ * Failures: redistribution_new fails if memory runs out; afterwards nothing allocates or fails. One path in millions
+ * cannot be built again from its sub-paths; it keeps its contribution and starts no chain, and so does one whose
+ * brightness relative to the map is not finite. Proposals with a density that is not finite are counted and rejected.
  */
 #include "worker/render/chain/redistribution.h"
 

@@ -6,8 +6,12 @@
  * after another from the BSDFs, with Russian roulette where it is allowed. Each vertex keeps its throughput (beta) and
  * its densities per area from both sides, pdf and pdf_rev, from which multiple importance sampling takes its weights
  * (Veach 1997). A vertex at infinity stands for a direction; its density is per solid angle. A sub-path ends early
- * where a ray finds nothing, a density is zero, or shading and geometric normal disagree about a direction's side. A
- * contribution that is NaN, infinite or negative is counted and left out.
+ * where a ray finds nothing, a density is zero, or shading and geometric normal disagree about a direction's side.
+ *
+ * Failures: nothing here can fail as a whole. A contribution that is NaN, infinite or negative, or that makes the
+ * sample brighter than a float holds, is left out and counted (COUNT_NAN, COUNT_INFINITE, COUNT_NEGATIVE); notes of the
+ * image say how many were. Without a count, contributions fainter than FAINTEST are left out, and those of a sample
+ * beyond PATH_MAX_SPLATS.
  */
 #include "worker/render/path/path.h"
 
