@@ -97,6 +97,24 @@ static int read_mark(const struct kept_bootstrap *k, struct checked_file *f, str
 	return rc;
 }
 
+/* Whether the file begins like a kept bootstrap. */
+static bool is_ours(const char *path)
+{
+	char begin[sizeof magic];
+	FILE *f = fopen(path, "rb");
+	bool ours = f && fread(begin, sizeof begin, 1, f) == 1 && memcmp(begin, magic, sizeof magic) == 0;
+	if (f)
+		fclose(f);
+	return ours;
+}
+
+/* Returns the error's sentence without the path at its beginning. */
+static const char *without_path(const struct error *e, const char *path)
+{
+	size_t n = strlen(path);
+	return strncmp(e->text, path, n) == 0 && strncmp(e->text + n, ": ", 2) == 0 ? e->text + n + 2 : e->text;
+}
+
 /* Leases that bootstrap_load has added before it fails stay in the bootstrap: each was checked. */
 void kept_bootstrap_resume(struct kept_bootstrap *k, struct bootstrap *b, char *text, size_t size)
 {
@@ -118,8 +136,9 @@ void kept_bootstrap_resume(struct kept_bootstrap *k, struct bootstrap *b, char *
 		checked_file_close(&f);
 	}
 	k->resumed = bootstrap_missing(b) < all;
+	k->damaged = rc == -EBADMSG && is_ours(k->path);
 	if (rc)
-		snprintf(text, size, "%.300s is not used: %.128s", k->path, e.text);
+		snprintf(text, size, "%.300s is not used: %.128s", k->path, without_path(&e, k->path));
 	else
 		snprintf(text, size, "continues from %u of %u leases of the bootstrap, kept in %.300s",
 			 all - bootstrap_missing(b), all, k->path);
@@ -175,6 +194,6 @@ void kept_bootstrap_write(struct kept_bootstrap *k, const struct bootstrap *b)
 
 void kept_bootstrap_end(const struct kept_bootstrap *k)
 {
-	if (k->resumed)
+	if (k->resumed || k->damaged)
 		unlink(k->path);
 }

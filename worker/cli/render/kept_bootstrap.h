@@ -32,6 +32,7 @@ struct kept_bootstrap {
 	char path[KEPT_PATH];		  /* "": nothing can be kept */
 	char text[KEPT_TEXT];		  /* fingerprint, plan and defines */
 	bool resumed;			  /* leases were added from the file */
+	bool damaged;			  /* the file is a kept bootstrap, but damaged */
 	char said[KEPT_PATH + 256];	  /* set by kept_bootstrap_write: the end of a sentence for the user */
 };
 
@@ -46,7 +47,8 @@ void kept_bootstrap_begin(struct kept_bootstrap *k, const char *image, const cha
 void kept_bootstrap_resume(struct kept_bootstrap *k, struct bootstrap *b, char *text, size_t size);
 /* Writes the finished leases, if there are any, and sets k->said. */
 void kept_bootstrap_write(struct kept_bootstrap *k, const struct bootstrap *b);
-/* Removes the file, if leases were added from it. Call when the image is written. */
+/* Removes the file, if leases were added from it or it is damaged; another command's file stays. Call when the image is
+ * written. */
 void kept_bootstrap_end(const struct kept_bootstrap *k);
 
 #endif
