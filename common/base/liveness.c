@@ -1,4 +1,4 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/base/liveness.h"
 
-_Thread_local atomic_ullong *tick_counter;
+_Thread_local atomic_ullong *liveness_counter;

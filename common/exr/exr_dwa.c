@@ -205,7 +205,7 @@ static int read_rows(ImfInputFile *in, ImfRgba *rows, struct exr_image *img, str
 			for (uint32_t c = 0; c < img->channel_count; c++)
 				img->planes[c][first + i] = ImfHalfToFloat(value[c]);
 		}
-		tick();
+		liveness_tick();
 	}
 	return 0;
 }

@@ -90,7 +90,7 @@ static bool is_due(enum fault f)
 
 static void sleep_unless_stopped(double seconds, const atomic_bool *stop)
 {
-	for (double until = clock_seconds() + seconds; clock_seconds() < until && !atomic_load(stop); tick())
+	for (double until = clock_seconds() + seconds; clock_seconds() < until && !atomic_load(stop); liveness_tick())
 		usleep(1000);
 }
 

@@ -197,7 +197,7 @@ static int open_asset(void *user, const char *name, struct asset *out, struct er
 	struct job_cache *b = user;
 	const Farm__JobInfo *m = info_of(b);
 	size_t i = 0;
-	tick();
+	liveness_tick();
 	while (i < m->n_files && strcmp(m->files[i]->name, name) != 0)
 		i++;
 	if (i == m->n_files)

@@ -51,10 +51,10 @@ static void *thread_main(void *user)
 		if (!t)
 			break;
 		pthread_mutex_unlock(&c->lock);
-		tick_counter = &t->ticks;
-		tick();
+		liveness_counter = &t->ticks;
+		liveness_tick();
 		t->run(t);
-		tick_counter = NULL;
+		liveness_counter = NULL;
 		pthread_mutex_lock(&c->lock);
 		queue_push(&c->finished, t);
 		uv_async_send(&c->back);

@@ -354,7 +354,7 @@ static struct render_found look_on(struct pilot *p, uint64_t stream, uint64_t fi
 	const struct film_window *w = &p->context.window;
 	for (uint64_t i = first / IN_PIXEL; i < end / IN_PIXEL; i++) {
 		double u[4];
-		tick();
+		liveness_tick();
 		rng_uniform4(p->seed, RNG_CHOICE, i, PILOT_PIXEL, stream, u); /* random pixels */
 		const double at[2] = {floor(u[0] * w->width), floor(u[1] * w->height)};
 		struct film_window pixel = {w->x + at[0], w->y + at[1], 1, 1};

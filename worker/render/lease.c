@@ -53,7 +53,7 @@ enum {
 
 static bool is_stopped(const struct job *j)
 {
-	tick();
+	liveness_tick();
 	return j->stop && atomic_load_explicit(j->stop, memory_order_relaxed);
 }
 

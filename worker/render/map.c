@@ -62,7 +62,7 @@ static void sample_second(struct map_maker *m, struct brightness *map, uint64_t 
 	struct path_context *c = &m->context;
 	for (uint64_t i = 0; i < samples; i++) {
 		struct sampler_random s;
-		tick();
+		liveness_tick();
 		sampler_random_init(&s, seed, RNG_BRIGHTNESS, i, STEP_SECOND);
 		c->split = redistribution_begin(m->redistribution, NO_PIXEL, i);
 		path_trace_both_ways(c, &s.base, &m->sample);

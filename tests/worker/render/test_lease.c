@@ -390,9 +390,9 @@ static void test_ticks(void **state)
 		for (int kind = LEASE_BOOTSTRAP; kind <= LEASE_RENDER; kind++) {
 			struct lease_key k = make_key((enum lease_kind)kind, 1, 0, 0);
 			atomic_store(&ticks, 0);
-			tick_counter = &ticks;
+			liveness_counter = &ticks;
 			struct batch b = lease_done(w, &p, k, p.kind == PLAN_CHAINS ? &in : NULL);
-			tick_counter = NULL;
+			liveness_counter = NULL;
 			assert_true(b.counters[COUNT_SAMPLES] >= TICK);
 			assert_true(atomic_load(&ticks) >= b.counters[COUNT_SAMPLES] / TICK);
 			batch_fini(&b);

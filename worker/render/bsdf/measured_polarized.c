@@ -196,7 +196,7 @@ static int read_table(const struct tensor_input *in, struct polarized *m)
 	for (uint64_t i = 0; i < t.count / MUELLER; i++) {
 		value[i] = tensor_is_usable(&t, MUELLER * i) ? (float)tensor_value(&t, MUELLER * i) : nothing;
 		if (i % TICK_INTERVAL == 0)
-			tick();
+			liveness_tick();
 	}
 	m->value = value;
 	return 0;

@@ -127,7 +127,7 @@ static int read_spectra(const struct tensor_input *in, struct measured *m, const
 			for (size_t c = 0; c < 3; c++)
 				rgb[3 * (s * nodes + i) + c] = (float)sum[c];
 		}
-		tick();
+		liveness_tick();
 	}
 	m->spectrum = lanes;
 	m->rgb = rgb;

@@ -51,7 +51,7 @@ int tensor_check_finite(const struct tensor_input *in, const struct tensor *t, c
 		if (!tensor_is_usable(t, i))
 			return tensor_fault(in, EINVAL, name, "has a number beyond 1e30, or one that is not finite");
 		if (i % SIDE_MAX == 0)
-			tick();
+			liveness_tick();
 	}
 	return 0;
 }

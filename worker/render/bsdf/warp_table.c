@@ -82,7 +82,7 @@ int warp_table_make(struct warp_table *t, uint32_t slices, uint32_t width, uint3
 				    below_row + (size_t)s * height);
 		if (rc)
 			return rc;
-		tick();
+		liveness_tick();
 	}
 	*t = (struct warp_table){width, height, value, below_node, below_row};
 	return 0;

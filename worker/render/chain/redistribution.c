@@ -110,7 +110,7 @@ static void run_chain(struct redistribution *r, const struct spread_place *from,
 	x->scale = from->scale;
 	x->share = from->share;
 	x->place.weight = y->place.weight = 0;
-	tick();
+	liveness_tick();
 	for (uint32_t i = 0; i < r->rule.length; i++) {
 		double u[4];
 		struct move move = {0};

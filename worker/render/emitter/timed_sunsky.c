@@ -80,7 +80,7 @@ static void add_sky(const struct timed *t, vec3 towards, double angle, double *m
 			for (int k = 0; k < 3; k++)
 				mean[3 * (y * SKY_WIDTH + x) + k] += t->sky_scale * rgb[k] / t->skies;
 		}
-	tick();
+	liveness_tick();
 }
 
 /* Interpolates the coarse sky bilinearly; its outer rows continue to the pole and to the horizon. */
@@ -152,7 +152,7 @@ static void bake_sun(const struct timed *t)
 		vec3 towards;
 		double angle, l[3];
 		if (i % 4096 == 0)
-			tick();
+			liveness_tick();
 		if (!sun_at(t, (i + 0.5) / t->suns, &towards, &angle))
 			continue;
 		double place = angle / (0.5 * M_PI) * (HEIGHTS - 1), r = t->radius * sqrt(fraction(i * STEP_X)),

@@ -235,7 +235,7 @@ static int compare_all(struct search *f, struct member *m, size_t n)
 		if (!gone)
 			m[kept++] = m[i];
 		f->incomplete |= f->work > f->limit;
-		tick();
+		liveness_tick();
 	}
 	return 0;
 }
@@ -293,7 +293,7 @@ static size_t leave_out(const struct search *f, struct prim_ref *items, size_t n
 		if (near)
 			items[kept++] = items[i];
 		if (i % 4096 == 0)
-			tick();
+			liveness_tick();
 	}
 	return kept;
 }
@@ -366,7 +366,7 @@ static size_t divide(struct search *f, uint32_t shape, const struct member *box,
 		if (may_meet(f, &m, box))
 			out[count++] = m.prim;
 		if (k % 4096 == 0)
-			tick();
+			liveness_tick();
 	}
 	return count;
 }
@@ -450,7 +450,7 @@ static size_t divide_small(struct search *f, const struct prim_ref *items, size_
 		if (near.count > OTHERS ? is_in_box(f, p) : is_near_any(f, p, &near))
 			out[count++] = p;
 	}
-	tick();
+	liveness_tick();
 	return count;
 }
 
@@ -497,7 +497,7 @@ static int look_into_halves(struct search *f, const struct prim_ref *items, size
 			if (is_in_half(f, items[i], upper, c))
 				half[count++] = items[i];
 			if (i % 4096 == 0)
-				tick();
+				liveness_tick();
 		}
 		rc = look_into(f, half, count, cuts - 1);
 		*side = whole;
@@ -577,7 +577,7 @@ static int find_spines(struct search *f, uint32_t count, size_t *triangles)
 			return -ENOMEM;
 		f->spines[i] = spine_of(&f->shapes[i]);
 		*triangles += f->shapes[i].triangle_count;
-		tick();
+		liveness_tick();
 	}
 	return 0;
 }

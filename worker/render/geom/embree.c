@@ -37,13 +37,13 @@ void embree_attach(RTCScene scene, RTCGeometry g, uint32_t id)
 static bool progress_monitor(void *counter, double done)
 {
 	(void)done;
-	tick_on(counter);
+	liveness_tick_on(counter);
 	return true;
 }
 
 void embree_build(RTCScene scene)
 {
-	rtcSetSceneProgressMonitorFunction(scene, progress_monitor, tick_counter);
+	rtcSetSceneProgressMonitorFunction(scene, progress_monitor, liveness_counter);
 	rtcCommitScene(scene);
 }
 

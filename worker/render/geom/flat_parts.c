@@ -79,7 +79,7 @@ int flat_parts_find(struct flat_parts *f, const struct accel_shape *s)
 		faces[i] = face_of(s, i);
 		all += faces[i].area;
 		if (i % 4096 == 0)
-			tick();
+			liveness_tick();
 	}
 	if (n > 0)
 		qsort(faces, n, sizeof *faces, compare_faces);

@@ -161,6 +161,6 @@ unsigned char *gltf_meshopt_decode(struct gltf *g, const struct gltf_at *view, c
 		return NULL;
 	}
 	undo_filter(&p, out);
-	tick();
+	liveness_tick();
 	return out;
 }

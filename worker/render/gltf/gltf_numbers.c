@@ -237,7 +237,7 @@ static void unpack(struct gltf *g, const struct gltf_at *a, const struct gltf_at
 			out->x[at * out->components + k] =
 				read_number(bytes + p->offset + i * p->stride + k * width, p->component, p->normalized);
 		if (i % 65536 == 0)
-			tick();
+			liveness_tick();
 	}
 }
 

@@ -164,7 +164,7 @@ static bool add_joints(struct gltf *g, const struct gltf_primitive *p, unsigned 
 			sums[i / 4].m[k / 4][k % 4] += weight.x[i] * m->m[k / 4][k % 4];
 		weights[i / 4] += weight.x[i];
 		if (i % 65536 == 0)
-			tick();
+			liveness_tick();
 	}
 	gltf_vectors_fini(&joint);
 	gltf_vectors_fini(&weight);

@@ -220,7 +220,7 @@ int brightness_of_samples(struct brightness *b, struct path_context *c, path_tra
 	for (uint64_t i = 0; i < samples; i++) {
 		struct sampler_random s;
 		if (i % TICK_INTERVAL == 0)
-			tick();
+			liveness_tick();
 		sampler_random_init(&s, seed, stream, i, step);
 		trace(c, &s.base, &sample);
 		brightness_add_sample(b, &sample);

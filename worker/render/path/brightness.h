@@ -27,7 +27,7 @@ struct brightness {
 };
 
 /* Makes the map from `samples` samples of the whole window, evaluated by `trace` with the numbers of the given stream
- * and step; brightness_fini frees it. Calls tick(). Returns -ENOMEM if out of memory. */
+ * and step; brightness_fini frees it. Calls liveness_tick(). Returns -ENOMEM if out of memory. */
 int brightness_of_samples(struct brightness *b, struct path_context *c, path_tracer *trace, uint64_t seed,
 			  enum rng_stream stream, uint64_t step, uint64_t samples, struct error *e);
 

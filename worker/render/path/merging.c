@@ -190,7 +190,7 @@ int merging_photons(struct merging *m, struct path_context *c, uint64_t seed, ui
 		struct pinned_numbers s;
 		double film[2];
 		if (m->paths % TICKS == 0)
-			tick();
+			liveness_tick();
 		sampler_init(&s, m, seed, step, m->paths);
 		path_walk_camera(c, &s.random.base, 1, film); /* sets the wavelengths and the time of c */
 		unsigned n = path_walk_light(c, &s.random.base, c->max_depth);
@@ -218,7 +218,7 @@ bool merging_walk(const struct merging *m, struct path_context *c, uint64_t seed
 	struct pinned_numbers s;
 	double distance = 0, unused;
 	if (index % TICKS == 0)
-		tick();
+		liveness_tick();
 	c->one_way = false;
 	sampler_init(&s, m, seed, step, index);
 	unsigned n = path_walk_camera(c, &s.random.base, c->max_depth + 1, out->film);

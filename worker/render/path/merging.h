@@ -59,8 +59,8 @@ struct merged {
 	double bdpt, path;
 };
 
-/* Traces `paths` light sub-paths with numbers of the stream RNG_CHOICE and calls tick(). Returns -ENOMEM if out of
- * memory; merging_fini frees *m in either case. */
+/* Traces `paths` light sub-paths with numbers of the stream RNG_CHOICE and calls liveness_tick(). Returns -ENOMEM if
+ * out of memory; merging_fini frees *m in either case. */
 int merging_photons(struct merging *m, struct path_context *c, uint64_t seed, uint64_t step, uint64_t paths);
 void merging_fini(struct merging *m);
 /* Walks the camera sub-path of one sample, of as many as there are light sub-paths. Returns false if it meets no rough

@@ -148,7 +148,7 @@ static int scan(const struct spread *s, struct obj_shape *o)
 	int64_t mesh = -1; /* counted as obj_read.h says */
 	bool in_mesh = false;
 	for (struct text_line l; text_lines_next(&lines, &l);) {
-		tick();
+		liveness_tick();
 		if (text_line_is(&l, "f")) {
 			mesh += !in_mesh;
 			in_mesh = now->has_faces = true;

@@ -64,7 +64,7 @@ static int spline_chain(const struct curve *c, uint32_t i, struct list *points)
 int curve_chain(const struct curve *c, uint32_t i, struct list *points)
 {
 	points->count = 0;
-	tick();
+	liveness_tick();
 	return c->spline ? spline_chain(c, i, points) : linear_chain(c, i, points);
 }
 

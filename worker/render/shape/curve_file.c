@@ -119,7 +119,7 @@ static int read_text(struct curve_reader *r, const struct asset *a)
 	struct text_line l;
 	int rc = 0;
 	while (!rc && text_lines_next(&lines, &l)) {
-		tick();
+		liveness_tick();
 		rc = read_line(r, &l);
 	}
 	return rc ? rc : end_curve(r, lines.number);
@@ -136,7 +136,7 @@ static int read_binary(struct curve_reader *r, const struct asset *a)
 	int rc = 0;
 	while (left > 0 && !rc) {
 		double v[4] = {0, 0, 0, r->radius};
-		tick();
+		liveness_tick();
 		if (end - p >= 4 && isinf(get_float(p))) {
 			rc = end_curve(r, 0);
 			p += 4;

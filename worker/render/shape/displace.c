@@ -224,7 +224,7 @@ static void each_point(struct displacer *w, bool all, void (*what)(struct displa
 	uint32_t n = w->grid.parts;
 	for (uint32_t t = 0; t < w->base.triangle_count; t++)
 		for (uint32_t i = 0; i <= n; i++) {
-			tick();
+			liveness_tick();
 			for (uint32_t j = 0; j <= n - i; j++) {
 				if (!all && i > 0 && j > 0 && j < n - i)
 					j = n - i;
@@ -278,7 +278,7 @@ static void put_triangles(struct displacer *w)
 	uint32_t n = w->grid.parts, count = 0;
 	for (uint32_t t = 0; t < w->base.triangle_count; t++)
 		for (uint32_t i = 0; i < n; i++) {
-			tick();
+			liveness_tick();
 			for (uint32_t j = 0; j < n - i; j++) {
 				copy_face(w, t, count);
 				put_triangle(w, t, (const uint32_t[3][2]){{i, j}, {i + 1, j}, {i, j + 1}},

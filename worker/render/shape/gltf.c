@@ -112,7 +112,7 @@ static int fill_mesh(struct mesh *m, const struct scene_node *n, const struct ac
 		if (m->uv && !(isfinite(m->uv[i][0]) && isfinite(m->uv[i][1])))
 			return node_error(n, e, EINVAL, "the texture coordinates of vertex %u are not finite", i);
 		if (i % 65536 == 0)
-			tick();
+			liveness_tick();
 	}
 	for (uint32_t t = 0; t < m->triangle_count; t++)
 		for (unsigned k = 0; k < 3; k++) {

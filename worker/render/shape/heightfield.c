@@ -125,7 +125,7 @@ static int make_mesh(const struct field *f, bool smooth, const struct scene_node
 		return node_error(n, e, ENOMEM, "out of memory");
 	double across = 2.0 / (width - 1), along = 2.0 / (height - 1);
 	for (uint32_t y = 0; y < height; y++) {
-		tick();
+		liveness_tick();
 		for (uint32_t x = 0; x < width; x++) {
 			uint32_t i = y * width + x;
 			mesh_store(m->position[i], (vec3){across * x - 1, along * y - 1, height_at(f, x, y)});

@@ -11,7 +11,7 @@
 static int compare_corners(const void *a, const void *b)
 {
 	const struct obj_corner *x = a, *y = b;
-	tick();
+	liveness_tick();
 	if (x->v != y->v)
 		return x->v < y->v ? -1 : 1;
 	if (x->vt != y->vt)

@@ -281,7 +281,7 @@ static int read_lines(struct reader *o)
 {
 	while (o->p < o->end) {
 		o->line++;
-		tick();
+		liveness_tick();
 		int r = read_line(o);
 		if (r)
 			return r;

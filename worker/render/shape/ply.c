@@ -434,7 +434,7 @@ static int read_body(struct ply *f)
 					  (unsigned long long)el->count, el->name);
 		for (uint64_t i = 0; i < el->count; i++) {
 			if (i % TICK_INTERVAL == 0)
-				tick();
+				liveness_tick();
 			int r = read_item(f, el, i);
 			if (r)
 				return r;

@@ -124,7 +124,7 @@ void polygon_cut(const struct polygon *p, uint32_t (*t)[3])
 {
 	vec3 normal = normal_of(p);
 	if (!fan_covers(p, normal)) {
-		tick();
+		liveness_tick();
 		cut_ears(p, normal, t);
 		return;
 	}

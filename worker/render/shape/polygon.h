@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Cuts the polygons of mesh files into triangles. Any thread; allocates nothing; calls tick()
+/* Cuts the polygons of mesh files into triangles. Any thread; allocates nothing; calls liveness_tick()
  * (common/base/liveness.h). */
 #ifndef WORKER_RENDER_SHAPE_POLYGON_H
 #define WORKER_RENDER_SHAPE_POLYGON_H

@@ -230,7 +230,7 @@ static void fill_layer(struct surface *s, uint32_t z)
 	size_t count = (size_t)(s->cells[0] + 1) * (s->cells[1] + 1);
 	memset(s->edge[z & 1], 0, count * sizeof *s->edge[0]);
 	for (uint32_t y = 0; y <= s->cells[1]; y++) {
-		tick();
+		liveness_tick();
 		for (uint32_t x = 0; x <= s->cells[0]; x++) {
 			const double p[3] = {x / (double)SPLIT, y / (double)SPLIT, z / (double)SPLIT};
 			s->field[z & 1][in_layer(s, x, y)] = field_at(&s->grid, p);
@@ -243,7 +243,7 @@ static int cut_layer(struct surface *s, uint32_t z)
 	struct cell c = {.at = {0, 0, z}};
 	int rc = 0;
 	for (c.at[1] = 0; c.at[1] < s->cells[1] && !rc; c.at[1]++) {
-		tick();
+		liveness_tick();
 		for (c.at[0] = 0; c.at[0] < s->cells[0] && !rc; c.at[0]++) {
 			unsigned inside = 0;
 			for (unsigned k = 0; k < 8; k++) {
@@ -289,7 +289,7 @@ static int make_mesh(const struct surface *s, bool smooth, struct arena *arena, 
 		return -ENOMEM;
 	memcpy(m->index, s->triangles.items, s->triangles.count * sizeof *m->index);
 	for (uint32_t i = 0; i < m->vertex_count; i++) {
-		tick();
+		liveness_tick();
 		for (int k = 0; k < 3; k++)
 			m->position[i][k] = p[i][k] / (s->grid.size[k] - 1);
 		if (smooth)

@@ -48,7 +48,7 @@ static int read_stream(struct stream *s, void *out, size_t size)
 	while (size > 0) {
 		uInt piece = size < 1u << 20 ? (uInt)size : 1u << 20;
 		s->z.avail_out = piece;
-		tick();
+		liveness_tick();
 		int code = inflate(&s->z, Z_SYNC_FLUSH);
 		size -= piece - s->z.avail_out;
 		if (s->z.avail_out > 0 && code != Z_OK)

@@ -123,7 +123,7 @@ static bool share_vertices(struct smoothing *s, struct corner *c, size_t count)
 		struct corner first = *c;
 		for (size_t i = 0; i < count; i++) {
 			if (++s->compared % TICK_EVERY == 0)
-				tick();
+				liveness_tick();
 			if (smooth_across(s, &first, &c[i]))
 				s->out.index[c[i].at / 3][c[i].at % 3] = v;
 			else

@@ -88,7 +88,7 @@ int spline_add(struct list *rings, const double (*points)[4], uint32_t count, do
 	int rc = 0;
 	for (uint32_t i = 0; i + SPLINE_POINTS <= count && !rc; i++) {
 		unsigned n = pieces_of(points + i, tolerance);
-		tick();
+		liveness_tick();
 		for (unsigned k = i > 0; k <= n && !rc; k++) {
 			struct tube_ring r = ring_at(points + i, (double)k / n, axis);
 			r.first = i == 0 && k == 0;

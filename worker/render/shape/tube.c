@@ -96,7 +96,7 @@ int tube_add_chain(struct list *rings, const double (*points)[4], uint32_t count
 	bool begun = false;
 	int rc = 0;
 	for (uint32_t i = 1; i < count && !rc; i++) {
-		tick();
+		liveness_tick();
 		struct sphere_at next = {mesh_load(points[i]), points[i][3], v + v_step * i};
 		vec3 way = vec3_sub(next.center, s.center), to = mesh_unit(way);
 		double length = vec3_length(way);
@@ -176,7 +176,7 @@ int tube_mesh(const struct list *rings, struct arena *arena, struct mesh *out)
 	for (uint32_t i = 0; i < count; i++) {
 		const struct tube_ring *r = &ring[i];
 		uint32_t first = i * (TUBE_SIDES + 1);
-		tick();
+		liveness_tick();
 		start = r->first ? direction_at_start(r->axis) : transport_direction(start, r[-1].axis, r->axis);
 		set_ring(out, first, r, start);
 		if (r->first)

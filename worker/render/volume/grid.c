@@ -156,7 +156,7 @@ void grid_find_full(const struct grid *g, unsigned char *full)
 	int x[3], y[3], z[3];
 	for (int k = 0; k < g->size[2]; k++) {
 		int nz = cells_with(g, 2, k, z);
-		tick();
+		liveness_tick();
 		for (int j = 0; j < g->size[1]; j++) {
 			int ny = cells_with(g, 1, j, y);
 			for (int i = 0; i < g->size[0]; i++, v += g->channels) {

@@ -70,7 +70,7 @@ static int read_grid(const unsigned char *p, size_t size, const struct scene_nod
 		out->least = fmin(out->least, (double)out->value[i]);
 		out->largest = fmax(out->largest, (double)out->value[i]);
 		if (i % TICK_INTERVAL == 0)
-			tick();
+			liveness_tick();
 	}
 	return 0;
 }

@@ -115,7 +115,7 @@ static bool needs_triangles(const struct builder *b, const struct scene_node *n,
 static int read_shape(struct builder *b, const struct scene_node *n, bool placed, struct shape_geometry *g,
 		      uint64_t *dropped)
 {
-	tick();
+	liveness_tick();
 	crash_place("building the scene", n->file, n->line);
 	int rc = shape_build(n, b->assets, &b->scratch, g, dropped, b->e);
 	if (!rc && g->kind == SHAPE_CURVE && needs_triangles(b, n, g, placed))
@@ -400,7 +400,7 @@ static int place_curves(struct builder *b, struct geom_shape *g, const struct cu
 		rc = curve_chain(c, i, &points);
 		if (!rc)
 			put_chain(out, b->w, points.items, points.count);
-		tick();
+		liveness_tick();
 	}
 	list_free(&points);
 	if (rc)
@@ -483,7 +483,7 @@ int build_place_shapes(struct builder *b)
 	const struct scene_node *first_gone = NULL;
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		bool gone;
-		tick();
+		liveness_tick();
 		move_shape(b, i, kept);
 		int rc = place_shape(b, kept, wide_from, &gone);
 		if (rc)

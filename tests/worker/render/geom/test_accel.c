@@ -349,9 +349,9 @@ static void test_building_ticks(void **state)
 	atomic_ullong ticks = 0;
 	struct geom_shape s;
 	body_ball(&s, 200, 0.7, 0.15);
-	tick_counter = &ticks;
+	liveness_counter = &ticks;
 	struct accel *a = body_accel(&s, 1);
-	tick_counter = NULL;
+	liveness_counter = NULL;
 	print_message("%llu ticks for %u triangles\n", atomic_load(&ticks), s.triangle_count);
 	assert_true(atomic_load(&ticks) >= s.triangle_count / 4096);
 	accel_free(a);
