@@ -274,6 +274,13 @@ static const char *name_of_file(const char *file, char name[NAME_MOST + 1])
 	return name;
 }
 
+static void print_notes(const struct arguments *a, const struct scene_files *files)
+{
+	char note[512];
+	for (size_t i = 0; render_scene_note(&files->summary, i, note, sizeof note); i++)
+		place_print(stderr, "hslt-submit: note: ", a->render.scene, note);
+}
+
 int main(int argc, char **argv)
 {
 	static struct arguments a; /* too large for the stack */
@@ -302,8 +309,7 @@ int main(int argc, char **argv)
 		return rc == -EINVAL ? 2 : 1;
 	}
 	char note[512], name[NAME_MOST + 1];
-	for (size_t i = 0; render_scene_note(&files.summary, i, note, sizeof note); i++)
-		place_print(stderr, "hslt-submit: note: ", a.render.scene, note);
+	print_notes(&a, &files);
 	a.request.output = a.estimate || to_stdout(&a) ? "" : last_part(a.render.output);
 	a.request.name = a.name ? a.name : name_of_file(files.scene, name);
 	if ((rc = check_access(&a, &e))) {

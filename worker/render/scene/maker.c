@@ -526,14 +526,9 @@ static int finish_node(struct maker *m, const struct draft *d, struct xml_elemen
 	return r;
 }
 
-/* An object with errors inside still becomes a node, so that all errors are found. An element that cannot become a
- * node, for example because its type is unknown, is reported once. */
-int maker_node(struct maker *m, struct xml_element *el, const struct scene_node **out)
+/* Refuses an element that refers to itself, was refused before, or lies too deep. */
+static int check_place(struct maker *m, struct xml_element *el)
 {
-	if (el->node) {
-		*out = el->node;
-		return 0;
-	}
 	if (el->busy)
 		return xml_error(el, m->error, ELOOP, "refers to itself");
 	if (el->told)
@@ -547,11 +542,25 @@ int maker_node(struct maker *m, struct xml_element *el, const struct scene_node 
 			    : xml_error(el, m->error, ELOOP, "objects refer to each other more than %d deep",
 					XML_DEPTH_MAX);
 	}
+	return 0;
+}
+
+/* An object with errors inside still becomes a node, so that all errors are found. An element that cannot become a
+ * node, for example because its type is unknown, is reported once. */
+int maker_node(struct maker *m, struct xml_element *el, const struct scene_node **out)
+{
+	if (el->node) {
+		*out = el->node;
+		return 0;
+	}
+	int r = check_place(m, el);
+	if (r)
+		return r;
 	el->told = true; /* reset on success */
 	enum plugin_class cls;
 	plugin_class_find(el->name, &cls);
 	bool file = el->parent && strcmp(el->parent->name, "include") == 0;
-	int r = element_check(el, file || m->tree->dialect_3 ? "type|id|name|version" : "type|id|name", true, m->error);
+	r = element_check(el, file || m->tree->dialect_3 ? "type|id|name|version" : "type|id|name", true, m->error);
 	if (r)
 		return r;
 	const char *type = xml_attribute(el, "type");

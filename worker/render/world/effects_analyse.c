@@ -351,6 +351,28 @@ static void lobes(struct report *r, const struct census *c)
 					"border on a medium that scatters", "no medium scatters");
 }
 
+static void motion(struct report *r, const struct world *w, const struct effects_source *src)
+{
+	char text[NAMES_MAX];
+	struct tally moving = {0};
+	for (uint32_t i = 0; i < w->shape_count; i++)
+		if (surface_moves(&w->shapes[i]))
+			count(&moving, src->shape[i], "");
+	for (uint32_t i = 0; i < w->emitter_count; i++)
+		if (w->emitters[i].moves && w->emitter_shape[i] == UINT32_MAX)
+			count(&moving, src->emitter[i], "");
+	if (w->camera.moves)
+		count(&moving, src->sensor, "");
+	if (moving.count)
+		r->fx->motion = line(r, EFFECT_MOTION, true, "%s move%s while the shutter is open",
+				     names_of(&moving, text), verb_of(&moving, "s", ""));
+	else
+		r->fx->motion = line(r, EFFECT_MOTION, false, "%s",
+				     w->settings.shutter_open < w->settings.shutter_close
+					     ? "nothing moves while the shutter is open"
+					     : "the exposure time is zero");
+}
+
 static void surfaces(struct report *r, const struct census *c, const struct world *w, const struct effects_source *src)
 {
 	char text[NAMES_MAX], more[NAMES_MAX];
@@ -385,23 +407,7 @@ static void surfaces(struct report *r, const struct census *c, const struct worl
 		     w->instance_count, w->instance_count == 1 ? "" : "s", w->instance_count == 1 ? "s" : "");
 	else
 		line(r, EFFECT_INSTANCING, false, "no mesh is used in several places");
-	struct tally moving = {0};
-	for (uint32_t i = 0; i < w->shape_count; i++)
-		if (surface_moves(&w->shapes[i]))
-			count(&moving, src->shape[i], "");
-	for (uint32_t i = 0; i < w->emitter_count; i++)
-		if (w->emitters[i].moves && w->emitter_shape[i] == UINT32_MAX)
-			count(&moving, src->emitter[i], "");
-	if (w->camera.moves)
-		count(&moving, src->sensor, "");
-	if (moving.count)
-		r->fx->motion = line(r, EFFECT_MOTION, true, "%s move%s while the shutter is open",
-				     names_of(&moving, text), verb_of(&moving, "s", ""));
-	else
-		r->fx->motion = line(r, EFFECT_MOTION, false, "%s",
-				     w->settings.shutter_open < w->settings.shutter_close
-					     ? "nothing moves while the shutter is open"
-					     : "the exposure time is zero");
+	motion(r, w, src);
 	const struct render_coincident *k = &w->coincident;
 	if (k->total > 1)
 		line(r, EFFECT_COINCIDENCE, true, "%zu pairs of shapes coincide visibly", k->total);
