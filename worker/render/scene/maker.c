@@ -239,6 +239,26 @@ static int read_property(struct maker *m, struct draft *d, const struct xml_elem
 	return r || !file ? r : maker_add_asset(m, file, el);
 }
 
+/* Adds a child of its class; target: the element that the child was made from. */
+static int add_child(struct maker *m, struct draft *d, const struct xml_element *owner, const struct xml_element *el,
+		     const struct xml_element *target, const struct scene_node *child)
+{
+	enum plugin_class cls;
+	plugin_class_find(target->name, &cls);
+	const char *written = xml_attribute(el, "name");
+	bool many = d->node->cls == cls && (cls == PLUGIN_BSDF || cls == PLUGIN_SHAPE || cls == PLUGIN_SENSOR ||
+					    cls == PLUGIN_INTEGRATOR || cls == PLUGIN_PHASE);
+	bool second = !many && node_child(d->node, cls, 0);
+	if (second && d->stands_in)
+		return leave_out(&m->notes, el, d->node->type, written ? written : target->name, "a second object,");
+	if (second)
+		return xml_error(el, m->error, EINVAL, "a second %s in <%s type=\"%.64s\">, which may have one",
+				 plugin_class_name(cls), owner->name, d->node->type);
+	d->children[d->node->child_count++] = child;
+	d->node->shines |= child->shines;
+	return 0;
+}
+
 /* Reads an object that is nested in another or referred to there: as a parameter if the table has its name,
  * otherwise as a child of its class. */
 static int read_object(struct maker *m, struct draft *d, const struct xml_element *owner, const struct xml_element *el,
@@ -292,17 +312,7 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 		return r;
 	if (p)
 		return add_property(m, d, el, p, (struct value){.type = VALUE_NODE, .as.node = child});
-	bool many = d->node->cls == cls && (cls == PLUGIN_BSDF || cls == PLUGIN_SHAPE || cls == PLUGIN_SENSOR ||
-					    cls == PLUGIN_INTEGRATOR || cls == PLUGIN_PHASE);
-	bool second = !many && node_child(d->node, cls, 0);
-	if (second && d->stands_in)
-		return leave_out(&m->notes, el, d->node->type, written ? written : target->name, "a second object,");
-	if (second)
-		return xml_error(el, m->error, EINVAL, "a second %s in <%s type=\"%.64s\">, which may have one",
-				 plugin_class_name(cls), owner->name, d->node->type);
-	d->children[d->node->child_count++] = child;
-	d->node->shines |= child->shines;
-	return 0;
+	return add_child(m, d, owner, el, target, child);
 }
 
 int maker_foreign(struct maker *m, const struct xml_element *el)
