@@ -29,7 +29,7 @@ used=$(df --output=used -k "$DIR/spool" | tail -n 1)
 mount -o remount,size=$((used + 4900))k "$DIR/spool" # all results take 5,000 KB, and so would a checkpoint
 id=$(submit "$BOX" -o "$DIR/full.exr" $JOB)
 until_true 20 is_state "$id" held || fail "$id is $(value "$id" state), and $(df -k "$DIR/spool" | tail -n 1)"
-value "$id" waiting | grep -q 'No space left' || fail "it does not say why: $(value "$id" waiting)"
+value "$id" waiting | grep -q 'No space left\|space left on the disk' || fail "it does not say why: $(value "$id" waiting)"
 grep -q "level=warn event=job_held job=$id state=held" "$DIR/coordinator.log" || fail "the log does not warn"
 [ -z "$(value "$id" eta | grep -v null)" ] || fail "it states when it will be done: $(value "$id" eta)"
 before=$(value "$id" merged)
