@@ -24,7 +24,7 @@ fill_but() {
 
 waits_for_room() {
 	fill_but 0
-	value "$1" waiting | grep -q "No space left\|has no room"
+	value "$1" waiting | grep -q "No space left\|space left on the disk\|has no room"
 }
 
 has_merged() {
@@ -45,7 +45,7 @@ code 0 timeout 60 "$BIN/hslt-job" list
 got=0
 timeout 60 "$BIN/hslt-job" extend "$finished" --spp +2 >"$DIR/extend.log" 2>&1 || got=$?
 [ $got -ne 124 ] || fail "hslt-job extend gets no answer on a full disk"
-[ $got -eq 0 ] || grep -q "No space left\|no room\|deleted\|disk is full\|database or disk is full" "$DIR/extend.log" || fail "extend says: $(cat "$DIR/extend.log")"
+[ $got -eq 0 ] || grep -q "No space left\|space left on the disk\|no room\|deleted\|disk is full\|database or disk is full" "$DIR/extend.log" || fail "extend says: $(cat "$DIR/extend.log")"
 extended=$([ $got -eq 0 ] && echo yes || echo no)
 got=0
 timeout 60 "$BIN/hslt-job" extend "$counted" --spp +64 >"$DIR/extend2.log" 2>&1 || got=$?
