@@ -133,7 +133,10 @@ static json_t *worker_json(const Farm__WorkerStatus *w)
 
 static void print_workers(const Farm__WorkerListAnswer *a)
 {
-	worker_table_head();
+	if (a->n_workers == 0)
+		printf("no workers are connected\n");
+	else
+		worker_table_head();
 	for (size_t i = 0; i < a->n_workers; i++) {
 		const Farm__WorkerStatus *w = a->workers[i];
 		worker_table_print(&(struct worker_row){w->name, w->state, w->text, w->restarts, w->threads, w->leases,

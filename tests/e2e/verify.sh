@@ -23,6 +23,7 @@ start_coordinator --heartbeat 60
 python3 "$HERE/starts.py" "${COORDINATOR#*:}" || fail "restarted workers"
 stop $COORDINATOR_PID
 start_coordinator
+[ "$("$BIN/hslt-job" workers)" = "no workers are connected" ] || fail "without workers: $("$BIN/hslt-job" workers)"
 start_worker honest1
 a=$WORKER
 id=$(submit "$BOX" -o "$DIR/all.exr" $JOB --verify 100%)
