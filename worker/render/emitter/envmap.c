@@ -168,7 +168,9 @@ struct light_row {
 
 static void load_row(const struct envmap *m, uint32_t row, struct light_row *to)
 {
-	for (uint32_t c = 0; to->row != row && c < m->columns; c++) {
+	if (to->row == row)
+		return;
+	for (uint32_t c = 0; c < m->columns; c++) {
 		double rgb[3];
 		raster_pixel(&m->raster, c, row, rgb);
 		to->luminance[c] = rec709_luminance(rgb);
