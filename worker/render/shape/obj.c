@@ -131,6 +131,28 @@ static int out_of_memory(const struct scene_node *n, struct error *e)
 	return node_error(n, e, ENOMEM, "%s: out of memory", node_string(n, "filename", ""));
 }
 
+/* Returns room for that many corners and triangles; has_room() says whether there was memory for it. */
+static struct faces faces_of(size_t corners, size_t triangles)
+{
+	return (struct faces){.corners = mem_alloc(corners, sizeof(struct obj_corner)),
+			      .triangles = mem_alloc(triangles, sizeof(uint32_t[3]))};
+}
+
+static bool has_room(const struct faces *f)
+{
+	return f->corners && f->triangles;
+}
+
+/* Makes the mesh of copied faces, and frees these. */
+static int build_copies(const struct scene_node *n, const struct obj_file *o, struct faces *f, struct arena *arena,
+			struct shape_geometry *out, struct error *e)
+{
+	bool ok = has_room(f) && make_mesh(o, f, arena, &out->mesh, node_bool(n, "flip_tex_coords", true));
+	mem_free(f->corners);
+	mem_free(f->triangles);
+	return ok ? 0 : out_of_memory(n, e);
+}
+
 /* Builds the faces of one material from copies, since the file is kept for the other materials. */
 static int build_material(const struct scene_node *n, const struct obj_file *o, const char *material,
 			  struct arena *arena, struct shape_geometry *out, struct error *e)
@@ -146,16 +168,11 @@ static int build_material(const struct scene_node *n, const struct obj_file *o, 
 	if (triangles == 0)
 		return node_error(n, e, EINVAL, "%s: has no faces of the material `%.64s`",
 				  node_string(n, "filename", ""), material);
-	struct faces f = {.corners = mem_alloc(corners, sizeof *f.corners),
-			  .triangles = mem_alloc(triangles, sizeof *f.triangles)};
-	bool ok = f.corners && f.triangles;
-	for (size_t i = 0; ok && i < o->runs.count; i++)
+	struct faces f = faces_of(corners, triangles);
+	for (size_t i = 0; has_room(&f) && i < o->runs.count; i++)
 		if (is_of(o, i, material))
 			take(o, range_of_run(o, i), &f);
-	ok = ok && make_mesh(o, &f, arena, &out->mesh, node_bool(n, "flip_tex_coords", true));
-	mem_free(f.corners);
-	mem_free(f.triangles);
-	return ok ? 0 : out_of_memory(n, e);
+	return build_copies(n, o, &f, arena, out, e);
 }
 
 /* One mesh, copied. `material`, if not NULL, must be its own. */
@@ -171,16 +188,10 @@ static int build_mesh(const struct scene_node *n, const struct obj_file *o, cons
 		return node_error(n, e, EINVAL, "%s: mesh %zu has no faces of the material `%.64s`", name, index,
 				  material);
 	struct range r = range_of_mesh(o, index);
-	struct faces f = {.corners = mem_alloc(r.corner_end - r.corner, sizeof *f.corners),
-			  .triangles = mem_alloc(r.triangle_end - r.triangle, sizeof *f.triangles)};
-	bool ok = f.corners && f.triangles;
-	if (ok) {
+	struct faces f = faces_of(r.corner_end - r.corner, r.triangle_end - r.triangle);
+	if (has_room(&f))
 		take(o, r, &f);
-		ok = make_mesh(o, &f, arena, &out->mesh, node_bool(n, "flip_tex_coords", true));
-	}
-	mem_free(f.corners);
-	mem_free(f.triangles);
-	return ok ? 0 : out_of_memory(n, e);
+	return build_copies(n, o, &f, arena, out, e);
 }
 
 static int build_all(const struct scene_node *n, struct obj_file *o, struct arena *arena, struct shape_geometry *out,
